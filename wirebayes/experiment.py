@@ -1,0 +1,344 @@
+"""What was measured: tests of one wire each, read from TOML beside CSV and checked to the last field."""
+
+import hashlib
+import json
+import re
+import tomllib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.readings import Hold, frozen, nearest, read_readings, read_text, shown
+from wirebayes.wire.protocol import Protocol
+
+__all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
+
+_KEYS = ("name", "material", "length_mm", "resolution_N", "readings", "unrecorded_holds", "prior")
+_HOLD_KEYS = ("before_hold", "displacement_mm", "duration_s")
+_NAME = re.compile(r"[A-Za-z0-9._-]+", re.ASCII)
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One test of one wire sample.
+
+    Attributes
+    ----------
+    name, material : str
+    length_mm : float
+        Zero-tension length before the test.
+    resolution_N : float
+        Step to which tensions were rounded; 0.0 when not stated.
+    holds : tuple of Hold
+        In order, the unrecorded ones at their place.
+    source : Path
+        The TOML file it was read from.
+    priors : dict
+        ``[prior]`` tables by parameter name, as written: the file's, then the experiment's own over them.
+    """
+
+    name: str
+    material: str
+    length_mm: float
+    resolution_N: float
+    holds: tuple[Hold, ...]
+    source: Path
+    priors: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def recorded_holds(self) -> tuple[Hold, ...]:
+        """The holds that have readings."""
+        return tuple(hold for hold in self.holds if hold.recorded)
+
+    @property
+    def material_folder(self) -> str:
+        """The material as a folder name: spaces become hyphens."""
+        return self.material.replace(" ", "-")
+
+    def protocol(self) -> Protocol:
+        """What was done, padded to (H, R) arrays."""
+        first = next((hold.temperature_C[0] for hold in self.holds if hold.temperature_C is not None), None)
+        return protocol_of(self.holds, self.length_mm, first)
+
+    def tension(self) -> NDArray[np.float64]:
+        """Measured tensions, (H, R) in N, padded with 0 as `protocol` is."""
+        return _padded([hold.tension_N for hold in self.holds])
+
+    def train(self, holds: int) -> "Experiment":
+        """The first `holds` recorded holds, and the unrecorded ones before the last of them.
+
+        Raises
+        ------
+        InputError
+            When there are not that many.
+        """
+        places = [place for place, hold in enumerate(self.holds) if hold.recorded]
+        if not 1 <= holds <= len(places):
+            raise InputError(
+                f"{self.source}, experiment {self.name}: found {holds} training holds asked for, "
+                f"expected 1 to {len(places)}, the recorded ones"
+            )
+        return replace(self, holds=self.holds[: places[holds - 1] + 1])
+
+    def without_unrecorded(self) -> "Experiment":
+        """The same test as if the unrecorded holds had never been."""
+        return replace(self, holds=_in_sequence(self.recorded_holds))
+
+    @property
+    def data_hash(self) -> str:
+        """SHA-256 of everything measured (not of the priors, nor of how the files spell it)."""
+        content = [self.name, self.material, self.length_mm, self.resolution_N]
+        holds = [
+            [hold.number, hold.displacement_mm, hold.duration_s, hold.time_s.tolist(), hold.tension_N.tolist()]
+            + ([] if hold.temperature_C is None else [hold.temperature_C.tolist()])
+            for hold in self.holds
+        ]
+        return hashlib.sha256(json.dumps([content, holds]).encode()).hexdigest()
+
+
+def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | None = None) -> Protocol:
+    """Pad holds to rectangular arrays.
+
+    Parameters
+    ----------
+    holds : tuple of Hold
+    length_mm : float
+    reference_C : float, optional
+        Temperature from which warming counts; without it there is no warming.
+
+    Returns
+    -------
+    Protocol
+        With H holds and R columns, R the largest number of readings in a hold.
+    """
+    warming = None
+    if reference_C is not None:
+        empty = frozen([])
+        warming = _padded([empty if hold.temperature_C is None else hold.temperature_C - reference_C for hold in holds])
+    return Protocol(
+        length_mm=length_mm,
+        displacement_mm=np.array([hold.displacement_mm for hold in holds]),
+        time_s=_padded([hold.time_s for hold in holds]),
+        mask=_padded([np.ones(hold.time_s.size) for hold in holds]) > 0,
+        duration_s=np.array([hold.duration_s for hold in holds]),
+        number=np.array([-1 if hold.number is None else hold.number for hold in holds], dtype=np.int64),
+        warming_K=warming,
+    )
+
+
+def _padded(rows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    array = np.zeros((len(rows), max((row.size for row in rows), default=0)))
+    for target, row in zip(array, rows, strict=True):
+        target[: row.size] = row
+    return array
+
+
+def _in_sequence(holds: tuple[Hold, ...]) -> tuple[Hold, ...]:
+    starts = np.concatenate([[0.0], np.cumsum([hold.duration_s for hold in holds])])
+    return tuple(replace(hold, start_s=float(start)) for hold, start in zip(holds, starts, strict=False))
+
+
+def select(experiments: list[Experiment], name: str | None) -> list[Experiment]:
+    """All experiments, or the named one.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    if name is None:
+        return experiments
+    names = [experiment.name for experiment in experiments]
+    if name not in names:
+        raise InputError(
+            f"{experiments[0].source}: found no experiment {shown(name)}{nearest(name, names)}, "
+            f"expected one of {', '.join(names)}"
+        )
+    return [experiments[names.index(name)]]
+
+
+def read_experiments(path: str | Path) -> list[Experiment]:
+    """Read an experiment file and the CSV files beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file in the format of the reference page "experiment file".
+
+    Returns
+    -------
+    list of Experiment
+        In order of the file.
+
+    Raises
+    ------
+    InputError
+        On anything wrong, with the file, the line and column or the key, what was found and what was expected.
+    """
+    source = Path(path)
+    text = read_text(source)
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}: found a TOML error, {_lower(str(error))}; expected valid TOML") from None
+    except RecursionError:
+        raise InputError(f"{source}: found values nested too deeply, expected an experiment file") from None
+    top = _Keys(source, text, None, document)
+    top.only(("experiment", "prior"))
+    tables = document.get("experiment")
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
+        found = "nothing" if tables is None else "a single table" if isinstance(tables, dict) else shown(tables)
+        raise InputError(f"{source}, key experiment: found {found}, expected at least one [[experiment]]")
+    shared = top.priors()
+    experiments: list[Experiment] = []
+    for index, table in enumerate(tables):
+        keys = _Keys(source, text, index, table)
+        experiment = _read_one(keys, shared)
+        if any(experiment.name == other.name for other in experiments):
+            raise keys.complain("name", shown(experiment.name) + " a second time", "a name used once in the file")
+        experiments.append(experiment)
+    return experiments
+
+
+@dataclass(frozen=True)
+class _Keys:
+    """One TOML table, asked for its keys; knows where each stands, so that a complaint can say it."""
+
+    source: Path
+    text: str
+    index: int | None
+    table: dict[str, Any]
+    prefix: str = ""
+
+    def complain(self, key: str, found: str, expected: str) -> InputError:
+        place = str(self.source)
+        if self.index is not None:
+            line = self._line(key)
+            place += f", line {line}" if line else ""
+            name = self.table.get("name") if not self.prefix else None
+            place += (
+                f", experiment {name}" if isinstance(name, str) and name != found else f", experiment {self.index + 1}"
+            )
+        return InputError(f"{place}, key {self.prefix}{key}: found {found}, expected {expected}")
+
+    def _line(self, key: str) -> int | None:
+        """Line of a key in its [[experiment]], found in the text because the parser does not keep it."""
+        top = (self.prefix + key).split("[")[0].split(".")[0]
+        seen = -1
+        for number, line in enumerate(self.text.splitlines(), start=1):
+            seen += line.strip().startswith("[[experiment]]")
+            if seen == self.index and re.match(rf"\s*[\"']?{re.escape(top)}[\"']?\s*[=.]", line):
+                return number
+        return None
+
+    def only(self, known: tuple[str, ...]) -> None:
+        for key in self.table:
+            if key not in known:
+                hint = nearest(key, known)
+                raise self.complain(key, f"an unknown key{hint}", "only " + ", ".join(known))
+
+    def value(self, key: str, expected: str) -> Any:
+        if key not in self.table:
+            raise self.complain(key, "nothing", expected)
+        return self.table[key]
+
+    def string(self, key: str, expected: str) -> str:
+        value = self.value(key, expected)
+        if not isinstance(value, str) or not value.strip():
+            raise self.complain(key, shown(value), expected)
+        return value
+
+    def number(self, key: str, expected: str, above: float | None = None, least: float | None = None) -> float:
+        value = self.value(key, expected)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.complain(key, shown(value), expected)
+        try:
+            number = float(value)
+        except OverflowError:
+            raise self.complain(key, shown(value), expected) from None
+        if not np.isfinite(number) or (above is not None and number <= above) or (least is not None and number < least):
+            raise self.complain(key, shown(value), expected)
+        return number
+
+    def priors(self) -> dict[str, dict[str, Any]]:
+        """The ``[prior]`` table, left as written: what a prior may say is known to the statistics alone."""
+        tables = self.table.get("prior", {})
+        expected = "a table of tables, one for each parameter"
+        if not isinstance(tables, dict):
+            raise self.complain("prior", shown(tables), expected)
+        for name, table in tables.items():
+            if not isinstance(table, dict):
+                raise self.complain(f"prior.{name}", shown(table), "a table, such as { low = 0.0, high = 1.0 }")
+        return tables
+
+
+def _read_one(keys: _Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
+    keys.only(_KEYS)
+    expected = "a name of letters, digits, '.', '_' and '-'"
+    name = keys.string("name", expected)
+    if not _NAME.fullmatch(name) or name in (".", ".."):
+        raise keys.complain("name", shown(name), expected)
+    expected = "a name without '/', '\\' or control characters"
+    material = keys.string("material", expected)
+    if material.strip() in (".", "..") or any(c in "/\\" or not c.isprintable() for c in material):
+        raise keys.complain("material", shown(material), expected)
+    length = keys.number("length_mm", "a length above 0 mm", above=0.0)
+    resolution = 0.0
+    if "resolution_N" in keys.table:
+        resolution = keys.number("resolution_N", "a step above 0 N, or no such key", above=0.0)
+    holds = _with_unrecorded(keys, read_readings(_readings_path(keys), length), length)
+    return Experiment(name, material, length, resolution, holds, keys.source, {**shared, **keys.priors()})
+
+
+def _readings_path(keys: _Keys) -> Path:
+    expected = "a CSV file inside this file's folder, relative to it"
+    readings = keys.string("readings", expected)
+    folder = keys.source.parent
+    try:
+        inside = not Path(readings).is_absolute() and (folder / readings).resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, a NUL in the name
+        inside = False
+    if not inside:
+        raise keys.complain("readings", shown(readings), expected)
+    if not (folder / readings).is_file():
+        raise keys.complain("readings", f"{shown(readings)}, which is no file there", expected)
+    return folder / readings
+
+
+def _with_unrecorded(keys: _Keys, holds: tuple[Hold, ...], length_mm: float) -> tuple[Hold, ...]:
+    """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
+    entries = keys.value("unrecorded_holds", "") if "unrecorded_holds" in keys.table else []
+    expected = "a list of { before_hold, displacement_mm, duration_s }"
+    if not isinstance(entries, list):
+        raise keys.complain("unrecorded_holds", shown(entries), expected)
+    numbers = [hold.number for hold in holds if hold.number is not None]
+    placed: list[tuple[int, Hold]] = []
+    for index, entry in enumerate(entries):
+        if not isinstance(entry, dict):
+            raise keys.complain(f"unrecorded_holds[{index}]", shown(entry), expected)
+        inner = _Keys(keys.source, keys.text, keys.index, entry, f"unrecorded_holds[{index}].")
+        inner.only(_HOLD_KEYS)
+        reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table['readings']}"
+        before = inner.value("before_hold", reach)
+        if isinstance(before, bool) or not isinstance(before, int) or not 0 <= before <= numbers[-1]:
+            raise inner.complain("before_hold", shown(before), reach)
+        displacement = inner.number(
+            "displacement_mm", f"a displacement above -{length_mm:g} mm, the wire's length", above=-length_mm
+        )
+        duration = inner.number("duration_s", "a duration of 0 s or more", least=0.0)
+        if index and entry == entries[index - 1]:
+            raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
+        place = next(place for place, number in enumerate(numbers) if number >= before)
+        placed.append((place, Hold(None, displacement, duration, frozen([]), frozen([]))))
+    ordered = []
+    for place, hold in enumerate(holds):
+        ordered += [unrecorded for at, unrecorded in placed if at == place] + [hold]
+    return _in_sequence(tuple(ordered))
+
+
+def _lower(message: str) -> str:
+    return message[:1].lower() + message[1:]

@@ -1,0 +1,263 @@
+"""The strict reader of a readings' CSV: every complaint names the file, the line and the column.
+
+The format: UTF-8 (a byte-order mark is accepted), one header line with the columns in any order, one reading a line,
+fields separated by commas, plain decimal numbers with optional spaces round them, any line ending, blank lines only at
+the end. There are no comments, no quotes and no empty cells.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+
+REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
+OPTIONAL = ("temperature_C",)
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
+_NEWLINE = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """One position held, with the readings taken there.
+
+    Attributes
+    ----------
+    number : int or None
+        The hold's number in the readings' file; None when it was held but not recorded.
+    displacement_mm : float
+    duration_s : float
+        A recorded hold lasts until its last reading.
+    time_s, tension_N : (r,) array
+        Time since the hold began and the tension then; empty when unrecorded. A protocol without
+        measured tensions has NaN in `tension_N`.
+    temperature_C : (r,) array or None
+    start_s : float
+        Time elapsed before this hold since the first one began.
+    """
+
+    number: int | None
+    displacement_mm: float
+    duration_s: float
+    time_s: NDArray[np.float64]
+    tension_N: NDArray[np.float64]
+    temperature_C: NDArray[np.float64] | None = None
+    start_s: float = 0.0
+
+    @property
+    def recorded(self) -> bool:
+        """True when the hold has readings."""
+        return self.time_s.size > 0
+
+
+def shown(value: object) -> str:
+    """What was found, on one short line."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """A hint for a mistyped word, or nothing."""
+    match = get_close_matches(word, known, 1)
+    return f" (did you mean {match[0]}?)" if match else ""
+
+
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file, without its byte-order mark.
+
+    Raises
+    ------
+    InputError
+        Missing, unreadable, empty, or not UTF-8 (names the line of the first bad byte).
+    """
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: found no such file, expected a readable file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: found a folder, expected a file") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{path}: cannot be read ({reason}), expected a readable file") from None
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = len(_NEWLINE.split(raw[: error.start].decode("utf-8", "replace")))
+        found = f"byte 0x{error.object[error.start]:02x}"
+        raise InputError(f"{path}, line {line}: found {found}, expected UTF-8 text") from None
+    if not text.strip():
+        raise InputError(f"{path}: found an empty file, expected text")
+    return text
+
+
+@dataclass(frozen=True)
+class _Table:
+    """A CSV split into fields; `complain` turns a row and a column into a place a person can find."""
+
+    path: Path
+    header: list[str]
+    rows: list[list[str]]
+
+    def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
+        place = f"line {row + 2}, column {self.header.index(column) + 1} ({column})"
+        return InputError(f"{self.path}, {place}: found {found}, expected {expected}")
+
+    def cell(self, row: int, column: str) -> str:
+        return self.rows[row][self.header.index(column)]
+
+    def number(self, row: int, column: str) -> float:
+        text = self.cell(row, column)
+        if not _NUMBER.fullmatch(text):
+            raise self.complain(row, column, shown(text) if text else "an empty cell", "a finite decimal number")
+        value = float(text)
+        if not np.isfinite(value):
+            raise self.complain(row, column, shown(text), "a finite decimal number")
+        return value
+
+    def whole(self, row: int, column: str) -> int:
+        text = self.cell(row, column)
+        if not _WHOLE.fullmatch(text):
+            raise self.complain(row, column, shown(text) if text else "an empty cell", "a whole number, 0 or more")
+        return int(text)
+
+
+def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> _Table:
+    lines = _NEWLINE.split(read_text(path))
+    while not lines[-1].strip():
+        lines.pop()
+    header = [field.strip() for field in lines[0].split(",")]
+    known = (*required, *optional)
+    expected = ",".join(required) + f" (and optionally {', '.join(optional)})"
+    for column, name in enumerate(header, start=1):
+        if name not in known:
+            hint = nearest(name, known)
+            raise InputError(
+                f"{path}, line 1, column {column}: found {shown(name)}{hint}, expected a header of {expected}"
+            )
+        if name in header[: column - 1]:
+            raise InputError(f"{path}, line 1, column {column}: found {name} a second time, expected it once")
+    for name in required:
+        if name not in header:
+            raise InputError(f"{path}, line 1: found no column {name}, expected a header of {expected}")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        fields = [field.strip() for field in line.split(",")]
+        if len(fields) != len(header):
+            found = f"{len(fields)} field{'s' * (len(fields) != 1)}" if line.strip() else "a blank line"
+            column = min(len(fields), len(header))
+            raise InputError(
+                f"{path}, line {number}, column {column}: found {found}, expected {len(header)} ({','.join(header)})"
+            )
+        rows.append(fields)
+    if not rows:
+        raise InputError(f"{path}, line 2: found no readings, expected at least one")
+    return _Table(path, header, rows)
+
+
+def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
+    """Read and check a readings' CSV.
+
+    Parameters
+    ----------
+    path : Path
+    length_mm : float
+        Zero-tension length, so that a displacement that leaves no wire is found.
+
+    Returns
+    -------
+    tuple of Hold
+        In order of the file, each starting when the one before it ended.
+
+    Raises
+    ------
+    InputError
+        With the file, line, column, what was found and what was expected.
+    """
+    table = _read_table(path, REQUIRED, OPTIONAL)
+    return _holds(table, length_mm, [table.number(row, "tension_N") for row in range(len(table.rows))])
+
+
+def read_protocol(path: Path, length_mm: float) -> tuple[Hold, ...]:
+    """Read the CSV of a protocol to predict: the readings' columns, with tensions optional.
+
+    A column `tension_N`, when there is one, is filled at most at the first time of a hold; every other
+    reading has NaN.
+
+    Raises
+    ------
+    InputError
+        As `read_readings`, and where a tension stands at a later time of its hold.
+    """
+    table = _read_table(path, REQUIRED[:3], ("tension_N", *OPTIONAL))
+    tension = [np.nan] * len(table.rows)
+    if "tension_N" in table.header:
+        for row in range(len(table.rows)):
+            if not table.cell(row, "tension_N"):
+                continue
+            tension[row] = table.number(row, "tension_N")
+            if row and table.cell(row, "hold") == table.cell(row - 1, "hold"):
+                found = table.cell(row, "tension_N")
+                raise table.complain(row, "tension_N", found, "an empty cell after the hold's first time")
+    return _holds(table, length_mm, tension)
+
+
+def _holds(table: _Table, length_mm: float, tension: Sequence[float]) -> tuple[Hold, ...]:
+    rows = range(len(table.rows))
+    number = [table.whole(row, "hold") for row in rows]
+    displacement = [table.number(row, "displacement_mm") for row in rows]
+    time = [table.number(row, "time_s") for row in rows]
+    temperature = None
+    if "temperature_C" in table.header:
+        temperature = [table.number(row, "temperature_C") for row in rows]
+        for row in rows:
+            if temperature[row] < -273.15:
+                raise table.complain(row, "temperature_C", table.cell(row, "temperature_C"), "at least -273.15 °C")
+    first = []
+    for row in rows:
+        if length_mm + displacement[row] <= 0:
+            expected = f"a displacement above -{length_mm:g} mm, the wire's length"
+            raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
+        if time[row] < 0:
+            raise table.complain(row, "time_s", table.cell(row, "time_s"), "0 s or later")
+        if row and number[row] == number[row - 1]:
+            if displacement[row] != displacement[row - 1]:
+                expected = f"{table.cell(row - 1, 'displacement_mm')} as before in hold {number[row]}"
+                raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
+            if time[row] <= time[row - 1]:
+                expected = f"a time after {table.cell(row - 1, 'time_s')} s in hold {number[row]}"
+                raise table.complain(row, "time_s", table.cell(row, "time_s"), expected)
+            continue
+        if row and number[row] < number[row - 1]:
+            interleaved = " (its rows must stand together)" if number[row] in number[:row] else ""
+            expected = f"a hold number above {number[row - 1]}{interleaved}"
+            raise table.complain(row, "hold", str(number[row]), expected)
+        first.append(row)
+    holds, start = [], 0.0
+    for begin, end in zip(first, [*first[1:], len(table.rows)], strict=True):
+        holds.append(
+            Hold(
+                number=number[begin],
+                displacement_mm=displacement[begin],
+                duration_s=time[end - 1],
+                time_s=frozen(time[begin:end]),
+                tension_N=frozen(tension[begin:end]),
+                temperature_C=None if temperature is None else frozen(temperature[begin:end]),
+                start_s=start,
+            )
+        )
+        start += time[end - 1]
+    return tuple(holds)
+
+
+def frozen(values: Sequence[float]) -> NDArray[np.float64]:
+    """A read-only array, so that what was measured stays what was measured."""
+    array = np.array(values, dtype=float)
+    array.flags.writeable = False
+    return array
