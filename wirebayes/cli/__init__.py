@@ -1,0 +1,144 @@
+"""The command line: a table of commands, each loaded only when it is called.
+
+Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wrong is a bug and shows its traceback.
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Annotated, NamedTuple
+
+import typer
+
+from wirebayes import __version__
+from wirebayes.errors import InputError
+
+
+class Command(NamedTuple):
+    """Where a command's function lives, and what ``--help`` says of it without loading it."""
+
+    module: str
+    function: str
+    summary: str
+    example: str
+
+
+COMMANDS = {
+    "reproduce": Command(
+        "wirebayes.cli.reproduce",
+        "reproduce",
+        "Everything the paper shows, on its own tables, with posteriors.",
+        "wirebayes reproduce --output out/reproduce",
+    ),
+    "fit": Command(
+        "wirebayes.cli.fit",
+        "fit",
+        "Posterior of a wire's parameters.",
+        "wirebayes fit data/paper/experiments.toml --experiment roc-line-1m --output out/fit",
+    ),
+    "compare": Command(
+        "wirebayes.cli.compare",
+        "compare",
+        "Laws, histories, likelihoods and effects side by side, on readings they have not seen.",
+        "wirebayes compare data/paper/experiments.toml --experiment nylon-1.5m --output out/compare",
+    ),
+    "discover": Command(
+        "wirebayes.cli.discover",
+        "discover",
+        "Find which physical effect the model is missing.",
+        "wirebayes discover data/paper/experiments.toml --output out/discover",
+    ),
+    "predict": Command(
+        "wirebayes.cli.predict",
+        "predict",
+        "Predict readings of holds not measured yet.",
+        "wirebayes predict out/fit protocol.csv --output predicted.csv",
+    ),
+    "simulate": Command(
+        "wirebayes.cli.simulate",
+        "simulate",
+        "Write synthetic tests with known truth.",
+        "wirebayes simulate --output out/simulated --seed 1",
+    ),
+    "pose": Command(
+        "wirebayes.cli.robot",
+        "pose",
+        "Pose of a robot on creeping wires: kinematics, drift and their uncertainty.",
+        "wirebayes pose data/robots/suspended-8.toml --wires out/fit/roc-line-1m --output out/pose",
+    ),
+    "calibrate": Command(
+        "wirebayes.cli.robot",
+        "calibrate",
+        "Zero-tension lengths of a robot's wires from readings along its poses.",
+        "wirebayes calibrate data/robots/suspended-8.toml readings.csv --output out/calibrate",
+    ),
+    "export": Command(
+        "wirebayes.cli.robot",
+        "export",
+        "A robot with its wires as a MuJoCo model.",
+        "wirebayes export data/robots/suspended-8.toml --wires out/fit/roc-line-1m --output out/export",
+    ),
+    "report": Command(
+        "wirebayes.cli.report",
+        "report",
+        "One self-contained page of what a folder of results holds.",
+        "wirebayes report out/reproduce",
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Without the program's name; those of the process when not given.
+
+    Returns
+    -------
+    int
+        0 done, 2 bad input or usage.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    called = next((word for word in arguments if not word.startswith("-")), None)
+    try:
+        typer.main.get_command(_application(called)).main(args=arguments, prog_name="wirebayes")
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+    return 0
+
+
+def _application(called: str | None) -> typer.Typer:
+    """The whole command line, with only the called command's module loaded."""
+    # rich_markup_mode None: errors are plain lines, also for a program that reads them
+    application = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+    application.callback()(_top)
+    for name, command in COMMANDS.items():
+        function: Callable[..., object] = _unloaded
+        if name == called:
+            function = getattr(import_module(command.module), command.function)
+        # \b keeps the example on its own line, unwrapped
+        application.command(name, short_help=command.summary, epilog=f"\b\nExample:\n  {command.example}")(function)
+    return application
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"wirebayes {__version__}")
+        raise typer.Exit
+
+
+def _top(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."""
+
+
+def _unloaded() -> None:
+    raise AssertionError("only the called command is run, and that one is loaded")

@@ -1,0 +1,27 @@
+"""Options that several commands share, named and explained once.
+
+Use them as annotations: ``def fit(file: ExperimentFile, output: Output, seed: Seed = 0) -> None``.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+ExperimentFile = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Experiments, with their CSV files beside.")]
+Output = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same machine: same bytes.")]
+ExperimentName = Annotated[str | None, typer.Option("--experiment", metavar="NAME", help="This experiment only.")]
+TrainHolds = Annotated[
+    int | None, typer.Option("--train-holds", metavar="K", help="Learn from the first K recorded holds only.")
+]
+ElasticLawOption = Annotated[
+    Literal["hooke", "modified"], typer.Option("--elastic-law", help="Strain over L0, eq (1), or over L, eq (3).")
+]
+HistoryOption = Annotated[
+    Literal["saturating", "additive"],
+    typer.Option("--history", help="Creep towards one total amount, or a new amount in every hold."),
+]
+LikelihoodOption = Annotated[
+    Literal["chain", "hold"], typer.Option("--likelihood", help="The holds as one history, or every hold by itself.")
+]

@@ -1,0 +1,43 @@
+"""Progress bars on a terminal, silence in a pipe."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Report = Callable[[str, float, float], None]
+
+
+@contextmanager
+def progress() -> Iterator[Report]:
+    """Show progress on stderr while the block runs.
+
+    Yields
+    ------
+    report : callable
+        ``report(name, done, total)``: a bar for each name, drawn only when stderr is a terminal.
+
+    Examples
+    --------
+    >>> with progress() as report:
+    ...     for step in range(10):
+    ...         report("sampling", step + 1, 10)
+    """
+    if not sys.stderr.isatty():
+        yield _silent
+        return
+    from rich.console import Console  # rich is loaded only where there is someone to look at it
+    from rich.progress import Progress, TaskID, TimeElapsedColumn
+
+    with Progress(*Progress.get_default_columns(), TimeElapsedColumn(), console=Console(stderr=True)) as bars:
+        known: dict[str, TaskID] = {}
+
+        def report(name: str, done: float, total: float) -> None:
+            if name not in known:
+                known[name] = bars.add_task(name, total=total)
+            bars.update(known[name], completed=done, total=total)
+
+        yield report
+
+
+def _silent(name: str, done: float, total: float) -> None:
+    """Somebody else reads stderr."""

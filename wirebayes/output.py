@@ -1,0 +1,191 @@
+"""What is written: whole files or none, and folders that belong to one configuration.
+
+A folder of results holds ``configuration.json``, the resolved configuration that made it. The same configuration
+resumes there, another is refused; so nothing is ever mixed or overwritten.
+"""
+
+import csv
+import io
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from wirebayes.errors import InputError
+
+CONFIGURATION = "configuration.json"
+COMPLETE = "complete.json"
+_PARTIAL = ".partial"
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a whole file or nothing: a reader, or a run killed half-way, never meets half of it."""
+    handle, partial = tempfile.mkstemp(prefix=f".{path.name}.", suffix=_PARTIAL, dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(partial, 0o666 & ~_umask())  # mkstemp makes private files, results are for everyone
+        os.replace(partial, path)
+    except BaseException:
+        Path(partial).unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, content: str) -> None:
+    """Write a whole UTF-8 text file with line feeds, or nothing."""
+    write_bytes(path, content.encode("utf-8"))
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write JSON: keys in the order given, numbers in their shortest exact form, NaN and infinity as null."""
+    write_text(path, json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a CSV with line feeds; floats in their shortest exact form, NaN as an empty cell."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(["" if value is None else value for value in plain(list(row))])
+    write_text(path, text.getvalue())
+
+
+def plain(value: Any) -> Any:
+    """The value in JSON's own types: arrays as lists, numpy numbers as Python's, paths as text, NaN as None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return [plain(item) for item in sorted(value)]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that could not be written, before the work that would be lost.
+
+    Raises
+    ------
+    InputError
+        Its folder is absent or not writable, or the path is a folder itself.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: found a folder, expected the name of a file to write")
+    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: found no writable folder {path.parent}, expected one to write the file in")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A folder of results opened for one configuration.
+
+    Attributes
+    ----------
+    directory : Path
+    state : {"new", "resumed", "done"}
+        Made just now; begun earlier and not finished; finished earlier.
+    """
+
+    directory: Path
+    state: Literal["new", "resumed", "done"]
+
+    def finish(self) -> None:
+        """Mark the results as complete, so that the same command finds them done."""
+        write_json(self.directory / COMPLETE, {"complete": True})
+
+
+def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Run:
+    """Open a folder for a configuration, making it when it is absent.
+
+    Call it once everything that was given has been checked: before that, nothing should be written.
+
+    Parameters
+    ----------
+    directory : str or Path
+    configuration : mapping
+        Everything that decides the results: command, version, options as resolved, seed, hash of the data.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        The folder belongs to another configuration (names what differs) or to something else, or cannot be made.
+    """
+    directory = Path(directory)
+    wanted = plain(configuration)
+    state = check_run(directory, wanted)
+    if state == "new":
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            write_json(directory / CONFIGURATION, wanted)
+        except OSError as error:
+            raise InputError(f"{directory}: cannot be written ({error.strerror}), expected a writable folder") from None
+    return Run(directory, state)
+
+
+def check_run(directory: Path, configuration: Mapping[str, Any]) -> Literal["new", "resumed", "done"]:
+    """State in which `open_run` would find a folder; writes nothing and raises as `open_run` does."""
+    expected = "a new or empty folder, or one made with the same configuration"
+    try:
+        present = sorted(path.name for path in directory.iterdir() if not path.name.endswith(_PARTIAL))
+    except FileNotFoundError:
+        return "new"
+    except NotADirectoryError:
+        raise InputError(f"{directory}: found a file, expected a folder") from None
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be read ({error.strerror}), expected a readable folder") from None
+    if not present:
+        return "new"
+    stored = directory / CONFIGURATION
+    if CONFIGURATION not in present:
+        raise InputError(f"{directory}: found {present[0]} but no {CONFIGURATION}, expected {expected}")
+    try:
+        found = json.loads(stored.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InputError(f"{stored}: found no readable configuration, expected {expected}") from None
+    different = differences(found, plain(configuration))
+    if different:
+        listed = "; ".join(different[:3]) + (f"; and {len(different) - 3} more" if len(different) > 3 else "")
+        raise InputError(f"{directory}: made with another configuration: {listed}; expected {expected}")
+    return "done" if COMPLETE in present else "resumed"
+
+
+def differences(found: Any, wanted: Any, key: str = "") -> list[str]:
+    """What differs between two configurations, one short phrase for each key."""
+    if isinstance(found, dict) and isinstance(wanted, dict):
+        keys = [*wanted, *(name for name in found if name not in wanted)]
+        parts = [
+            differences(found.get(name, "nothing"), wanted.get(name, "nothing"), f"{key}.{name}" if key else name)
+            for name in keys
+        ]
+        return [phrase for part in parts for phrase in part]
+    if found == wanted:
+        return []
+    return [f"{key or 'content'} is {_short(found)} there, {_short(wanted)} here"]
+
+
+def _short(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 40 else text[:37] + "..."
