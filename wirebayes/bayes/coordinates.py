@@ -1,0 +1,124 @@
+"""The coordinates that are sampled: what the data see, so that the curved ridge in (B, k2, N) lies nearly straight.
+
+Positive parameters become logarithms; then, one after the other,
+
+- log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
+- log B becomes the log tension lost in one typical hold at a typical tension,
+  ``log B + U log τ + log(1 - exp(-k2 T^N)) + log(k1 / L0)``.
+
+The map is triangular and its last two steps have unit Jacobian.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes.problem import MATERIAL, Problem
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class _Ridge:
+    """Columns of one material's parameters (or their fixed values) and the constants of the map."""
+
+    where: dict[str, int]
+    fixed: dict[str, float]
+    log_tension: float
+    hold_s: float
+    log_length: float
+
+
+class Coordinates:
+    """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``."""
+
+    def __init__(self, problem: Problem) -> None:
+        names = problem.names
+        self.problem = problem
+        self.log_columns = np.array([name in problem.prior.logarithmic for name in names])
+        self.ridges = []
+        for mark in dict.fromkeys(_mark(problem, s.material) for s in problem.samples):
+            sample = next(s for s in problem.samples if _mark(problem, s.material) == mark)
+            columns = {name: f"{name}{mark}" for name in MATERIAL}
+            where = {name: names.index(c) for name, c in columns.items() if c in names and self.log_columns[names.index(c)]}
+            fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
+            if len(where) + len(fixed) < len(MATERIAL):
+                continue  # a user's prior that allows negative values: leave this material's columns as they are
+            length = sample.model.length_ref_mm or sample.protocol.length_mm
+            self.ridges.append(
+                _Ridge(where, fixed, float(np.log(sample.model.tension_ref_N)), sample.typical_hold_s, float(np.log(length)))
+            )
+
+    def to_sampled(self, theta: Array) -> Array:
+        """Sampled coordinates of natural parameters."""
+        z = theta.copy()
+        z[:, self.log_columns] = np.log(theta[:, self.log_columns])
+        for ridge in self.ridges:
+            creep, hazard = self._shifts(theta, ridge)
+            if "k2" in ridge.where:
+                z[:, ridge.where["k2"]] += hazard
+            if "B" in ridge.where:
+                z[:, ridge.where["B"]] += creep
+        return z
+
+    def to_natural(self, z: Array) -> Array:
+        """Natural parameters of sampled coordinates."""
+        theta = z.copy()
+        with np.errstate(over="ignore"):
+            theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
+            for ridge in self.ridges:
+                if "k2" in ridge.where:
+                    theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
+                if "B" in ridge.where:
+                    theta[:, ridge.where["B"]] = np.exp(z[:, ridge.where["B"]] - self._shifts(theta, ridge)[0])
+        return theta
+
+    def log_jacobian(self, theta: Array) -> Array:
+        """(n,) log |d natural / d sampled|."""
+        return np.log(theta[:, self.log_columns]).sum(axis=1)
+
+    def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:
+        return theta[:, ridge.where[name]] if name in ridge.where else ridge.fixed[name]
+
+    def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
+        return np.asarray(self._get(theta, ridge, "N") * np.log(0.5 * ridge.hold_s))
+
+    def _shifts(self, theta: Array, ridge: _Ridge) -> tuple[Array, Array]:
+        k1, U, k2, N = (self._get(theta, ridge, name) for name in ("k1", "U", "k2", "N"))
+        with np.errstate(all="ignore"):
+            # log(1 - exp(-x)) of a tiny x is log x; the floor keeps it finite.
+            reached = np.log(np.maximum(-np.expm1(-k2 * ridge.hold_s**N), 1e-300))
+        creep = U * ridge.log_tension + reached + np.log(k1) - ridge.log_length
+        return creep, self._hazard(theta, ridge)
+
+
+class Target:
+    """The log posterior density in the sampled coordinates, batched, counting its evaluations."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.coordinates = problem, Coordinates(problem)
+        self.log_prior = problem.prior.log_density()
+        self.evaluations = 0
+
+    def __call__(self, z: Array, readings: Any = None) -> Array:
+        """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""
+        self.evaluations += len(z)
+        theta = self.coordinates.to_natural(z)
+        with np.errstate(all="ignore"):
+            value = self.log_prior(theta) + self.coordinates.log_jacobian(theta)
+        inside = np.isfinite(value)
+        if not inside.any():
+            return np.full(len(z), -np.inf)
+        if inside.all():
+            return value + self.problem.log_likelihood(theta, readings)
+        picked = None if readings is None else [y[..., inside] for y in readings]
+        value = np.where(inside, value, -np.inf)
+        value[inside] += self.problem.log_likelihood(theta[inside], picked)
+        return value
+
+
+def _mark(problem: Problem, material: str) -> str:
+    marked = f"k1[{material}]"
+    return f"[{material}]" if marked in problem.names or marked in problem.prior.fixed else ""

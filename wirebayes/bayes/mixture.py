@@ -1,0 +1,129 @@
+"""A mixture of multivariate Student-t distributions: density, draws, and its fit by expectation-maximisation."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, logsumexp
+
+Array = NDArray[Any]
+DEGREES = 6.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Weights ``(k,)``, centres ``(k, d)`` and lower Cholesky factors ``(k, d, d)`` of the scales."""
+
+    weights: Array
+    centres: Array
+    factors: Array
+
+    def log_density(self, x: Array) -> Array:
+        """(n,) log density of points (n, d)."""
+        return np.asarray(logsumexp(self._parts(x) + np.log(self.weights)[:, None], axis=0))
+
+    def rvs(self, n: int, rng: Any) -> Array:
+        """(n, d) draws; `rng` is a numpy RandomState or Generator."""
+        d = self.centres.shape[1]
+        which = rng.choice(len(self.weights), size=n, p=self.weights)
+        stretch = np.sqrt(DEGREES / rng.chisquare(DEGREES, size=n))
+        return self.centres[which] + stretch[:, None] * np.einsum(
+            "nij,nj->ni", self.factors[which], rng.standard_normal((n, d))
+        )
+
+    def _parts(self, x: Array) -> Array:
+        """(k, n) log density of each component."""
+        return np.array([_log_t(_distance(x, c, f), f) for c, f in zip(self.centres, self.factors, strict=True)])
+
+
+def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:
+    """One component a mode, weighted by its evidence but none below a twentieth."""
+    weights = np.maximum(np.exp(log_weights - log_weights.max()), 0.05)
+    return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
+
+
+def blend(main: Mixture, safety: Mixture, share: float) -> Mixture:
+    """Both together, `share` of the weight on the second."""
+    return Mixture(
+        np.concatenate([(1.0 - share) * main.weights, share * safety.weights]),
+        np.concatenate([main.centres, safety.centres]),
+        np.concatenate([main.factors, safety.factors]),
+    )
+
+
+def wider(mixture: Mixture, factor: float) -> Mixture:
+    """The same with all scales stretched."""
+    return Mixture(mixture.weights, mixture.centres, mixture.factors * factor)
+
+
+def fit(x: Array, rng: np.random.Generator, *, most: int = 4) -> Mixture:
+    """The mixture with the best Bayesian information criterion among 1 to `most` components, for points (n, d)."""
+    n, d = x.shape
+    best, score = None, np.inf
+    for k in range(1, most + 1):
+        try:
+            mixture, log_likelihood = _em(x, k, rng)
+        except np.linalg.LinAlgError:
+            break
+        bic = -2.0 * log_likelihood + np.log(n) * (k * (1 + d + d * (d + 1) / 2) - 1)
+        if bic >= score:
+            break
+        best, score = mixture, bic
+    if best is None:
+        raise np.linalg.LinAlgError("the points do not span their space")
+    return best
+
+
+def _em(x: Array, k: int, rng: np.random.Generator, iterations: int = 60) -> tuple[Mixture, float]:
+    n, d = x.shape
+    covariance = np.cov(x.T).reshape(d, d)
+    ridge = 1e-9 * np.diag(np.diag(covariance))
+    root = np.linalg.cholesky(covariance + ridge)
+    centres = x[_spread(np.linalg.solve(root, x.T).T, k, rng)]
+    mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(root[None], k, axis=0))
+    last = -np.inf
+    for _ in range(iterations):
+        distances = np.array([_distance(x, c, f) for c, f in zip(mixture.centres, mixture.factors, strict=True)])
+        logs = np.array([_log_t(q, f) for q, f in zip(distances, mixture.factors, strict=True)])
+        logs += np.log(mixture.weights)[:, None]
+        total = logsumexp(logs, axis=0)
+        share = np.exp(logs - total)
+        # A component that holds too few points for its own covariance takes the others with it: stop there.
+        if (share.sum(axis=1) < 3.0 * d).any():
+            raise np.linalg.LinAlgError("empty component")
+        heavy = share * (DEGREES + d) / (DEGREES + distances)
+        new_centres = np.einsum("kn,nd->kd", heavy, x) / heavy.sum(axis=1, keepdims=True)
+        factors = []
+        for i in range(k):
+            deviation = x - new_centres[i]
+            scale = (heavy[i][:, None] * deviation).T @ deviation / share[i].sum()
+            factors.append(np.linalg.cholesky(scale + ridge))
+        mixture = Mixture(share.sum(axis=1) / n, new_centres, np.array(factors))
+        log_likelihood = float(total.sum())
+        if log_likelihood - last < 1e-5 * n:
+            break
+        last = log_likelihood
+    return mixture, log_likelihood
+
+
+def _spread(x: Array, k: int, rng: np.random.Generator) -> list[int]:
+    """Rows far from one another, for a start (k-means++)."""
+    chosen = [int(rng.integers(len(x)))]
+    nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)
+    while len(chosen) < k:
+        chosen.append(int(rng.choice(len(x), p=nearest / nearest.sum())))
+        nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
+    return chosen
+
+
+def _distance(x: Array, centre: Array, factor: Array) -> Array:
+    """(n,) squared Mahalanobis distance; numpy's inverse of a small triangle beats a solve of many columns."""
+    y = (x - centre) @ np.linalg.inv(factor).T
+    return np.einsum("nd,nd->n", y, y)
+
+
+def _log_t(distance: Array, factor: Array) -> Array:
+    d = len(factor)
+    constant = gammaln(0.5 * (DEGREES + d)) - gammaln(0.5 * DEGREES) - 0.5 * d * np.log(DEGREES * np.pi)
+    return constant - np.log(np.diag(factor)).sum() - 0.5 * (DEGREES + d) * np.log1p(distance / DEGREES)

@@ -1,0 +1,191 @@
+"""Sensor, setting and rounding error: the probability of readings given a staircase.
+
+Readings are Gaussian with covariance ``V = (sensor² + resolution²/12) I + setting² J Jᵀ``, J the derivative of all
+readings by all setting errors. What one hold leaves to the next is a single number, the creep carried on, so the
+normal density factors hold by hold in linear time: a Kalman filter whose state is that number.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.staircase import Linearised, Model, Theta, _Walk
+
+Array = NDArray[Any]
+_LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What the readings say of each hold, in order.
+
+    Attributes
+    ----------
+    log_likelihood : (H, n)
+        log p(readings of the hold | readings of the holds before); zero for an unrecorded hold.
+    carried_mean, carried_var : (H + 1, n)
+        Deviation of the creep carried into each hold from its nominal value, given the holds before, mm and mm².
+    """
+
+    log_likelihood: Array
+    carried_mean: Array
+    carried_var: Array
+
+
+def reading_variance(sensor_sd: Array, resolution_N: float) -> Array:
+    """Variance of one reading, N²: sensor error and rounding."""
+    return np.asarray(sensor_sd * sensor_sd + resolution_N * resolution_N / 12.0)
+
+
+def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> Filtered:
+    """Filter the readings along the holds.
+
+    Parameters
+    ----------
+    line : Linearised
+    readings : (H, R, n) or (H, R, 1) array
+    mask : (H, R) bool array
+    variance : (n,) array
+        Of one reading, rounding included.
+    setting_sd : (n,) array
+
+    Returns
+    -------
+    Filtered
+    """
+    holds, _, n = line.tension.shape
+    out = np.zeros((holds, n))
+    mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
+    setting_var = setting_sd * setting_sd
+    weight = 1.0 / variance
+    log_variance = np.log(variance) + _LOG_2PI
+    for j in range(holds):
+        m, p = mean[j], var[j]
+        a, c = line.carry_by_creep[j], line.carry_by_setting[j]
+        if not mask[j].any():
+            mean[j + 1], var[j + 1] = a * m, a * a * p + c * c * setting_var
+            continue
+        keep = slice(None) if mask[j].all() else mask[j]
+        by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
+        r = readings[j][keep] - line.tension[j][keep] - by_c * m
+        cc = np.einsum("rn,rn->n", by_c, by_c) * weight
+        cs = np.einsum("rn,rn->n", by_c, by_s) * weight
+        ss = np.einsum("rn,rn->n", by_s, by_s) * weight
+        cr = np.einsum("rn,rn->n", by_c, r) * weight
+        sr = np.einsum("rn,rn->n", by_s, r) * weight
+        det = 1.0 + p * cc + setting_var * ss + p * setting_var * (cc * ss - cs * cs)
+        # Posterior covariance of (carried creep, setting error), its columns divided by the determinant.
+        v_cc = p * (1.0 + setting_var * ss) / det
+        v_ss = setting_var * (1.0 + p * cc) / det
+        v_cs = -p * setting_var * cs / det
+        post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
+        square = np.einsum("rn,rn->n", r, r) * weight - cr * post_c - sr * post_s
+        out[j] = -0.5 * (square + r.shape[0] * log_variance + np.log(det))
+        mean[j + 1] = a * (m + post_c) + c * post_s
+        var[j + 1] = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
+    return Filtered(out, mean, var)
+
+
+def jacobian(line: Linearised) -> Array:
+    """(H, R, H, n) derivative of every reading by every setting error, N/mm; quadratic in the holds."""
+    holds, width, n = line.tension.shape
+    out = np.zeros((holds, width, holds, n))
+    carried = np.zeros((holds, n))
+    for j in range(holds):
+        out[j] = line.by_creep[j][:, None, :] * carried[None]
+        out[j, :, j] = line.by_setting[j]
+        carried = line.carry_by_creep[j] * carried
+        carried[j] = line.carry_by_setting[j]
+    return out
+
+
+def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> Array:
+    """(H, n) log p(readings of one hold | the readings of all others), from the inverse of V by blocks.
+
+    The hold's displacement and duration stay: only its readings are left out.
+    """
+    holds, width, n = line.tension.shape
+    jac = np.moveaxis(jacobian(line), -1, 0) * mask[None, :, :, None]
+    residual = np.moveaxis(np.where(mask[..., None], readings - line.tension, 0.0), -1, 0)
+    flat = jac.reshape(n, holds * width, holds)
+    scaled = flat * setting_sd[:, None, None]
+    # Woodbury: V^-1 = (I - K (variance I + Kᵀ K)^-1 Kᵀ) / variance with K = setting J.
+    inner = np.linalg.inv(variance[:, None, None] * np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
+    r = residual.reshape(n, holds * width)
+    pulled = (r - np.einsum("nai,nij,nbj,nb->na", scaled, inner, scaled, r, optimize=True)) / variance[:, None]
+    out = np.zeros((holds, n))
+    for j in np.flatnonzero(mask.any(axis=1)):
+        rows = j * width + np.flatnonzero(mask[j])
+        k = scaled[:, rows]
+        block = (np.eye(len(rows)) - k @ inner @ np.swapaxes(k, 1, 2)) / variance[:, None, None]
+        q = pulled[:, rows]
+        _, logdet = np.linalg.slogdet(block)
+        out[j] = -0.5 * (np.einsum("na,na->n", q, np.linalg.solve(block, q[..., None])[..., 0]) - logdet + len(rows) * _LOG_2PI)
+    return out
+
+
+def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array) -> Array:
+    """(H, n) log p(later readings | first reading) of every hold, each an experiment of its own (parameters as above).
+
+    The stretched length is where the first reading puts it, found by Newton steps; the first reading carries the
+    sensor's error too, so the later ones have covariance ``variance (I + a aᵀ)``, a the ratio of slopes. A hold whose
+    first reading is not above zero says nothing of its length and contributes nothing.
+    """
+    holds, _, n = np.broadcast_shapes(readings.shape, (1, 1, len(variance)))
+    out = np.zeros((holds, n))
+    for j, fitted in enumerate(hold_courses(protocol, theta, model, readings[:, 0])):
+        if fitted is None:
+            continue
+        tension, slope, valid = fitted
+        keep = np.flatnonzero(protocol.mask[j])[1:]
+        if not len(keep):
+            continue
+        ratio = slope[keep] / np.where(valid, slope[0], 1.0)
+        r = readings[j][keep] - tension[keep]
+        aa = np.einsum("rn,rn->n", ratio, ratio)
+        ar = np.einsum("rn,rn->n", ratio, r)
+        square = (np.einsum("rn,rn->n", r, r) - ar * ar / (1.0 + aa)) / variance
+        value = -0.5 * (square + len(keep) * (np.log(variance) + _LOG_2PI) + np.log1p(aa))
+        out[j] = np.where(valid, value, 0.0)
+    return out
+
+
+def hold_courses(protocol: Protocol, theta: Theta, model: Model, first: Array) -> list[tuple[Array, Array, Array] | None]:
+    """Each hold's course from its first reading alone: tension (R, n), its slope by stretched length, and validity (n,).
+
+    `first` is (H, n) or (H, 1); None stands for a hold that has no reading.
+    """
+    n = np.shape(theta["k1"])[0]
+    walk = _Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)
+    step = walk.closed_form if not model.effects else walk.complex_step
+    fresh = np.zeros(n)
+    out: list[tuple[Array, Array, Array] | None] = []
+    for j in range(len(protocol.displacement_mm)):
+        if not protocol.mask[j].any():
+            out.append(None)
+            continue
+        target = np.broadcast_to(first[j], (n,))
+        valid = target > 0
+        target = np.where(valid, target, 1.0)
+        walk.past = []
+        stretched = protocol.length_mm * (1.0 + target / walk.k1)
+        if model.law == "modified":
+            stretched = protocol.length_mm / np.maximum(1.0 - target / walk.k1, 0.1)
+        for _ in range(_NEWTON_STEPS):
+            tension, slope, *_ = step(j, stretched, fresh, {})
+            # A slack guess has no slope: go out until it pulls.
+            pulls = slope[0] > 0
+            move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), target / walk.k1 * protocol.length_mm)
+            stretched = stretched + move
+            if np.max(np.abs(move)) < 1e-12 * protocol.length_mm:
+                break
+            walk.past = []
+        tension, slope, *_ = step(j, stretched, fresh, {})
+        out.append((tension, slope, valid & (slope[0] > 0)))
+    return out
+
+
+_NEWTON_STEPS = 30

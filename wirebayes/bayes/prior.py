@@ -1,0 +1,153 @@
+"""What a person knows of a thin line before the test: one object for sampling, calibration and prediction.
+
+The ranges (5 % to 95 %) and their reasons:
+
+=============  ====================  ==========================================================================
+k1             170 to 24,000 N       nylon monofilament of 0.2 mm to braided polyethylene of 1 mm (modulus x area)
+B              0.05 to 2.7e-3 L0/N^U creep strain at 1 N; 1e-4 to 1e-3 measured on light polymer lines
+U              0.16 to 1.6           linear viscoelasticity is 1; polymers under small loads lie below
+k2             0.0042 to 0.22 s^-N   half the creep within seconds up to hours, together with N
+N              0.31 to 1.4           1 is an exponential, below it a stretched one
+preload        -1.1 to 2.1 mm        the test begins at a small tension, at a step of about 1 mm
+sensor_sd      0.001 to 0.1 N        a load cell of 10 to 100 N range
+setting_sd     0.004 to 0.2 mm       a milling machine's screw up to a hand-set vernier
+=============  ====================  ==========================================================================
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.errors import InputError
+
+Array = NDArray[Any]
+_HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Independent distributions of ordered parameters, some of them fixed.
+
+    Attributes
+    ----------
+    distributions : dict of name to scipy frozen distribution
+        In the order of the columns of every ``(n, d)`` array of parameters.
+    fixed : dict of name to float
+        Parameters that are known and not sampled.
+    logarithmic : frozenset of str
+        Positive parameters, sampled as logarithms.
+    """
+
+    distributions: dict[str, Any]
+    fixed: dict[str, float]
+    logarithmic: frozenset[str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.distributions)
+
+    def rvs(self, n: int, rng: np.random.Generator) -> Array:
+        """(n, d) draws."""
+        return np.column_stack([d.rvs(size=n, random_state=rng) for d in self.distributions.values()])
+
+    def ppf(self, cube: Array) -> Array:
+        """(n, d) parameters of points ``(n, d)`` in the unit cube."""
+        return np.column_stack([d.ppf(cube[:, i]) for i, d in enumerate(self.distributions.values())])
+
+    def log_density(self) -> Callable[[Array], Array]:
+        """A function of (n, d) parameters that returns the (n,) log density."""
+        parts = [fast_logpdf(d) for d in self.distributions.values()]
+
+        def evaluate(theta: Array) -> Array:
+            total = parts[0](theta[:, 0])
+            for i in range(1, len(parts)):
+                total = total + parts[i](theta[:, i])
+            return total
+
+        return evaluate
+
+
+def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
+    """The log density of a frozen distribution; closed forms of the common ones avoid scipy's overhead per call."""
+    shapes, loc, scale = dist.dist._parse_args(*dist.args, **dist.kwds)
+    loc, scale = float(loc), float(scale)
+    if dist.dist.name == "norm":
+        return lambda x: -0.5 * ((x - loc) / scale) ** 2 - (np.log(scale) + _HALF_LOG_2PI)
+    if dist.dist.name == "halfnorm":
+        constant = 0.5 * float(np.log(2.0 / np.pi)) - float(np.log(scale))
+        return lambda x: np.where(x >= loc, constant - 0.5 * ((x - loc) / scale) ** 2, -np.inf)
+    if dist.dist.name == "lognorm" and loc == 0.0:
+        s = float(shapes[0])
+
+        def lognormal(x: Array) -> Array:
+            log_x = np.log(np.where(x > 0, x, 1.0))
+            value = -0.5 * ((log_x - np.log(scale)) / s) ** 2 - log_x - (np.log(s) + _HALF_LOG_2PI)
+            return np.where(x > 0, value, -np.inf)
+
+        return lognormal
+    if dist.dist.name == "uniform":
+        return lambda x: np.where((x >= loc) & (x <= loc + scale), -np.log(scale), -np.inf)
+    return lambda x: np.asarray(dist.logpdf(x))
+
+
+def wire_defaults(length_mm: float) -> dict[str, Any]:
+    """Distributions of the plain model's parameters for a sample of this length (see the module's table)."""
+    return {
+        "k1": stats.lognorm(1.5, scale=2000.0),
+        "B": stats.lognorm(1.2, scale=3.7e-4 * length_mm),
+        "U": stats.lognorm(0.7, scale=0.5),
+        "k2": stats.lognorm(1.2, scale=0.03),
+        "N": stats.lognorm(0.45, scale=0.65),
+        "preload": stats.norm(0.5, 1.0),
+        "sensor_sd": stats.lognorm(1.3, scale=0.012),
+        "setting_sd": stats.lognorm(1.2, scale=0.03),
+    }
+
+
+_FORMS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
+    "normal": (("mean", "sd"), lambda mean, sd: stats.norm(mean, sd)),
+    "half-normal": (("sd",), lambda sd: stats.halfnorm(0.0, sd)),
+    "log-normal": (("median", "sd_log"), lambda median, sd_log: stats.lognorm(sd_log, scale=median)),
+    "uniform": (("low", "high"), lambda low, high: stats.uniform(low, high - low)),
+}
+
+
+def from_table(key: str, table: Any) -> Any:
+    """A distribution, or a float for a fixed value, from a TOML table.
+
+    ``{ distribution = "log-normal", median = 700.0, sd_log = 0.3 }``, likewise ``normal`` (mean, sd),
+    ``half-normal`` (sd), ``uniform`` (low, high); ``{ fixed = 1.0 }`` keeps a parameter at a value.
+
+    Raises
+    ------
+    InputError
+        Naming the key, what was found and what was expected.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"{key}: found {table!r}, expected a table such as {{ distribution = \"normal\", mean = 0.0, sd = 1.0 }}")
+    if set(table) == {"fixed"}:
+        return _number(f"{key}.fixed", table["fixed"])
+    form = table.get("distribution")
+    if form not in _FORMS:
+        raise InputError(f"{key}.distribution: found {form!r}, expected one of {', '.join(_FORMS)} (or fixed = VALUE)")
+    wanted, build = _FORMS[form]
+    extra, missing = set(table) - {"distribution", *wanted}, set(wanted) - set(table)
+    if extra or missing:
+        raise InputError(f"{key}: a {form} distribution takes {', '.join(wanted)}; found {', '.join(sorted(set(table) - {'distribution'})) or 'none'}")
+    values = {name: _number(f"{key}.{name}", table[name]) for name in wanted}
+    for name in ("sd", "sd_log", "median"):
+        if values.get(name, 1.0) <= 0:
+            raise InputError(f"{key}.{name}: found {values[name]}, expected a number above zero")
+    if form == "uniform" and values["high"] <= values["low"]:
+        raise InputError(f"{key}.high: found {values['high']}, expected a number above low = {values['low']}")
+    return build(**values)
+
+
+def _number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise InputError(f"{key}: found {value!r}, expected a finite number")
+    return float(value)

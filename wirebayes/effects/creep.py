@@ -1,0 +1,120 @@
+"""Effects on the creep within and between holds."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.laws import creep_fraction
+
+Own = dict[str, NDArray[Any]]
+
+
+class PermanentCreep(Effect):
+    """a_j = B τ^U - (1 - ψ) e_j; ψ = 1 is the additive chain."""
+
+    name = "permanent_creep"
+    place = "amount"
+    scope = "material"
+    amplitudes = (Amplitude("psi", "-", 0.0, stats.uniform(0.0, 1.0)),)
+    sentence = "A part of the creep is permanent: later holds creep as if it had not happened."
+    shows = "between holds, unloading"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["psi"] * hold.carried
+
+
+class Memory(Effect):
+    """ω times what the clocks of earlier holds would still add during this one."""
+
+    name = "memory"
+    place = "creep"
+    scope = "material"
+    amplitudes = (Amplitude("omega", "-", 0.0, stats.halfnorm(0.0, 1.0)),)
+    sentence = "Earlier holds go on creeping by their own clocks after the next hold has begun."
+    shows = "grows with hold number, slow inside holds"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        exponent = hold.theta["N"]
+        for start_s, amount, k2 in hold.past:
+            age = hold.start_s - start_s
+            grown = creep_fraction(age + hold.time_s, k2, exponent) - creep_fraction(np.full((1, 1), age), k2, exponent)
+            value = value + own["omega"] * amount * grown
+        return value
+
+
+class SecondRelaxation(Effect):
+    """A second creep mode towards A τ_j(0), time constant T2."""
+
+    name = "second_relaxation"
+    place = "elongation"
+    scope = "material"
+    amplitudes = (
+        Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.1)),
+        Amplitude("T2", "s", 30.0, stats.lognorm(1.2, scale=30.0), is_shape=True),
+    )
+    sentence = "The wire creeps in two modes, one with a time constant of its own."
+    shows = "shape within the hold"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + (own["A"] * hold.initial_tension - value) * -np.expm1(-hold.time_s / own["T2"])
+
+
+class SteadyCreep(Effect):
+    """An elongation a τ_j(0) t beside the creep, without a plateau."""
+
+    name = "steady_creep"
+    place = "elongation"
+    scope = "material"
+    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 1e-3)),)
+    sentence = "The wire also flows steadily under tension and never settles."
+    shows = "tail of the hold"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["a"] * hold.initial_tension * hold.time_s
+
+
+class TensionDependentRate(Effect):
+    """k2 (τ_j(0) / τref)^m."""
+
+    name = "tension_dependent_rate"
+    place = "rate"
+    scope = "material"
+    amplitudes = (Amplitude("m", "-", 0.0, stats.norm(0.0, 0.5)),)
+    sentence = "The creep runs faster or slower at higher tension."
+    shows = "hold shape changes with tension"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        tension = hold.initial_tension
+        ratio = np.where(tension.real > 0, tension, hold.tension_ref_N) / hold.tension_ref_N
+        return value * np.power(ratio, own["m"])
+
+
+class Ageing(Effect):
+    """a_j (1 + j)^(-a), j the number of earlier holds."""
+
+    name = "ageing"
+    place = "amount"
+    scope = "material"
+    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.5)),)
+    sentence = "Each hold relaxes less than the one before, whatever its tension."
+    shows = "relaxation amplitude by order, not displacement"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value * (1.0 + hold.index) ** -own["a"]
+
+
+class CreepThreshold(Effect):
+    """Creep is driven by max(τ - τc, 0)."""
+
+    name = "creep_threshold"
+    place = "drive"
+    scope = "material"
+    amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 2.0)),)
+    sentence = "Below a threshold of tension the wire does not creep."
+    shows = "no relaxation in the first holds"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return np.where((value - own["tau_c"]).real > 0, value - own["tau_c"], 0.0)

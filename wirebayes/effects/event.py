@@ -1,0 +1,40 @@
+"""Effects that happened once, at one hold of one test."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.wire.effect import Amplitude, EventEffect, HoldContext
+
+Own = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class GripSlip(EventEffect):
+    """Zero-tension length + w from hold h on."""
+
+    name = "grip_slip"
+    place = "zero_length"
+    amplitudes = (Amplitude("w", "mm", 0.0, stats.norm(0.0, 0.3)),)
+    sentence = "The wire slipped in its grip once."
+    shows = "one step in level; names the hold"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["w"] if hold.order >= self.hold else value
+
+
+@dataclass(frozen=True)
+class UnrecordedHold(EventEffect):
+    """Before hold h, T seconds passed at its displacement."""
+
+    name = "unrecorded_hold"
+    place = "wait"
+    amplitudes = (Amplitude("T", "s", 0.0, stats.halfnorm(0.0, 300.0)),)
+    sentence = "Time passed at a displacement before its first reading."
+    shows = "step in level; names the hold"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["T"] if hold.order == self.hold else value + 0.0 * own["T"]

@@ -1,0 +1,111 @@
+"""Effects of the bench: its clock, its sensor, its screw."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.protocol import Protocol
+
+Own = dict[str, NDArray[Any]]
+
+
+class ReadingDelay(Effect):
+    """The first reading of a hold comes t_d seconds late."""
+
+    name = "reading_delay"
+    place = "clock"
+    scope = "instrument"
+    amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 5.0)),)
+    sentence = "The first reading of each hold was taken later than written down."
+    shows = "first reading low, fastest creepers most"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        first = np.zeros((len(hold.time_s), 1))
+        first[0] = hold.recorded
+        return value + own["t_d"] * first
+
+
+class SensorDrift(Effect):
+    """Reading + a x elapsed time."""
+
+    name = "sensor_drift"
+    place = "reading"
+    scope = "instrument"
+    amplitudes = (Amplitude("a", "N/s", 0.0, stats.norm(0.0, 1e-3)),)
+    sentence = "The force sensor drifts with the clock."
+    shows = "clock time, also inside holds"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["a"] * (hold.start_s + hold.time_s)
+
+
+class SensorNonlinearity(Effect):
+    """Reading τ + a τ²."""
+
+    name = "sensor_nonlinearity"
+    place = "reading"
+    scope = "instrument"
+    amplitudes = (Amplitude("a", "1/N", 0.0, stats.norm(0.0, 0.02)),)
+    sentence = "The force sensor's scale bends at higher tension."
+    shows = "like stiffening; told apart over several wires"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value * (1.0 + own["a"] * value)
+
+
+class ClampTransient(Effect):
+    """Reading τ (1 + a exp(-t / T))."""
+
+    name = "clamp_transient"
+    place = "reading"
+    scope = "instrument"
+    amplitudes = (
+        Amplitude("a", "-", 0.0, stats.norm(0.0, 0.05)),
+        Amplitude("T", "s", 10.0, stats.lognorm(1.0, scale=10.0), is_shape=True),
+    )
+    sentence = "After each move the clamp or sensor settles, in proportion to the tension."
+    shows = "decays inside the hold, scales with tension"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value * (1.0 + own["a"] * np.exp(-hold.time_s / own["T"]))
+
+
+class _NeedsReversal(Effect):
+    """An effect that only a change of direction can show."""
+
+    @classmethod
+    def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
+        turned = [p for p in protocols if len(set(np.sign(np.diff(p.displacement_mm, prepend=0.0))) - {0.0}) > 1]
+        return [cls()] if turned else []
+
+
+class LostMotion(_NeedsReversal):
+    """After a reversal the position lags by w."""
+
+    name = "lost_motion"
+    place = "position"
+    scope = "instrument"
+    amplitudes = (Amplitude("w", "mm", 0.0, stats.halfnorm(0.0, 0.1)),)
+    sentence = "The screw has play: after a reversal the true position lags behind."
+    shows = "unloading branch"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value - own["w"] * hold.direction if hold.direction != hold.first_direction else value
+
+
+class GuideFriction(_NeedsReversal):
+    """τ (1 ± μ) by direction of motion, told from the first direction's own value."""
+
+    name = "guide_friction"
+    place = "reading"
+    scope = "instrument"
+    amplitudes = (Amplitude("mu", "-", 0.0, stats.norm(0.0, 0.05)),)
+    sentence = "Friction in the guide adds to the reading on the way out and takes away on the way back."
+    shows = "unloading branch"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value * (1.0 + own["mu"] * hold.direction)

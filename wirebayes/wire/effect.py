@@ -1,0 +1,158 @@
+"""The common face of an effect: a change of one quantity at one named place of the model.
+
+The staircase calls effects by place and knows none by name; a user's own effect is a subclass in the user's file.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.wire.protocol import Protocol
+
+Place = Literal[
+    "sample",  # the dictionary of parameters itself, before anything is computed
+    "position",  # stretched length, mm
+    "zero_length",  # zero-tension length, creep included, mm
+    "strain",  # strain whose product with k1 is the tension
+    "wait",  # time passed at this displacement before the hold began, s
+    "drive",  # tension that drives the creep, N
+    "amount",  # creep still to come in this hold, mm
+    "rate",  # k2, s^-N
+    "clock",  # time since the hold began, s
+    "fraction",  # share of the amount reached by a time
+    "creep",  # carried creep elongation over the hold, mm
+    "elongation",  # an elongation beside the creep: carried-in value in, values over the hold out, mm
+    "reading",  # what the sensor says, N
+]
+Scope = Literal["material", "instrument", "environment", "event"]
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """One parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+    neutral : float
+        The value at which the effect returns the plain model to the last bit.
+    prior : scipy frozen distribution
+    is_shape : bool
+        True for a positive constant of the form (a time constant), sampled as a logarithm; it means nothing while
+        the amplitude is neutral.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    prior: Any
+    is_shape: bool = False
+
+
+@dataclass
+class HoldContext:
+    """What an effect may look at while one hold is computed; arrays end in the batch axis ``n``.
+
+    Attributes
+    ----------
+    index : int
+        Position among all holds, unrecorded ones included, from 0.
+    recorded : bool
+        False for a hold of which no reading was kept.
+    order : float
+        The hold's number; an unrecorded hold lies half a number below the one it precedes.
+    displacement_mm, previous_mm : float
+        Of this hold and of the one before (the first hold comes from zero).
+    direction, first_direction : int
+        Sign of the last move and of the first one of the test.
+    start_s, duration_s : float
+        Elapsed time when the hold begins; how long it lasts.
+    time_s : (R, 1) array
+    warming_K : (R, 1) array
+        Zero where no temperature was logged.
+    length_mm, length_ref_mm, tension_ref_N : float
+    theta : dict of (n,) arrays
+        All parameters of the model.
+    initial_tension : (1, n) array
+        Tension when the hold begins.
+    carried : (1, n) array
+        Creep elongation carried into the hold.
+    past : list of (start_s, amount, k2)
+        The clocks of earlier holds.
+    """
+
+    index: int
+    recorded: bool
+    order: float
+    displacement_mm: float
+    previous_mm: float
+    direction: int
+    first_direction: int
+    start_s: float
+    duration_s: float
+    time_s: NDArray[Any]
+    warming_K: NDArray[Any]
+    length_mm: float
+    length_ref_mm: float
+    tension_ref_N: float
+    theta: dict[str, NDArray[Any]]
+    initial_tension: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
+    carried: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
+    past: list[tuple[float, NDArray[Any], NDArray[Any]]] = field(default_factory=list)
+
+
+class Effect:
+    """Base of every effect: name, place, scope, amplitudes and one function of one value.
+
+    A subclass sets the class attributes and writes `apply`; that is all the rest of the toolkit needs.
+    Functions must accept complex values (derivatives are taken by a complex step): compare ``value.real``.
+    """
+
+    name: ClassVar[str]
+    place: ClassVar[Place]
+    scope: ClassVar[Scope]
+    amplitudes: ClassVar[tuple[Amplitude, ...]]
+    sentence: ClassVar[str]
+    shows: ClassVar[str] = ""
+
+    def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
+        """The changed value; `own` holds this effect's amplitudes by their short names, each ``(n,)``."""
+        raise NotImplementedError
+
+    @property
+    def key(self) -> str:
+        """The effect's name, with its hold where it has one."""
+        return self.name
+
+    def columns(self) -> tuple[str, ...]:
+        """Parameter names as they appear in a posterior: ``effect_name.parameter``."""
+        return tuple(f"{self.name}.{a.name}" for a in self.amplitudes)
+
+    @classmethod
+    def variants(cls, protocols: Sequence[Protocol]) -> list["Effect"]:
+        """The forms of this effect that a set of tests could show; empty where it could show none.
+
+        Most effects have one form; one that happened at a single hold has one a hold.
+        """
+        return [cls()]
+
+
+@dataclass(frozen=True)
+class EventEffect(Effect):
+    """An effect that happened once, when hold number `hold` began, in the experiment `test` (empty: the only one)."""
+
+    hold: int = 0
+    test: str = ""
+    scope: ClassVar[Scope] = "event"
+
+    @property
+    def key(self) -> str:
+        return f"{self.name}@{self.hold}"
+
+    @classmethod
+    def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
+        """One a recorded hold; the protocols are those of one experiment."""
+        return [cls(hold=int(number)) for p in protocols for number in p.number[p.recorded]]

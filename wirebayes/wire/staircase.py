@@ -1,0 +1,275 @@
+"""Tension of one wire through a sequence of holds, batched over parameter sets.
+
+Arrays end in the batch axis: readings are ``(H, R, n)``, one row of memory per reading, because long inner loops are
+what numpy is fast at.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.wire import laws
+from wirebayes.wire.effect import Effect, HoldContext
+from wirebayes.wire.protocol import Protocol
+
+Theta = Mapping[str, NDArray[Any]]
+_STEP = 1e-30  # a complex step has no truncation error, so it may be this small
+
+
+@dataclass(frozen=True)
+class Model:
+    """Which wire: elastic law, history, effects, and the constant the effects refer to.
+
+    Attributes
+    ----------
+    law : {"hooke", "modified"}
+        Eq (1) or eq (3).
+    history : {"saturating", "additive"}
+        Whether eq (4) is the total creep a tension leads to, or is added anew in every hold.
+    effects : tuple of Effect
+    tension_ref_N : float
+        Geometric mean of the training tensions.
+    length_ref_mm : float
+        Geometric mean of the samples' lengths, for effects that compare lengths; 0 means this sample's own.
+    """
+
+    law: laws.ElasticLaw = "hooke"
+    history: laws.History = "saturating"
+    effects: tuple[Effect, ...] = ()
+    tension_ref_N: float = 1.0
+    length_ref_mm: float = 0.0
+
+    def at(self, place: str) -> list[Effect]:
+        """The effects at one place, in the order they compose."""
+        return [effect for effect in self.effects if effect.place == place]
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """A staircase and its first derivatives, all at setting error zero.
+
+    Attributes
+    ----------
+    tension : (H, R, n)
+    by_setting, by_creep : (H, R, n)
+        Derivative of a hold's readings by its own setting error and by the creep carried into it, N/mm.
+    carry_by_setting, carry_by_creep : (H, n)
+        Derivative of the creep carried out, by the same two.
+    creep : (H + 1, n)
+        Creep elongation carried into each hold, and out of the last.
+    """
+
+    tension: NDArray[Any]
+    by_setting: NDArray[Any]
+    by_creep: NDArray[Any]
+    carry_by_setting: NDArray[Any]
+    carry_by_creep: NDArray[Any]
+    creep: NDArray[Any]
+
+
+def simulate(
+    protocol: Protocol, theta: Theta, model: Model = Model(), setting_mm: NDArray[Any] | None = None
+) -> NDArray[Any]:
+    """Noise-free readings, the setting errors entering exactly.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    theta : mapping of name to (n,) array
+        ``k1 B U k2 N preload`` and ``effect_name.parameter`` of every effect of the model.
+    model : Model
+    setting_mm : (H, n) array, optional
+        Setting error of each hold; zero when left out. May be complex (derivatives).
+
+    Returns
+    -------
+    (H, R, n) array, N
+    """
+    n = np.shape(theta["k1"])[0]
+    walk = _Walk(protocol, theta, model)
+    creep: NDArray[Any] = np.zeros(n)
+    beside: dict[str, NDArray[Any]] = {}
+    readings = []
+    for j in range(len(protocol.displacement_mm)):
+        stretched = walk.stretched(j) + (0.0 if setting_mm is None else setting_mm[j])
+        tension, creep, beside = walk.hold(j, stretched, creep, beside)
+        readings.append(tension)
+    return np.array(readings)
+
+
+def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linearised:
+    """Readings with their derivatives by setting error and carried creep (parameters as in `simulate`).
+
+    Without effects the derivatives are in closed form; with effects they come from a complex step through the same
+    code that computes the readings. What effects carry beside the creep is held at its nominal value in them.
+    """
+    n = np.shape(theta["k1"])[0]
+    holds, width = protocol.time_s.shape
+    walk = _Walk(protocol, theta, model)
+    shape = (holds, width, n)
+    tension, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
+    carry_by_setting, carry_by_creep = np.empty((holds, n)), np.empty((holds, n))
+    creep = np.zeros((holds + 1, n))
+    beside: dict[str, NDArray[Any]] = {}
+    step = walk.closed_form if not model.effects else walk.complex_step
+    for j in range(holds):
+        tension[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j], beside = step(
+            j, walk.stretched(j), creep[j], beside
+        )
+    return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
+
+
+class _Walk:
+    """One pass along the holds: what all holds share is computed once here."""
+
+    def __init__(self, protocol: Protocol, theta: Theta, model: Model) -> None:
+        self.protocol, self.model = protocol, model
+        self.last = np.maximum(protocol.mask.sum(axis=1) - 1, 0)
+        self.time = np.where(protocol.recorded[:, None], protocol.time_s, protocol.duration_s[:, None])
+        self.start = protocol.start_s
+        self.directions = _directions(protocol.displacement_mm)
+        self.past: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
+        self.at = {effect.place: model.at(effect.place) for effect in model.effects}
+        self.own = {e.key: {a.name: theta[c] for a, c in zip(e.amplitudes, e.columns(), strict=True)}
+                    for e in model.effects}  # fmt: skip
+        self.theta: dict[str, NDArray[Any]] = dict(theta)
+        if "sample" in self.at:
+            self.theta = self._pass("sample", self.theta, self._context(0))
+        self.k1, self.B, self.U = self.theta["k1"], self.theta["B"], self.theta["U"]
+        self.k2, self.N = self.theta["k2"], self.theta["N"]
+        self.base = protocol.length_mm + self.theta["preload"]
+        self.kept = 1.0 if model.history == "saturating" else 0.0
+        # Holds mostly share their reading times, so the exponentials are few.
+        times, where = np.unique(self.time, return_inverse=True)
+        self.fraction = laws.creep_fraction(times[:, None], self.k2, self.N)
+        self.where = where.reshape(self.time.shape)
+
+    def stretched(self, j: int) -> NDArray[Any]:
+        return self.base + self.protocol.displacement_mm[j]
+
+    def hold(
+        self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
+    ) -> tuple[NDArray[Any], NDArray[Any], dict[str, NDArray[Any]]]:
+        """Readings (R, n), creep carried out (n,), other elongations carried out; real or complex."""
+        hold = self._context(j)
+        position = self._pass("position", stretched[None], hold)
+        carried = creep[None]
+        extra = sum((beside.get(e.key, 0.0) for e in self.at.get("elongation", ())), 0.0)
+        first = self._tension(position, carried + extra, hold, row=0)
+        if "wait" in self.at:
+            wait = self._pass("wait", np.zeros((1, 1)), hold)
+            carried = carried + self._amount(first, carried, hold)[0] * laws.creep_fraction(wait, self.k2, self.N)
+            first = self._tension(position, carried + extra, hold, row=0)
+        amount, k2 = self._amount(first, carried, hold)
+        if self.at.keys() & {"rate", "clock", "fraction"}:
+            clock = self._pass("clock", hold.time_s, hold)
+            fraction = self._pass("fraction", laws.creep_fraction(clock, k2, self.N), hold)
+        else:
+            fraction = self.fraction[self.where[j]]
+        grown = self._pass("creep", carried + amount * fraction, hold)
+        self.past.append((float(self.start[j]), amount, k2))
+        total, after = grown, {}
+        for effect in self.at.get("elongation", ()):
+            course = effect.apply(beside.get(effect.key, np.zeros((1, 1))), self.own[effect.key], hold)
+            after[effect.key] = course[self.last[j]][None]
+            total = total + course
+        readings = self._pass("reading", self._tension(position, total, hold), hold)
+        return readings, grown[self.last[j]], after
+
+    def complex_step(self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]) -> Any:
+        """`hold` with its derivatives by setting error and carried creep."""
+        past = list(self.past)
+        y_s, out_s, _ = self.hold(j, stretched + 1j * _STEP, creep, beside)
+        self.past = list(past)
+        y_c, out_c, _ = self.hold(j, stretched, creep + 1j * _STEP, beside)
+        self.past = past
+        y, out, after = self.hold(j, stretched, creep, beside)
+        return y, y_s.imag / _STEP, y_c.imag / _STEP, out, out_s.imag / _STEP, out_c.imag / _STEP, after
+
+    def closed_form(self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]) -> Any:
+        """The same without effects: eqs (4)-(6) differentiated by hand."""
+        law, length, k1 = self.model.law, self.protocol.length_mm, self.k1
+        zero = length + creep
+        first = k1 * laws.strain(stretched, zero, law)
+        by_s, by_l = laws.strain_slopes(stretched, zero, law)
+        taut = first > 0
+        safe = np.where(taut, first, 1.0)
+        target = np.where(taut, self.B * np.power(safe, self.U), 0.0)
+        slope = self.U * target / safe * k1
+        amount = target - self.kept * creep
+        amount_s, amount_c = slope * by_s, slope * by_l - self.kept
+        fraction = self.fraction[self.where[j]]
+        zero = zero + amount * fraction
+        tension = k1 * laws.strain(stretched, zero, law)
+        by_s, by_l = laws.strain_slopes(stretched, zero, law)
+        stiff = np.where(tension > 0, k1, 0.0)
+        by_setting = stiff * (by_s + by_l * (amount_s * fraction))
+        by_creep = stiff * (by_l * (1.0 + amount_c * fraction))
+        end = fraction[self.last[j]]
+        out = creep + amount * end
+        return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end, beside
+
+    def _amount(self, first: NDArray[Any], carried: NDArray[Any], hold: HoldContext) -> tuple[NDArray[Any], NDArray[Any]]:
+        hold.initial_tension, hold.carried = first, carried
+        target = laws.creep_target(self._pass("drive", first, hold), self.B, self.U)
+        amount = self._pass("amount", target - self.kept * carried, hold)
+        return amount, self._pass("rate", self.k2, hold)
+
+    def _tension(
+        self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext, row: int | None = None
+    ) -> NDArray[Any]:
+        if row is not None:
+            whole = hold.warming_K
+            hold.warming_K = whole[row : row + 1]
+        zero = self._pass("zero_length", self.protocol.length_mm + elongation, hold)
+        strain = self._pass("strain", laws.strain(position, zero, self.model.law), hold)
+        if row is not None:
+            hold.warming_K = whole
+        return np.where(strain.real > 0, self.k1 * strain, 0.0)
+
+    def _pass(self, place: str, value: Any, hold: HoldContext) -> Any:
+        for effect in self.at.get(place, ()):
+            value = effect.apply(value, self.own[effect.key], hold)
+        return value
+
+    def _context(self, j: int) -> HoldContext:
+        p = self.protocol
+        later = p.number[j:][p.number[j:] >= 0]
+        order = float(p.number[j]) if p.number[j] >= 0 else (float(later[0]) - 0.5 if later.size else np.inf)
+        return HoldContext(
+            index=j,
+            recorded=bool(p.recorded[j]),
+            order=order,
+            displacement_mm=float(p.displacement_mm[j]),
+            previous_mm=float(p.displacement_mm[j - 1]) if j else 0.0,
+            direction=int(self.directions[j]),
+            first_direction=int(self.directions[0]),
+            start_s=float(self.start[j]),
+            duration_s=float(p.duration_s[j]),
+            time_s=self.time[j][:, None],
+            warming_K=np.zeros((p.time_s.shape[1], 1)) if p.warming_K is None else p.warming_K[j][:, None],
+            length_mm=p.length_mm,
+            length_ref_mm=self.model.length_ref_mm or p.length_mm,
+            tension_ref_N=self.model.tension_ref_N,
+            theta=self.theta,
+            past=self.past,
+        )
+
+
+def _directions(displacement_mm: NDArray[Any]) -> NDArray[Any]:
+    """(H,) sign of the last move; a hold without a move keeps the one before, and a test begins upwards."""
+    out, current = np.empty(len(displacement_mm)), 1.0
+    for j, move in enumerate(np.sign(np.diff(displacement_mm, prepend=0.0))):
+        current = move or current
+        out[j] = current
+    return out
+
+
+def tension_reference(tensions: Sequence[float] | NDArray[Any]) -> float:
+    """Geometric mean of the positive tensions, N; the constant that some effects and coordinates refer to."""
+    values = np.asarray(tensions, float)
+    values = values[values > 0]
+    return float(np.exp(np.log(values).mean())) if values.size else 1.0
