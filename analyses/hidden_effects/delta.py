@@ -1,0 +1,125 @@
+"""The size of a hidden effect: delta, its direction in the space the plain model cannot reach, and the inverse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, solve_triangular
+
+from .catalogue import Candidate, largest, members
+from .generator import simulate
+from .rig import MATERIAL_PARAMETERS, Array, Rig
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A rig's plain readings and the metric in which effects are measured.
+
+    Attributes
+    ----------
+    plain : plain, noise-free readings (N), shape (R,).
+    chol : lower Cholesky factor of the true covariance V of the readings (N), shape (R, R).
+    basis : orthonormal basis of the whitened derivatives by the free parameters, shape (R, r).
+    floor : standard deviation of each reading (N), shape (R,).
+    """
+
+    rig: Rig
+    plain: Array
+    chol: Array
+    basis: Array
+    floor: Array
+
+    def whiten(self, dy: Array) -> Array:
+        """V^(-1/2) dy for rows `dy` (n, R)."""
+        return solve_triangular(self.chol, np.atleast_2d(dy).T, lower=True).T
+
+    def project(self, dy: Array) -> Array:
+        """Whitened rows with what the plain parameters can absorb taken out, shape (n, R)."""
+        z = self.whiten(dy)
+        return z - (z @ self.basis) @ self.basis.T
+
+
+def derivatives(rig: Rig, theta: Array | None = None) -> tuple[Array, Array, Array]:
+    """Central differences of the plain readings.
+
+    Returns
+    -------
+    readings (R,), derivative by the free parameters (R, d), by the setting errors of all holds (R, H), in N per unit.
+    """
+    theta = rig.theta if theta is None else theta
+    d, h = len(theta), rig.n_holds
+    steps = np.abs(theta) * 1e-4
+    steps[len(rig.materials) * len(MATERIAL_PARAMETERS) :] = 1e-3
+    thetas = np.tile(theta, (1 + 2 * (d + h), 1))
+    eta = np.zeros((len(thetas), h))
+    for i in range(d):
+        thetas[1 + 2 * i, i] += steps[i]
+        thetas[2 + 2 * i, i] -= steps[i]
+    for i in range(h):
+        eta[1 + 2 * d + 2 * i, i] = 1e-3
+        eta[2 + 2 * d + 2 * i, i] = -1e-3
+    y = simulate(rig, thetas, None, eta)
+    difference = (y[1::2] - y[2::2]).T
+    return y[0], difference[:, :d] / (2 * steps), difference[:, d:] / 2e-3
+
+
+def covariance(rig: Rig, by_eta: Array) -> Array:
+    """True covariance V (N^2) of all readings: sensor, rounding and setting errors carried along the chain."""
+    blocks = []
+    variances = np.concatenate([np.full(len(b.holds), b.setting_sd**2) for b in rig.benches])
+    for bench in rig.benches:
+        rounding = (bench.resolution_N or 0.0) ** 2 / 12
+        blocks.append((bench.sensor_sd**2 + rounding) * np.eye(bench.n_readings))
+    return block_diag(*blocks) + (by_eta * variances) @ by_eta.T
+
+
+def geometry(rig: Rig) -> Geometry:
+    """Metric of a rig at its true parameters."""
+    y, by_theta, by_eta = derivatives(rig)
+    v = covariance(rig, by_eta)
+    chol = np.linalg.cholesky(v)
+    columns = solve_triangular(chol, by_theta, lower=True)
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return Geometry(rig, y, chol, left[:, size > 1e-7 * size[0]], np.sqrt(np.diag(v)))
+
+
+def signature(geo: Geometry, rows: list[list[tuple[Candidate, float]]]) -> Array:
+    """Projected, whitened signatures of finite effects, shape (n, R); delta is the norm of a row."""
+    return geo.project(simulate(geo.rig, members=members(geo.rig, rows)) - geo.plain)
+
+
+def delta_curves(
+    geo: Geometry, candidates: list[Candidate], points: int = 17, decades: float = 4.0
+) -> tuple[Array, Array]:
+    """Signatures of candidates over a log grid of amplitudes up to the largest sensible one.
+
+    Returns
+    -------
+    amplitudes (c, points), signatures (c, points, R).
+    """
+    grid = np.geomspace(10.0**-decades, 1.0, points)
+    sizes = np.array([largest(geo.rig, c, geo.plain) for c in candidates])[:, None] * grid
+    rows = [[(c, float(a))] for c, line in zip(candidates, sizes, strict=True) for a in line]
+    z = signature(geo, rows)
+    return sizes, z.reshape(len(candidates), points, -1)
+
+
+def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float) -> float:
+    """Smallest amplitude (its size) whose signature has the given delta; nan when no sensible one has.
+
+    Grids inside the bracket of the one before, then log-log interpolation; effects with kinks need the third.
+    """
+    sizes, z = delta_curves(geo, [candidate])
+    grid, height = sizes[0], np.linalg.norm(z[0], axis=1)
+    for _ in range(3):
+        above = np.flatnonzero(height >= delta)
+        if not len(above) or above[0] == 0:
+            return float("nan")
+        low, high = grid[above[0] - 1], grid[above[0]]
+        grid = np.geomspace(low, high, 7)
+        height = np.linalg.norm(signature(geo, [[(candidate, float(a))] for a in grid]), axis=1)
+    above = np.flatnonzero(height >= delta)
+    i = int(above[0]) if len(above) and above[0] > 0 else len(grid) - 1
+    return float(np.exp(np.interp(np.log(delta), np.log(height[i - 1 : i + 1]), np.log(grid[i - 1 : i + 1]))))

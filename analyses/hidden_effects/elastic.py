@@ -1,0 +1,68 @@
+"""From position to tension: what the machine does to the stretched length, and the wire's elastic answer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .rig import Array, Bench
+from .state import Effects
+
+
+def positions(bench: Bench, fx: Effects) -> Array:
+    """True displacements (mm) before the setting error, shape (n, holds).
+
+    Lost motion is a play: going up the carriage follows at once, going down it stays until the play `w` is used up.
+    """
+    x = np.tile(bench.displacements_mm, (fx.n, 1))
+    if fx.on("screw_thread"):
+        pitch, phase = fx.shape("screw_thread.pitch"), fx.shape("screw_thread.phase")
+        wave = np.sin(2 * np.pi * bench.displacements_mm / pitch[:, None] + phase[:, None])
+        x = x + fx["screw_thread"][:, None] * wave
+    if fx.on("lost_motion"):
+        w = fx["lost_motion"]
+        carriage = x[:, 0].copy()
+        for j in range(1, x.shape[1]):
+            carriage = np.clip(carriage, x[:, j], x[:, j] + w)
+            x[:, j] = carriage
+    return x
+
+
+def natural_length(bench: Bench, fx: Effects, hold: int, creep: Array, warmth: Array | float) -> Array:
+    """Zero-tension length (mm) with creep (n, G), slip and warmth (K above the first logged reading), shape (n, G)."""
+    length = bench.length_mm + creep
+    if fx.on("grip_slip"):
+        length = length + (fx["grip_slip"] * (hold >= fx.shape("grip_slip.hold")))[:, None]
+    if fx.on("thermal_expansion"):
+        length = length * (1 + fx["thermal_expansion"][:, None] * warmth)
+    return length
+
+
+def tension(k1: Array, stretched: Array, natural: Array, fx: Effects, hold: int) -> Array:
+    """Tension (N), shape (n, G), of wires of `stretched` (n, 1) and `natural` (n, G) length in mm; 0 when slack."""
+    if not fx.on("fixture_compliance"):
+        return _tension_of_strain(k1, stretched / natural - 1, fx, hold)
+    give = fx["fixture_compliance"][:, None]
+    answer = _tension_of_strain(k1, stretched / natural - 1, fx, hold)
+    for _ in range(60):  # damped fixed point: the fixture gives way under the very tension sought
+        slope = k1[:, None] / natural
+        answer = answer + (_tension_of_strain(k1, (stretched - give * answer) / natural - 1, fx, hold) - answer) / (
+            1 + give * slope
+        )
+    return answer
+
+
+def _tension_of_strain(k1: Array, strain: Array, fx: Effects, hold: int) -> Array:
+    s = np.maximum(strain, 0.0)
+    if fx.on("toe"):
+        c = np.maximum(fx["toe"][:, None], 1e-12)
+        s = s - c * -np.expm1(-s / c)
+    stiffness = k1[:, None]
+    if fx.on("hold_softening"):
+        stiffness = stiffness * (1 - fx["hold_softening"][:, None] * hold)
+    result = stiffness * s
+    if fx.on("strain_stiffening"):
+        result = result * (1 + fx["strain_stiffening"][:, None] * s)
+    if fx.on("yield"):
+        beyond = np.maximum(s - fx.shape("yield.strain")[:, None], 0.0)
+        result = result - stiffness * fx["yield"][:, None] * beyond
+    return np.maximum(result, 0.0)
