@@ -1,0 +1,97 @@
+"""The paper's section 4 over a workspace: how far a vertical platform moves and tilts within a minute."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot import drift, inverse
+from wirebayes.robot import rotation as turning
+from wirebayes.robot.description import Robot
+from wirebayes.robot.wires import Wires
+
+Floats = NDArray[np.float64]
+TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
+
+
+@dataclass(frozen=True)
+class WorkspaceDrift:
+    """Drift at one time, everywhere in a workspace.
+
+    Attributes
+    ----------
+    position_m : (p, 3) array
+        Poses asked for, the normal vertical; those that no tensions hold are left out.
+    distance_m, tilt_rad : (p, n) arrays
+        Displacement of the reference point; angle between normal and vertical.
+    tension_N : (p, w) array
+        When the hold begins.
+    feasible : float
+        Share of the grid's points that tensions within the bounds hold.
+    found : float
+        Share of the forward problems that were solved.
+    """
+
+    position_m: Floats
+    distance_m: Floats
+    tilt_rad: Floats
+    tension_N: Floats
+    feasible: float
+    found: float
+
+    def holds(self, distance_m: float = DISTANCE_M, tilt_rad: float = TILT_RAD) -> Floats:
+        """(p,) probability, at every point, that both limits are kept."""
+        return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
+
+
+def grid(robot: Robot, points: tuple[int, int, int]) -> Floats:
+    """Regular grid over the robot's workspace box, (p, 3) m."""
+    axes = [
+        np.linspace(low, high, count) if count > 1 else np.array([0.5 * (low + high)])
+        for low, high, count in zip(robot.lower_m, robot.upper_m, points, strict=True)
+    ]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+
+
+def over_workspace(robot: Robot, wires: Wires, position_m: Floats, time_s: float = TIME_S) -> WorkspaceDrift:
+    """Drift of a vertical platform after a time, at every position and draw in one batch.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    position_m : (p, 3) array
+    time_s : float
+
+    Returns
+    -------
+    WorkspaceDrift
+    """
+    upright = np.broadcast_to(np.eye(3), (len(position_m), 3, 3))
+    tau = inverse.tensions(robot, position_m, upright)
+    good = np.isfinite(tau).all(1)
+    if not good.any():
+        empty = np.empty((0, 1))
+        return WorkspaceDrift(np.empty((0, 3)), empty, empty, np.empty((0, robot.legs)), 0.0, 0.0)
+    x, tau = position_m[good], tau[good]
+    n, p = max(v.shape[-1] for v in wires.theta.values()), len(x)
+    # Draws vary fastest; every (position, draw) is one row of the batch.
+    many = replace(wires, theta={k: np.tile(np.broadcast_to(v, (len(v), n)), p) for k, v in wires.theta.items()})
+    where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
+    R = np.broadcast_to(np.eye(3), (n * p, 3, 3))
+    told = inverse.commands(robot, many, where, R, pull)
+    course = drift.hold(robot, many, told.joint_m, np.array([time_s]), where, R)
+    shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
+    tilt = turning.tilt(course.rotation[:, 0])
+    return WorkspaceDrift(
+        x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
+    )
+
+
+def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
+    """The same robot at another size and mass; tension bounds follow the mass."""
+    lengths = ("exit_m", "platform_m", "centre_of_mass_m", "beyond_m", "wire_m", "home_m", "lower_m", "upper_m")
+    rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
+                   highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip
+    return replace(robot, mass_kg=mass_kg, rule=rule, **{name: getattr(robot, name) * factor for name in lengths})

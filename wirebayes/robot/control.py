@@ -1,0 +1,113 @@
+"""Acting on creep: commands that foresee it, the error that is left, and how long a calibration lasts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot import drift, inverse
+from wirebayes.robot.creep import HoldCreep, fresh
+from wirebayes.robot.description import Robot
+from wirebayes.robot.drift import without_creep
+from wirebayes.robot.wires import Wires
+
+Floats = NDArray[np.float64]
+Schedule = Callable[[float], Floats]
+
+
+def known(wires: Wires) -> Wires:
+    """One wire with the mean of every parameter: what a controller is told of an uncertain wire."""
+    return replace(wires, theta={k: v.mean(axis=-1, keepdims=True) for k, v in wires.theta.items()})
+
+
+def hooke_only(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
+    """Commands of a controller that knows the stiffness and nothing of creep; `told` holds one draw."""
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    joint = inverse.commands(robot, without_creep(told), position_m[None], rotation[None], tau).joint_m
+    return lambda time_s: joint
+
+
+def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
+    """Commands that take off, at every time, the creep foreseen under the tensions wanted there."""
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    ahead = HoldCreep(told, fresh(robot.legs, 1), tau.T, "start")
+
+    def joint(time_s: float) -> Floats:
+        strain = ahead.advance(time_s, tau.T).strain(told)
+        return inverse.commands(robot, told, position_m[None], rotation[None], tau, strain).joint_m
+
+    return joint
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """How far the platform is from where it was told to be.
+
+    Attributes
+    ----------
+    times_s : (t,) array
+    distance_m : (n, t) array
+    angle_rad : (n, t) array
+    found : (n,) bool array
+    """
+
+    times_s: Floats
+    distance_m: Floats
+    angle_rad: Floats
+    found: NDArray[np.bool_]
+
+    def probability(self, tolerance_m: float, tolerance_rad: float = np.inf) -> Floats:
+        """(t,) share of draws within both tolerances; a draw without equilibrium is never within."""
+        inside = (self.distance_m < tolerance_m) & (self.angle_rad < tolerance_rad) & self.found[:, None]
+        return np.asarray(inside.mean(0))
+
+
+def error(
+    robot: Robot, wires: Wires, schedule: Schedule, position_m: Floats, rotation: Floats, times_s: Floats
+) -> PoseError:
+    """Pose error over time of uncertain wires under one controller's commands.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws: what the wires may really be.
+    schedule : function
+        From `hooke_only` or `creep_aware`.
+    position_m, rotation : (3,), (3, 3) arrays
+        The pose asked for.
+    times_s : (t,) array
+    """
+    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation)
+    shift, angle = drift.moved(course, position_m, rotation)
+    return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found)
+
+
+def longest_interval(
+    errors: PoseError, tolerance_m: float, tolerance_rad: float = np.inf, probability: float = 0.95
+) -> float:
+    """Longest time up to which the pose is within tolerance with a probability, at every time before, s.
+
+    Zero when not even the first time is; infinite when the last time still is.
+    """
+    good = errors.probability(tolerance_m, tolerance_rad) >= probability
+    if good.all():
+        return float("inf")
+    first = int(np.argmin(good))
+    return float(errors.times_s[first - 1]) if first else 0.0
+
+
+def since_calibration(course: drift.Course, tolerated_from_s: float) -> PoseError:
+    """Error after the pose was calibrated away at one of the course's times: what drifts from there on.
+
+    Parameters
+    ----------
+    course : Course
+    tolerated_from_s : float
+        Time of the calibration; must be one of the course's times.
+    """
+    k = int(np.flatnonzero(course.times_s == tolerated_from_s)[0])
+    shift, angle = drift.moved(course, course.position_m[:, k], course.rotation[:, k])
+    times = course.times_s[k:] - tolerated_from_s
+    return PoseError(times, np.linalg.norm(shift[:, k:], axis=-1), angle[:, k:], course.found)

@@ -1,0 +1,109 @@
+"""Creep of a robot's wires through one hold: the bench's law, each wire under its own tension.
+
+Elongations are kept in millimetres of the tested sample, so that bench and robot share every formula; a wire's
+zero-tension length is its length before creep times one plus that elongation over the sample's length.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.wires import Wires, hold_context
+from wirebayes.wire import laws
+
+Floats = NDArray[np.float64]
+Follow = Literal["current", "start"]
+
+
+@dataclass(frozen=True)
+class CreepState:
+    """What wires carry from hold to hold.
+
+    Attributes
+    ----------
+    creep_mm : (w, n) array
+        Elongation of the tested length by creep, eq (5).
+    beside_mm : mapping of effect key to (w, n) array
+        Elongations that effects carry beside it.
+    holds : int
+        Holds so far.
+    clock_s : float
+        Time since the first hold began.
+    past : tuple of (start_s, amount, k2)
+        The clocks of earlier holds, for effects that remember them.
+    """
+
+    creep_mm: Floats
+    beside_mm: Mapping[str, Floats]
+    holds: int = 0
+    clock_s: float = 0.0
+    past: tuple[tuple[float, Floats, Floats], ...] = ()
+
+    def strain(self, wires: Wires) -> Floats:
+        """Creep as a strain of the whole wire, (w, n)."""
+        return np.asarray(sum(self.beside_mm.values(), self.creep_mm) / wires.length_mm)
+
+
+def fresh(legs: int, draws: int) -> CreepState:
+    """Wires that were never loaded."""
+    return CreepState(np.zeros((legs, draws)), {})
+
+
+class HoldCreep:
+    """Creep within one hold: its clock starts with the commanded length, its amount follows the tension.
+
+    Parameters
+    ----------
+    wires : Wires
+    carried : CreepState
+    tension_N : (w, n) array
+        When the hold begins.
+    follow : {"current", "start"}
+        "current": the amount still to come follows the tension as it changes. "start": it is fixed by the tension at
+        the beginning, as in the bench's law; the two agree while the tension does not change.
+    """
+
+    def __init__(self, wires: Wires, carried: CreepState, tension_N: Floats, follow: Follow = "current") -> None:
+        self.wires, self.carried, self.follow = wires, carried, follow
+        self.hold = hold_context(wires, carried.holds, carried.clock_s, tension_N, carried.creep_mm)
+        self.hold.past.extend(carried.past)
+        self.kept = 1.0 if wires.history == "saturating" else 0.0
+        self.k2 = self._pass("rate", wires.theta["k2"])
+        self.amount = self._amount(tension_N)
+        self.grown = np.zeros_like(carried.creep_mm)
+        self.time_s = 0.0
+
+    def advance(self, time_s: float, tension_N: Floats) -> CreepState:
+        """Creep to a later time of the hold, under the tension that reigned since the last call."""
+        N = self.wires.theta["N"]
+        if self.follow == "current":
+            self.amount = self._amount(tension_N)
+            # The share of what is left: composes to eq (5) exactly when the tension stays.
+            share = -np.expm1(-self.k2 * (np.power(time_s, N) - np.power(self.time_s, N)))
+            self.grown = self.grown + (self.amount - self.grown) * share
+        else:
+            self.grown = self.amount * laws.creep_fraction(np.asarray(time_s), self.k2, N)
+        self.time_s = time_s
+        self.hold.time_s = np.full((1, 1), time_s)
+        self.hold.duration_s = time_s
+        beside = {
+            e.key: e.apply(self.carried.beside_mm.get(e.key, np.zeros((1, 1))), self.wires.own(e), self.hold)
+            for e in self.wires.at("elongation")
+        }
+        carried = self.carried
+        past = (*carried.past, (carried.clock_s, self.amount, self.k2))
+        grown = self._pass("creep", carried.creep_mm + self.grown)
+        return CreepState(grown, beside, carried.holds + 1, carried.clock_s + time_s, past)
+
+    def _amount(self, tension_N: Floats) -> Floats:
+        theta = self.wires.theta
+        target = laws.creep_target(self._pass("drive", tension_N), theta["B"], theta["U"])
+        return self._pass("amount", target - self.kept * self.carried.creep_mm)
+
+    def _pass(self, place: str, value: Floats) -> Floats:
+        for effect in self.wires.at(place):
+            value = effect.apply(value, self.wires.own(effect), self.hold)
+        return value

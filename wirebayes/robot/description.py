@@ -1,0 +1,113 @@
+"""The robot as data: exit points, platform, legs, and the choices that are stated with it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Actuator = Literal["drum", "linear"]
+Freedom = Literal["pose", "position"]
+GRAVITY = 9.80665  # m/s^2, standard
+
+
+@dataclass(frozen=True)
+class GivenWire:
+    """A wire whose parameters are written in the robot's file, without uncertainty.
+
+    Attributes
+    ----------
+    parameters : dict
+        ``k1`` (N), ``B`` (mm N^-U), ``U``, ``k2`` (s^-N), ``N``.
+    length_mm : float
+        The length that `B` refers to.
+    """
+
+    parameters: dict[str, float]
+    length_mm: float
+
+
+@dataclass(frozen=True)
+class TensionRule:
+    """Which of the many tensions of a redundant robot is meant: the stated, swappable choice."""
+
+    choice: str
+    lowest_N: float
+    highest_N: float
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot of ``w`` legs; all lengths in metres, masses in kilograms.
+
+    Attributes
+    ----------
+    name, description, source : str
+    freedom : {"pose", "position"}
+        "position": parallel lines keep the orientation, only the three coordinates are free.
+    mass_kg : float
+    centre_of_mass_m : (3,) array
+        In the platform's frame, from the reference point.
+    exit_m, platform_m : (w, 3) arrays
+        Exit points in the world, platform points in the platform's frame.
+    lines : (w,) array
+        Parallel parts of one wire between exit and platform point; all carry its tension.
+    beyond_m : (w,) array
+        Wire beyond the exit point (to the drum or inside the pulley block); it stretches and creeps too.
+    actuator : tuple of {"drum", "linear"}
+    ratio : (w,) array
+        Pulley block: wire moved per joint displacement; 0 for a drum.
+    wire_m : (w,) array
+        Total zero-tension length of a linear actuator's wire; 0 for a drum.
+    wire : tuple of str
+        Name of each leg's wire; legs of one name are cut from one line.
+    given : dict of str to GivenWire
+    rule : TensionRule
+    home_m, home_rotation_rad : (3,) arrays
+        The pose shown when none is asked for.
+    lower_m, upper_m : (3,) arrays
+        Box in which workspace figures are computed.
+    """
+
+    name: str
+    description: str
+    source: str
+    freedom: Freedom
+    mass_kg: float
+    centre_of_mass_m: Floats
+    exit_m: Floats
+    platform_m: Floats
+    lines: Floats
+    beyond_m: Floats
+    actuator: tuple[Actuator, ...]
+    ratio: Floats
+    wire_m: Floats
+    wire: tuple[str, ...]
+    given: dict[str, GivenWire]
+    rule: TensionRule
+    home_m: Floats
+    home_rotation_rad: Floats
+    lower_m: Floats
+    upper_m: Floats
+
+    @property
+    def legs(self) -> int:
+        """Number of legs."""
+        return len(self.exit_m)
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom of the platform: 6, or 3 when parallel lines keep its orientation."""
+        return 6 if self.freedom == "pose" else 3
+
+    @property
+    def is_linear(self) -> NDArray[np.bool_]:
+        """(w,) True where a linear actuator drives the leg."""
+        return np.array([a == "linear" for a in self.actuator])
+
+    @property
+    def size_m(self) -> float:
+        """Typical lever arm of the platform, by which rotations are compared with displacements."""
+        arms = np.linalg.norm(self.platform_m - self.platform_m.mean(0), axis=1)
+        return float(max(np.sqrt(np.mean(arms**2)), 1e-3 * np.ptp(self.exit_m, axis=0).max()))

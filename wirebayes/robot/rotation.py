@@ -1,0 +1,52 @@
+"""Rotations as matrices and rotation vectors, batched along the leading axes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def matrix(rotation_vector_rad: Floats) -> Floats:
+    """Rotation matrices ``(..., 3, 3)`` of rotation vectors ``(..., 3)``, rad (Rodrigues)."""
+    v = np.asarray(rotation_vector_rad, float)
+    angle = np.sqrt((v * v).sum(-1))[..., None, None]
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    k = cross_matrix(v)
+    return np.asarray(np.eye(3) + a * k + b * (k @ k))
+
+
+def vector(rotation: Floats) -> Floats:
+    """Rotation vectors ``(..., 3)``, rad, of rotation matrices ``(..., 3, 3)``; exact also near zero and near pi."""
+    from scipy.spatial.transform import Rotation
+
+    flat = np.reshape(rotation, (-1, 3, 3))
+    return np.asarray(Rotation.from_matrix(flat).as_rotvec()).reshape(*np.shape(rotation)[:-2], 3)
+
+
+def cross_matrix(v: Floats) -> Floats:
+    """``(..., 3, 3)`` matrices K with ``K x = v × x``."""
+    z = np.zeros(np.shape(v)[:-1])
+    x, y, w = v[..., 0], v[..., 1], v[..., 2]
+    rows = [np.stack(r, -1) for r in ([z, -w, y], [w, z, -x], [-y, x, z])]
+    return np.stack(rows, -2)
+
+
+def tilt(rotation: Floats) -> Floats:
+    """Angle between the platform's normal (its third axis) and the vertical, rad; `(...)` of `(..., 3, 3)`."""
+    return np.asarray(np.arctan2(np.hypot(rotation[..., 0, 2], rotation[..., 1, 2]), rotation[..., 2, 2]))
+
+
+def compose(increment_rad: Floats, rotation: Floats) -> Floats:
+    """Batch-last: ``exp(increment)`` times the rotation, ``(3, n)`` and ``(3, 3, n)`` arrays."""
+    x, y, z = increment_rad
+    angle2 = x * x + y * y + z * z
+    angle = np.sqrt(angle2)
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    turn = np.empty((3, 3, *x.shape))
+    turn[0, 0], turn[1, 1], turn[2, 2] = 1 - b * (y * y + z * z), 1 - b * (x * x + z * z), 1 - b * (x * x + y * y)
+    turn[0, 1], turn[1, 0] = b * x * y - a * z, b * x * y + a * z
+    turn[0, 2], turn[2, 0] = b * x * z + a * y, b * x * z - a * y
+    turn[1, 2], turn[2, 1] = b * y * z - a * x, b * y * z + a * x
+    return np.asarray((turn[:, :, None] * rotation[None]).sum(1))

@@ -1,0 +1,58 @@
+"""Which parameter's uncertainty makes the pose error: shares of the variance when parameters are correlated.
+
+Every parameter gets its average gain in explained variance over all orders in which the parameters can be learnt
+(Lindeman, Merenda and Gold's shares; the Shapley value of a regression). Shares of the parameters and of what no
+regression explains add up to one.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def shares(parameters: Mapping[str, Floats], output: Floats) -> dict[str, float]:
+    """Shares of an output's variance, each parameter entering by its logarithm (or itself) and that squared.
+
+    Parameters
+    ----------
+    parameters : mapping of name to (n,) array
+    output : (n,) array
+
+    Returns
+    -------
+    dict
+        One share a parameter, and "unexplained".
+    """
+    names = [name for name, value in parameters.items() if np.std(value) > 0]
+    total = float(np.var(output))
+    if total == 0 or not names:
+        return dict.fromkeys(parameters, 0.0) | {"unexplained": 0.0}
+    y = (output - output.mean()) / output.std()
+    columns = {name: _columns(parameters[name]) for name in names}
+    explained: dict[tuple[str, ...], float] = {(): 0.0}
+    for size in range(1, len(names) + 1):
+        for subset in combinations(names, size):
+            X = np.column_stack([columns[name] for name in subset])
+            fit = X @ np.linalg.lstsq(X, y, rcond=None)[0]
+            explained[subset] = float(1.0 - np.mean((y - fit) ** 2))
+    out = dict.fromkeys(parameters, 0.0)
+    d = len(names)
+    for name in names:
+        rest = [other for other in names if other != name]
+        for size in range(d):
+            for subset in combinations(rest, size):
+                with_it = tuple(other for other in names if other in subset or other == name)
+                out[name] += (explained[with_it] - explained[subset]) / (d * comb(d - 1, size))
+    return out | {"unexplained": 1.0 - explained[tuple(names)]}
+
+
+def _columns(value: Floats) -> Floats:
+    z = np.log(value) if np.all(value > 0) else value
+    z = (z - z.mean()) / z.std()
+    square = z * z
+    return np.column_stack([z, square - square.mean()])

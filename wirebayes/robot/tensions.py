@@ -1,0 +1,71 @@
+"""Which tensions a redundant robot is meant to have: choices with one face, swapped by name or by a user's function.
+
+A choice takes wrench matrix, wrench, lowest and highest tension and returns tensions, or None where none fit.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+Floats = NDArray[np.float64]
+Choice = Callable[[Floats, Floats, float, float], Floats | None]
+
+
+def nearest(reference_N: Floats, structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:
+    """Tensions nearest (2-norm) to a reference that carry a load within bounds.
+
+    A least-distance problem in the null space of the structure matrix, solved exactly by Lawson and Hanson's
+    non-negative least squares (*Solving Least Squares Problems*, ch. 23).
+
+    Parameters
+    ----------
+    reference_N : (w,) array
+    structure : (d, w) array
+        Wrench of unit tensions.
+    load : (d,) array
+        Wrench to be made by the wires.
+    lowest_N, highest_N : float
+
+    Returns
+    -------
+    (w,) array, or None when no tensions within the bounds carry the load.
+    """
+    left, sizes, right = np.linalg.svd(structure)
+    rank = int((sizes > 1e-10 * sizes[0]).sum())
+    particular = right[:rank].T @ ((left.T @ load)[:rank] / sizes[:rank])
+    if np.abs(structure @ particular - load).max() > 1e-9 * np.abs(load).max():
+        return None
+    null = right[rank:].T
+    tau = particular + null @ (null.T @ (reference_N - particular))
+    if tau.min() >= lowest_N and tau.max() <= highest_N:
+        return np.asarray(tau)
+    if null.shape[1] == 0:
+        return None
+    G = np.vstack([null, -null])
+    h = np.concatenate([lowest_N - tau, tau - highest_N])
+    E = np.vstack([G.T, h])
+    f = np.zeros(len(E))
+    f[-1] = 1.0
+    residual = E @ nnls(E, f, maxiter=50 * E.shape[1])[0] - f
+    if np.abs(residual[-1]) < 1e-10:
+        return None
+    result = tau + null @ (-residual[:-1] / residual[-1])
+    margin = 1e-8 * max(highest_N, 1.0)
+    inside = result.min() >= lowest_N - margin and result.max() <= highest_N + margin
+    return np.asarray(result) if inside else None
+
+
+def minimum_norm(structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:
+    """The smallest tensions (2-norm) above the floor."""
+    return nearest(np.zeros(structure.shape[1]), structure, load, lowest_N, highest_N)
+
+
+def middle(structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:
+    """The tensions nearest to the middle of the allowed range: stiffer, further from slackness."""
+    reference = np.full(structure.shape[1], 0.5 * (lowest_N + highest_N))
+    return nearest(reference, structure, load, lowest_N, highest_N)
+
+
+CHOICES: dict[str, Choice] = {"minimum_norm": minimum_norm, "middle": middle}

@@ -1,0 +1,155 @@
+"""The wires of a robot: elastic law with whatever effects bend it, and what creep needs, one value a leg and draw.
+
+Arrays are batch-last: ``(w, n)`` or anything that broadcasts to it. Lengths in metres, tensions in newtons.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.wire import laws
+from wirebayes.wire.effect import Effect, HoldContext
+
+Floats = NDArray[np.float64]
+_STEP = 1e-30
+
+
+@dataclass(frozen=True)
+class Wires:
+    """Elastic law, history and parameters of all legs.
+
+    Attributes
+    ----------
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+    theta : mapping of name to (w, n) or (1, n) array
+        ``k1`` (N), ``B`` (mm N^-U at `length_mm`), ``U``, ``k2`` (s^-N), ``N`` and ``effect_name.parameter``.
+    length_mm : (w, 1) array
+        The zero-tension length that B was fitted at; creep is a strain of the whole wire.
+    effects : tuple of Effect
+        Material effects only.
+    tension_ref_N : float
+    """
+
+    law: laws.ElasticLaw
+    history: laws.History
+    theta: Mapping[str, Floats]
+    length_mm: Floats
+    effects: tuple[Effect, ...] = ()
+    tension_ref_N: float = 1.0
+
+    def at(self, place: str) -> list[Effect]:
+        """The effects at one place, in the order they compose."""
+        return [effect for effect in self.effects if effect.place == place]
+
+    def own(self, effect: Effect) -> dict[str, Floats]:
+        """An effect's amplitudes by their short names."""
+        return {a.name: self.theta[c] for a, c in zip(effect.amplitudes, effect.columns(), strict=True)}
+
+    def part(self, index: slice | NDArray[np.intp]) -> "Wires":
+        """The same wires for some of the draws."""
+        theta = {k: v if v.shape[-1] == 1 else v[:, index] for k, v in self.theta.items()}
+        return replace(self, theta=theta)
+
+
+def hold_context(
+    wires: Wires, hold: int = 0, clock_s: float = 0.0, tension_N: Floats | None = None, carried_mm: Floats | None = None
+) -> HoldContext:
+    """What an effect may look at, as on the bench: a robot's hold begins with a command and has no displacement."""
+    zero = np.zeros((1, 1))
+    return HoldContext(
+        index=hold,
+        recorded=True,
+        order=float(hold),
+        displacement_mm=0.0,
+        previous_mm=0.0,
+        direction=1,
+        first_direction=1,
+        start_s=clock_s,
+        duration_s=0.0,
+        time_s=zero,
+        warming_K=zero,
+        length_mm=float(np.mean(wires.length_mm)),
+        length_ref_mm=float(np.mean(wires.length_mm)),
+        tension_ref_N=wires.tension_ref_N,
+        theta=dict(wires.theta),
+        initial_tension=zero if tension_N is None else tension_N,
+        carried=zero if carried_mm is None else carried_mm,
+    )
+
+
+def bent_strain(wires: Wires, strain: Floats) -> tuple[Floats, Floats]:
+    """Effective strain whose product with k1 is the tension, and its slope by the strain (a complex step)."""
+    bends = wires.at("strain")
+    if not bends:
+        return strain, np.ones_like(strain)
+    value = strain + 1j * _STEP
+    context = hold_context(wires)
+    for effect in bends:
+        value = effect.apply(value, wires.own(effect), context)
+    return np.asarray(value.real), np.asarray(value.imag / _STEP)
+
+
+def tension(wires: Wires, stretched_m: Floats, zero_m: Floats) -> tuple[Floats, Floats]:
+    """Tension and its slope by the stretched length, eqs (1), (3) or (6); both zero when slack.
+
+    Parameters
+    ----------
+    wires : Wires
+    stretched_m, zero_m : (w, n) arrays
+
+    Returns
+    -------
+    tension_N, slope_N_m : (w, n) arrays
+    """
+    if wires.law == "hooke":
+        ratio = stretched_m / zero_m
+        strain, slope = ratio - 1.0, 1.0 / zero_m
+    else:
+        ratio = zero_m / stretched_m
+        strain, slope = 1.0 - ratio, ratio / stretched_m
+    k1 = wires.theta["k1"]
+    if wires.at("strain"):
+        strain, bend = bent_strain(wires, strain)
+        slope = slope * bend
+    taut = strain > 0
+    return k1 * np.where(taut, strain, 0.0), k1 * np.where(taut, slope, 0.0)
+
+
+def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
+    """Elastic energy, J: the integral of the tension from the zero-tension length; zero when slack."""
+    stretch = np.maximum(stretched_m - zero_m, 0.0)
+    if wires.at("strain"):
+        nodes, weights = np.polynomial.legendre.leggauss(8)
+        total = np.zeros(np.broadcast_shapes(stretch.shape, zero_m.shape))
+        for node, weight in zip(nodes, weights, strict=True):
+            total += 0.5 * weight * tension(wires, zero_m + stretch * (0.5 * (node + 1.0)), zero_m)[0]
+        return total * stretch
+    if wires.law == "hooke":
+        return np.asarray(0.5 * wires.theta["k1"] * stretch * stretch / zero_m)
+    x = stretch / zero_m
+    return np.asarray(wires.theta["k1"] * zero_m * (x - np.log1p(x)))
+
+
+def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) -> Floats:
+    """Zero-tension length that gives a tension at a stretched length, m; NaN where the law cannot reach the tension."""
+    goal = tension_N / wires.theta["k1"]
+    strain = goal + np.zeros(np.broadcast_shapes(goal.shape, stretched_m.shape))
+    if wires.at("strain"):
+        for _ in range(50):
+            value, slope = bent_strain(wires, strain)
+            move = (value - goal) / np.where(slope > 0, slope, np.nan)
+            strain = strain - move
+            if not np.any(np.abs(move) > 1e-15):
+                break
+    with np.errstate(invalid="ignore"):
+        length = stretched_m / (1.0 + strain) if wires.law == "hooke" else stretched_m * (1.0 - strain)
+        return np.where(length > 0, length, np.nan)
+
+
+def stretched_length(wires: Wires, zero_m: Floats, tension_N: Floats) -> Floats:
+    """Stretched length at which a wire of a zero-tension length carries a tension, m."""
+    unit = zero_tension_length(wires, np.ones_like(zero_m + tension_N), tension_N)
+    return zero_m / unit
