@@ -6,6 +6,8 @@ Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wr
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import typer
@@ -23,7 +25,7 @@ class Command(NamedTuple):
     example: str
 
 
-COMMANDS = {
+_ALL = {
     "reproduce": Command(
         "wirebayes.cli.reproduce",
         "reproduce",
@@ -64,19 +66,19 @@ COMMANDS = {
         "wirebayes.cli.robot",
         "pose",
         "Pose of a robot on creeping wires: kinematics, drift and their uncertainty.",
-        "wirebayes pose data/robots/suspended-8.toml --wires out/fit/roc-line-1m --output out/pose",
+        "wirebayes pose data/robots/cogiro.toml --wires out/fit/roc-line-1m --output out/pose",
     ),
     "calibrate": Command(
         "wirebayes.cli.robot",
         "calibrate",
         "Zero-tension lengths of a robot's wires from readings along its poses.",
-        "wirebayes calibrate data/robots/suspended-8.toml readings.csv --output out/calibrate",
+        "wirebayes calibrate data/robots/cogiro.toml readings.csv --output out/calibrate",
     ),
     "export": Command(
         "wirebayes.cli.robot",
         "export",
         "A robot with its wires as a MuJoCo model.",
-        "wirebayes export data/robots/suspended-8.toml --wires out/fit/roc-line-1m --output out/export",
+        "wirebayes export data/robots/cogiro.toml --wires out/fit/roc-line-1m --output out/export",
     ),
     "report": Command(
         "wirebayes.cli.report",
@@ -85,6 +87,15 @@ COMMANDS = {
         "wirebayes report out/reproduce",
     ),
 }
+
+
+def _written(command: Command) -> bool:
+    spec = find_spec(command.module)
+    return spec is not None and f"def {command.function}(" in Path(spec.origin or "").read_text(encoding="utf-8")
+
+
+# a command that has not been written yet is not offered
+COMMANDS = {name: command for name, command in _ALL.items() if _written(command)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,50 @@
+# A fresh machine needs python3 (3.11 or later) and make; everything else goes into .venv.
+
+PYTHON ?= python3
+BIN := .venv/bin
+INPUTS := pyproject.toml constraints.txt
+
+# One thread each for the linear algebra: the package's own processes share the cores.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: run test test-full lint calibration discover-benchmark benchmark docs clean
+
+run: .venv/run.stamp
+	$(BIN)/wirebayes reproduce --output out/reproduce
+
+test: lint
+	$(BIN)/python -m pytest -m "not slow and not browser"
+
+test-full: lint
+	$(BIN)/python -m pytest
+
+lint: .venv/test.stamp
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+calibration: .venv/run.stamp
+	$(BIN)/python analyses/calibration.py --output out/calibration
+
+discover-benchmark: .venv/run.stamp
+	$(BIN)/python analyses/discover_benchmark.py --output out/discover-benchmark
+
+benchmark: .venv/benchmark.stamp
+	$(BIN)/python analyses/benchmark.py --output out/benchmark
+
+docs: .venv/docs.stamp
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+# What is installed follows pyproject.toml and constraints.txt; a stamp is left only by an install that worked.
+.venv/run.stamp: $(INPUTS)
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or later is needed" if sys.version_info < (3, 11) else 0)'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+.venv/%.stamp: .venv/run.stamp
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[$*]"
+	touch $@
+
+clean:
+	rm -rf .venv out build docs/_build wirebayes.egg-info

@@ -1,0 +1,45 @@
+"""Fixtures that several tests share."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+# Before anything draws or multiplies: no window, and one thread, so that bytes do not depend on the machine's load.
+os.environ.setdefault("MPLBACKEND", "Agg")
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
+
+CSV = """hold,displacement_mm,time_s,tension_N
+1,1,0,1.00
+1,1,60,0.90
+3,2.5,0,2.00
+3,2.5,30,1.90
+3,2.5,90,1.80
+4,0.5,10,0.20
+"""
+
+TOML = """[[experiment]]
+name = "wire-a"
+material = "Roc Line 2.2 kg"
+length_mm = 1000.0
+resolution_N = 0.01
+readings = "a.csv"
+unrecorded_holds = [{ before_hold = 3, displacement_mm = 2.0, duration_s = 45.0 }]
+"""
+
+
+@pytest.fixture
+def experiment_file(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a small valid experiment, with replacements ``{old: new}`` in its TOML or CSV; returns the TOML's path."""
+
+    def write(toml: dict[str, str] | None = None, csv: dict[str, str] | None = None) -> Path:
+        for name, text, changes in (("e.toml", TOML, toml), ("a.csv", CSV, csv)):
+            for old, new in (changes or {}).items():
+                assert old in text, f"{old!r} is not in the valid {name}"
+                text = text.replace(old, new, 1)
+            (tmp_path / name).write_bytes(text.encode())
+        return tmp_path / "e.toml"
+
+    return write

@@ -1,0 +1,136 @@
+"""The command line's own behaviour: help, usage, exit codes."""
+
+import os
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from wirebayes import __version__
+from wirebayes.cli import COMMANDS, Command, main
+from wirebayes.errors import InputError
+
+DATA = Path(__file__).parent.parent / "data"
+
+
+def run(*arguments: str, **options) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-m", "wirebayes", *arguments], capture_output=True, text=True, check=False, **options
+    )
+
+
+def test_help_names_every_command_and_loads_nothing_heavy():
+    code = (
+        "import sys; from wirebayes.cli import main; main(['--help']);"
+        "sys.exit(', '.join(m for m in ('numpy', 'scipy', 'matplotlib', 'xarray') if m in sys.modules))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.stderr.strip() == ""
+    for name, command in COMMANDS.items():
+        assert re.search(rf"^  {name} ", result.stdout, re.MULTILINE)
+        assert command.summary.split()[0] in result.stdout
+
+
+def test_the_version_is_printed(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"wirebayes {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["fti"], "No such command 'fti'."),
+        (["--colour"], "No such option"),
+        *(
+            [
+                (["fit", "--together"], "--together"),
+                (["fit"], "Missing argument"),
+                (["fit", "a.toml", "--likelihood", "series"], "'series' is not one of"),
+                (["fit", "a.toml", "--seed", "-1"], "-1"),
+            ]
+            if "fit" in COMMANDS
+            else []
+        ),
+    ],
+)
+def test_wrong_usage_is_exit_code_2_and_plain_lines(arguments, said, tmp_path):
+    result = run(*arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert len(result.stderr.splitlines()) <= 5
+    assert result.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_asked_shows_the_help(capsys):
+    assert main([]) == 2
+    assert "Usage: wirebayes" in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_shows_an_example_that_it_accepts(name, capsys):
+    command = COMMANDS[name]
+    assert callable(getattr(import_module(command.module), command.function))
+    assert main([name, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert f"  {command.example}\n" in shown
+    words = command.example.split()
+    assert words[:2] == ["wirebayes", name]
+    for option in (word for word in words if word.startswith("--")):
+        assert option in shown
+    for file in (word for word in words if word.startswith("data/")):
+        assert (DATA.parent / file).is_file()
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "report"])
+def test_every_command_takes_output_and_seed(name, capsys):
+    assert main([name, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "--output" in shown
+    assert "--seed" in shown
+
+
+def test_an_input_error_is_its_text_and_exit_code_2(monkeypatch, capsys):
+    def refuse() -> None:
+        raise InputError("a.csv, line 3: found x, expected y")
+
+    monkeypatch.setitem(COMMANDS, "fit", Command("somewhere", "fit", "", ""))
+    monkeypatch.setattr("wirebayes.cli.import_module", lambda _: type("module", (), {"fit": staticmethod(refuse)}))
+    assert main(["fit"]) == 2
+    assert capsys.readouterr() == ("", "a.csv, line 3: found x, expected y\n")
+
+
+def test_a_bug_is_not_dressed_up_as_bad_input(monkeypatch):
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setitem(COMMANDS, "fit", Command("somewhere", "fit", "", ""))
+    monkeypatch.setattr("wirebayes.cli.import_module", lambda _: type("module", (), {"fit": staticmethod(fail)}))
+    with pytest.raises(ZeroDivisionError):
+        main(["fit"])
+
+
+def test_no_progress_bar_in_a_pipe(capsys):
+    from wirebayes.cli.progress import progress
+
+    with progress() as report:
+        report("sampling", 1, 2)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a pseudo-terminal is asked for")
+def test_a_progress_bar_on_a_terminal():
+    import pty
+
+    parent, child = pty.openpty()
+    code = "from wirebayes.cli.progress import progress\nwith progress() as report: report('sampling', 2, 2)"
+    subprocess.run([sys.executable, "-c", code], stderr=child, check=True, env={**os.environ, "TERM": "xterm"})
+    os.close(child)
+    shown = os.read(parent, 100_000).decode()
+    os.close(parent)
+    assert "sampling" in shown
+    assert "100%" in shown
