@@ -1,0 +1,96 @@
+"""Random (robot, pose, wire) cases: commanded poses, and lengths disturbed until wires go slack."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wirebayes.robot import forward, inverse, rotation
+from wirebayes.robot.wires import Wires
+
+
+@dataclass
+class Cases:
+    wires: Wires
+    position_m: np.ndarray
+    rotation: np.ndarray
+    zero_m: np.ndarray
+    offset_m: np.ndarray
+
+
+def commanded(robot, law, count, rng):
+    """Feasible random poses with their exact lengths; wires stiff enough for the robot's mass."""
+    position = rng.uniform(robot.lower_m, robot.upper_m, (count, 3))
+    turn = rng.normal(0.0, 0.05, (count, 3)) if robot.degrees == 6 else np.zeros((count, 3))
+    R = rotation.matrix(turn)
+    tau = inverse.tensions(robot, position, R)
+    good = np.isfinite(tau).all(1)
+    position, R, tau = position[good], R[good], tau[good]
+    k1 = np.exp(rng.uniform(np.log(50), np.log(1000), len(position))) * np.maximum(tau.max(1), robot.mass_kg)
+    wires = Wires(law, "saturating", {"k1": k1[None]}, np.full((robot.legs, 1), 1000.0))
+    told = inverse.commands(robot, wires, position, R, tau)
+    return Cases(wires, position, R, told.zero_m, told.offset_m)
+
+
+def disturbed(robot, law, count, rng, amount=0.01):
+    """The same with every length wrong by about a percent: redundant robots get slack wires."""
+    cases = commanded(robot, law, count, rng)
+    free = cases.zero_m - robot.beyond_m
+    return replace(cases, zero_m=cases.zero_m + amount * free * rng.normal(size=free.shape))
+
+
+def solved(robot, cases):
+    """Forward kinematics from the commanded pose."""
+    return forward.solve(robot, cases.wires, cases.zero_m, cases.offset_m, cases.position_m, cases.rotation)
+
+
+def energy_minimum(robot, law, k1, zero_m, offset_m, start_m, start_rotation):
+    """Pose of least energy by a general minimiser on an energy written anew, its gradient by a complex step."""
+    from scipy.optimize import minimize
+
+    size = robot.size_m
+    d = robot.degrees
+
+    def pose(q):
+        if d == 3:
+            return start_m + q, start_rotation.astype(complex)
+        v = q[3:] / size
+        angle2 = v @ v
+        # cos and sinc as series of the squared angle, so that a complex step passes through zero
+        a = sum((-1) ** k * angle2**k / float(_factorial(2 * k + 1)) for k in range(10))
+        b = sum((-1) ** k * angle2**k / float(_factorial(2 * k + 2)) for k in range(10))
+        K = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+        return start_m + q[:3], (np.eye(3) + a * K + b * K @ K) @ start_rotation
+
+    def energy(q):
+        x, R = pose(q)
+        line = x + robot.platform_m @ R.T - robot.exit_m
+        S = robot.lines * np.sqrt((line * line).sum(1)) + offset_m
+        taut = S.real > zero_m
+        hooke, modified = 0.5 * (S - zero_m) ** 2 / zero_m, S - zero_m - zero_m * np.log(S / zero_m)
+        W = k1 * (hooke if law == "hooke" else modified)
+        weight = robot.mass_kg * 9.80665 * (x + R @ robot.centre_of_mass_m)[2]
+        return np.where(taut, W, 0.0).sum() + weight
+
+    def value_and_slope(q):
+        steps = 1e-30j * np.eye(d)
+        return energy(q.astype(complex)).real, np.array([energy(q + s).imag / 1e-30 for s in steps])
+
+    q = np.zeros(d)
+    for _ in range(6):  # restarted: BFGS stops where rounding hides the energy's fall
+        q = minimize(value_and_slope, q, jac=True, method="BFGS", options={"gtol": 1e-13, "maxiter": 400}).x
+    q = _polished(value_and_slope, q)
+    x, R = pose(q.astype(complex))
+    return x.real, R.real, float(np.abs(value_and_slope(q)[1]).max())
+
+
+def _polished(value_and_slope, q):
+    """A few Newton steps on the slope with a difference Hessian: a root finder of its own."""
+    for _ in range(4):
+        g = value_and_slope(q)[1]
+        H = np.array([(value_and_slope(q + e)[1] - value_and_slope(q - e)[1]) / 2e-6 for e in 1e-6 * np.eye(len(q))])
+        q = q - np.linalg.lstsq(0.5 * (H + H.T), g, rcond=None)[0]
+    return q
+
+
+def _factorial(k):
+    return float(np.prod(np.arange(1, k + 1, dtype=float)))

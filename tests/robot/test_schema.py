@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+
+from wirebayes.errors import InputError
+from wirebayes.robot import schema
+
+GOOD = """version = 1
+name = "tripod"
+description = "three wires and a point"
+source = "made up for the tests"
+freedom = "position"
+[platform]
+mass_kg = 1.0
+[tension]
+choice = "minimum_norm"
+lowest_N = 0.1
+highest_N = 20.0
+[pose]
+position_m = [0.0, 0.0, 1.0]
+[workspace]
+lower_m = [-0.1, -0.1, 0.9]
+upper_m = [0.1, 0.1, 1.1]
+[wires.steel]
+k1_N = 1e5
+B_mm = 0.01
+U = 1.0
+k2 = 0.01
+N = 1.0
+length_mm = 1000
+[[leg]]
+exit_point_m = [1.0, 0.0, 2.0]
+platform_point_m = [0.0, 0.0, 0.0]
+wire = "steel"
+[[leg]]
+exit_point_m = [-0.5, 0.9, 2.0]
+platform_point_m = [0.0, 0.0, 0.0]
+[[leg]]
+exit_point_m = [-0.5, -0.9, 2.0]
+platform_point_m = [0.0, 0.0, 0.0]
+actuator = "linear"
+pulley_ratio = 4.0
+wire_length_m = 3.0
+"""
+
+
+def _read(tmp_path, text):
+    file = tmp_path / "robot.toml"
+    file.write_text(text, encoding="utf-8")
+    return schema.read(file)
+
+
+def test_a_good_file_is_read(tmp_path):
+    robot = _read(tmp_path, GOOD)
+    assert robot.legs == 3
+    assert robot.degrees == 3
+    assert robot.wire == ("steel", "default", "default")
+    assert robot.given["steel"].parameters["k1"] == 1e5
+    np.testing.assert_array_equal(robot.is_linear, [False, False, True])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("mass_kg = 1.0", "mass_kg = -1.0", "platform.mass_kg"),
+        ("mass_kg = 1.0", "mass_kg = nan", "platform.mass_kg"),
+        ("mass_kg = 1.0", "mass = 1.0", "platform.mass"),
+        ("mass_kg = 1.0", "mass_kg = true", "platform.mass_kg"),
+        ("mass_kg = 1.0", "mass_kg = 1.0\nweight = 2", "platform.weight"),
+        ("[1.0, 0.0, 2.0]", "[1.0, 0.0]", "leg[0].exit_point_m"),
+        ("[1.0, 0.0, 2.0]", "[1.0, inf, 0.0]", "leg[0].exit_point_m"),
+        ("[1.0, 0.0, 2.0]", '"here"', "leg[0].exit_point_m"),
+        ('"minimum_norm"', '"best"', "tension.choice"),
+        ("highest_N = 20.0", "highest_N = 0.05", "tension.highest_N"),
+        ("upper_m = [0.1, 0.1, 1.1]", "upper_m = [-0.2, 0.1, 1.1]", "workspace.upper_m"),
+        ("pulley_ratio = 4.0\n", "", "leg[2].pulley_ratio"),
+        ('wire = "steel"', 'wire = "copper"', "leg[0].wire"),
+        ("k1_N = 1e5", "k1_N = 0", "wires.steel.k1_N"),
+        ("version = 1", "version = 2", "version"),
+        ("version = 1", "version = 1\ncolour = 3", "colour"),
+        ('freedom = "position"', 'freedom = "all"', "freedom"),
+        ('actuator = "linear"', 'actuator = "drum"', "leg[2].pulley_ratio"),
+        ("[platform]\nmass_kg = 1.0", "platform = 3", "platform"),
+    ],
+)
+def test_every_mistake_names_file_and_key_in_one_line(tmp_path, old, new, key):
+    assert old in GOOD
+    with pytest.raises(InputError) as caught:
+        _read(tmp_path, GOOD.replace(old, new, 1))
+    said = str(caught.value)
+    assert "\n" not in said
+    assert "robot.toml" in said
+    assert f" {key}" in said
+
+
+@pytest.mark.parametrize("text", ["version = ", GOOD.split("[[leg]]")[0], "\x00"])
+def test_broken_files_are_refused(tmp_path, text):
+    with pytest.raises(InputError, match=r"robot\.toml"):
+        _read(tmp_path, text)
+
+
+def test_unknown_names_list_the_shipped_robots():
+    with pytest.raises(InputError, match="cogiro"):
+        schema.read("no-such-robot")
+
+
+def test_shipped_robots_say_where_their_numbers_come_from():
+    assert len(schema.shipped()) >= 5
+    for name in schema.shipped():
+        robot = schema.read(name)
+        assert robot.name == name
+        assert "github.com" in robot.source or "Representative, not a published" in robot.source

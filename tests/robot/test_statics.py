@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from wirebayes.robot import rotation, schema, statics
+from wirebayes.robot.wires import tension
+
+from . import cases
+
+
+def _turned(R, d):
+    return np.moveaxis(rotation.matrix(d), 0, -1) if R is None else rotation.matrix(d) @ R
+
+
+@pytest.mark.parametrize("name", schema.shipped())
+@pytest.mark.parametrize("law", ["hooke", "modified"])
+def test_wrench_and_stiffness_are_derivatives_of_the_energy(name, law):
+    robot = schema.read(name)
+    rng = np.random.default_rng(5)
+    c = cases.disturbed(robot, law, 6, rng)
+    d, n = robot.degrees, len(c.position_m)
+
+    def energy(q):
+        x = c.position_m + q[:3]
+        R = rotation.matrix(q[3:]) @ c.rotation if d == 6 else c.rotation
+        return statics.potential(robot, c.wires, x.T, np.moveaxis(R, 0, -1), c.zero_m.T, c.offset_m.T)
+
+    R = np.moveaxis(c.rotation, 0, -1)
+    shape = statics.geometry(robot, c.position_m.T, R)
+    tau, slope = tension(c.wires, statics.stretched(robot, shape, c.offset_m.T), c.zero_m.T)
+    gradient, hessian = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
+    np.testing.assert_allclose(gradient, -(statics.wrench(robot, shape, tau) + statics.weight(robot, R)))
+    h = 1e-4 * robot.size_m if d == 6 else 1e-4
+    steps = h * np.diag([1.0] * 3 + [1.0 / robot.size_m] * (d - 3))
+    span = np.diag(steps)
+    slopes = np.array([(energy(e) - energy(-e)) / (2 * s) for e, s in zip(steps, span, strict=True)])
+    stiff = np.max(np.abs([hessian[i][i] for i in range(3)]), axis=0)
+    weights = np.array([1.0] * 3 + [1.0 / robot.size_m] * (d - 3))[:, None]
+    assert np.max(np.abs(slopes - gradient) * weights / (stiff * h)) < 1e-4
+    for i in range(d):
+        for j in range(d):
+            a, b = steps[i], steps[j]
+            second = (energy(a + b) - energy(a - b) - energy(b - a) + energy(-a - b)) / (4 * span[i] * span[j])
+            error = np.abs(second - hessian[i][j]) * weights[i] * weights[j] / stiff
+            assert np.max(error) < 1e-4, (i, j)
+    assert n >= 3
+
+
+def test_rotation_vector_round_trip_keeps_tiny_and_large_angles():
+    v = np.array([[1e-9, -2e-10, 3e-10], [0.1, 0.2, -0.3], [0.0, 3.1, 0.0], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(rotation.vector(rotation.matrix(v)), v, rtol=1e-7, atol=1e-20)
+
+
+def test_tilt_is_the_angle_of_the_normal():
+    R = rotation.matrix(np.array([[0.0, 0.02, 0.0], [0.0, 0.0, 1.0], [1e-6, 0.0, 0.0]]))
+    np.testing.assert_allclose(rotation.tilt(R), [0.02, 0.0, 1e-6], atol=1e-16)

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from wirebayes.robot import inverse, schema, statics, tensions
+
+ROBOTS = schema.shipped()
+
+
+def _problem(name, seed=0):
+    robot = schema.read(name)
+    x = np.random.default_rng(seed).uniform(robot.lower_m, robot.upper_m)
+    shape = statics.geometry(robot, x[:, None], np.eye(3)[..., None])
+    structure = (-statics.jacobian(robot, shape) * robot.lines[:, None])[..., 0]
+    return robot, structure, -statics.weight(robot, np.eye(3)[..., None])[:, 0]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("choice", sorted(tensions.CHOICES))
+def test_tensions_carry_the_weight_within_bounds_and_are_the_nearest(name, choice):
+    robot, structure, load = _problem(name)
+    low, high = robot.rule.lowest_N, robot.rule.highest_N
+    tau = tensions.CHOICES[choice](structure, load, low, high)
+    assert tau is not None
+    np.testing.assert_allclose(structure @ tau, load, atol=1e-9 * np.abs(load).max())
+    assert tau.min() >= low - 1e-6
+    assert tau.max() <= high + 1e-6
+    reference = np.zeros(robot.legs) if choice == "minimum_norm" else np.full(robot.legs, 0.5 * (low + high))
+    other = minimize(
+        lambda t: ((t - reference) ** 2).sum() / high**2, tau * 1.01, jac=lambda t: 2 * (t - reference) / high**2,
+        method="SLSQP", bounds=[(low, high)] * robot.legs, options={"ftol": 1e-14, "maxiter": 300},
+        constraints={"type": "eq", "fun": lambda t: structure @ t - load, "jac": lambda t: structure},
+    )  # fmt: skip
+    ours = np.sum((tau - reference) ** 2)
+    assert ours <= np.sum((other.x - reference) ** 2) * (1 + 1e-5) + 1e-9
+
+
+def test_impossible_bounds_are_refused():
+    _, structure, load = _problem("cogiro-desk")
+    assert tensions.minimum_norm(structure, load, 0.5, 1.0) is None
+
+
+def test_a_pose_outside_the_wires_is_infeasible():
+    robot = schema.read("cogiro-desk")
+    tau = inverse.tensions(robot, np.array([[3.0, 0.0, 0.3]]), np.eye(3)[None])
+    assert np.isnan(tau).all()
+
+
+def test_a_users_own_choice_is_used():
+    robot = schema.read("cogiro-desk")
+    x, R = robot.home_m[None], np.eye(3)[None]
+    stiffer = inverse.tensions(robot, x, R, choice=lambda s, w, lo, hi: tensions.minimum_norm(s, w, 5.85, hi))
+    assert np.nanmin(stiffer) >= 5.85 - 1e-9 > inverse.tensions(robot, x, R).min()

@@ -1,0 +1,219 @@
+"""Everything `pose` answers about one robot, one line and one pose, as plain numbers with bands."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot import control, draws, drift, forward, inverse, shares
+from wirebayes.robot import rotation as turning
+from wirebayes.robot.claim import DISTANCE_M, TILT_RAD, TIME_S
+from wirebayes.robot.description import Robot
+from wirebayes.robot.draws import WireDraws
+from wirebayes.robot.wires import Wires
+
+Floats = NDArray[np.float64]
+SPREADS = (0.0, 0.05)
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked.
+
+    Attributes
+    ----------
+    position_m : (3,) array
+    rotation : (3, 3) array
+    times_s : (t,) array
+        Rising, the first zero.
+    tolerance_m, tolerance_rad : float
+        Of the pose, for the longest time between calibrations.
+    seed : int
+    """
+
+    position_m: Floats
+    rotation: Floats
+    times_s: Floats
+    tolerance_m: float = DISTANCE_M
+    tolerance_rad: float = TILT_RAD
+    seed: int = 0
+
+
+def band(values: Floats) -> dict[str, Any]:
+    """Mean, sd and quantiles over the first axis (the draws); NaN draws are left out."""
+    good = values[np.isfinite(values.reshape(len(values), -1)).all(1)]
+    if not len(good):
+        return dict.fromkeys(("mean", "sd", *QUANTILES), None)
+    quantiles = np.quantile(good, list(QUANTILES.values()), axis=0)
+    named = dict(zip(QUANTILES, quantiles, strict=True))
+    return {"mean": good.mean(0), "sd": good.std(0)} | named
+
+
+def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, Any], dict[float, drift.Course]]:
+    """Inverse and forward kinematics, drift, pose error and where it comes from.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    asked : Question
+
+    Returns
+    -------
+    dict
+        The content of ``pose.json`` (arrays not yet lists).
+    dict of specimen spread to Course
+        The drifts, for pictures.
+    """
+    rng = np.random.default_rng(asked.seed)
+    shared = draws.for_robot(robot, line)
+    x, R = asked.position_m, asked.rotation
+    tau = inverse.tensions(robot, x[None], R[None])
+    content: dict[str, Any] = {
+        "version": 1,
+        "robot": robot.name,
+        "mass_kg": robot.mass_kg,
+        "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0]},
+        "wires": {
+            "draws": line.count,
+            "tested_length_mm": line.length_mm,
+            "elastic_law": line.law,
+            "history": line.history,
+            "effects": [e.key for e in line.material()],
+            "left_out": [e.key for e in line.effects if e not in line.material()],
+            "legs": list(robot.wire),
+        },
+        "tension_distribution": {
+            "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
+        },
+        "feasible": bool(np.isfinite(tau).all()),
+    }  # fmt: skip
+    if not content["feasible"]:
+        return content | {"sentence": "No tensions within the bounds hold the platform at this pose."}, {}
+    told = inverse.commands(robot, shared, x[None], R[None], tau)
+    content["inverse"] = {
+        "tension_N": tau[0],
+        "zero_tension_length_m": band(told.zero_m),
+        "joint_value_m": band(told.joint_m),
+    }
+    content["forward"] = _round_trip(robot, shared, told, x, R)
+    content["equilibria"] = _all_equilibria(robot, shared, told, x, rng)
+    courses = {}
+    content["drift"] = []
+    for spread in SPREADS:
+        wires = draws.for_robot(robot, line, spread, rng)
+        courses[spread] = drift.from_command(robot, wires, x, R, asked.times_s)
+        content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))
+    content["claim"] = _claim(courses, x, asked)
+    content["pose_error"] = _errors(robot, line, asked, rng)
+    content["variance_shares"] = _shares(line, courses, x, R)
+    content["warnings"] = draws.warnings(line, tau, float(asked.times_s[-1]), told.zero_m)
+    return content, courses
+
+
+def _round_trip(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:
+    """Forward kinematics of the commands, from a start beside the pose, must return to it."""
+    back = forward.solve(robot, wires, told.zero_m, told.offset_m, x + 0.01 * robot.size_m, R)
+    stiff = forward_stiffness(robot, wires, told, x, R)
+    return {
+        "solved": float(back.found.mean()),
+        "statuses": {text: int((back.status == code).sum()) for code, text in forward.STATUS.items()},
+        "largest_round_trip_error_m": float(np.abs(back.position_m - x)[back.found].max(initial=0.0)),
+        "slack_wires": int((told.tension_N[0] <= 0).sum()),
+        "lowest_stiffness_N_m": band(stiff),
+    }
+
+
+def forward_stiffness(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> Floats:
+    """Smallest eigenvalue of the stiffness matrix, rotations weighed at the platform's edge, ``(n,)`` N/m."""
+    from wirebayes.robot.statics import stiffness
+
+    n = len(told.zero_m)
+    pose = np.repeat(x[:, None], n, 1), np.repeat(R[..., None], n, -1)
+    K = stiffness(robot, wires, *pose, told.zero_m.T, told.offset_m.T)
+    scale = np.ones(robot.degrees)
+    scale[3:] = 1.0 / robot.size_m
+    return np.asarray(np.linalg.eigvalsh(K * np.outer(scale, scale))[:, 0])
+
+
+def _all_equilibria(
+    robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, rng: np.random.Generator
+) -> dict[str, Any]:
+    """How many poses the mean wire's lengths allow, found from many starts."""
+    mean = control.known(wires)
+    found = forward.equilibria(robot, mean, told.zero_m.mean(0), told.offset_m.mean(0), rng)
+    return {
+        "stable_found": len(found.position_m),
+        "starts": 64,
+        "poses": [
+            {"position_m": p, "rotation_vector_rad": v, "slack_wires": int((t <= 0).sum())}
+            for p, v, t in zip(found.position_m, turning.vector(found.rotation), found.tension_N, strict=True)
+        ],
+    }
+
+
+def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
+    shift, angle = drift.moved(course, x, R)
+    shift = np.where(course.found[:, None, None], shift, np.nan)
+    return {
+        "times_s": course.times_s,
+        "solved": float(course.found.mean()),
+        "displacement_mm": band(1e3 * shift),
+        "distance_mm": band(1e3 * np.linalg.norm(shift, axis=-1)),
+        "tilt_deg": band(np.degrees(turning.tilt(course.rotation))),
+        "rotation_deg": band(np.degrees(angle)),
+        "tension_N": band(course.tension_N),
+    }
+
+
+def _claim(courses: dict[float, drift.Course], x: Floats, asked: Question) -> dict[str, Any]:
+    """Probability, at this pose, of the paper's figures."""
+    out: dict[str, Any] = {"time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD))}
+    probability = []
+    for spread, course in courses.items():
+        k = np.flatnonzero(course.times_s == TIME_S)
+        value = None
+        if k.size:
+            distance = np.linalg.norm(course.position_m[:, k[0]] - x, axis=-1)
+            value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]]) < TILT_RAD)).mean())
+        probability.append({"specimen_spread": spread, "probability": value})
+    return out | {"holds": probability}
+
+
+def _errors(robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Pose error under two controllers told the posterior mean, and how long each stays within tolerance."""
+    out = []
+    for spread in SPREADS:
+        wires = draws.for_robot(robot, line, spread, rng)
+        told = control.known(draws.for_robot(robot, line))
+        for name, build in (("hooke_only", control.hooke_only), ("creep_aware", control.creep_aware)):
+            schedule = build(robot, told, asked.position_m, asked.rotation)
+            error = control.error(robot, wires, schedule, asked.position_m, asked.rotation, asked.times_s)
+            within = control.longest_interval(error, asked.tolerance_m, asked.tolerance_rad)
+            out.append({
+                "specimen_spread": spread,
+                "controller": name,
+                "times_s": error.times_s,
+                "distance_mm": band(1e3 * error.distance_m[error.found]),
+                "rotation_deg": band(np.degrees(error.angle_rad[error.found])),
+                "tolerance_mm": 1e3 * asked.tolerance_m,
+                "tolerance_deg": float(np.degrees(asked.tolerance_rad)),
+                "longest_time_within_s": within if np.isfinite(within) else float(error.times_s[-1]),
+                "still_within_at_the_end": not np.isfinite(within),
+            })  # fmt: skip
+    return out
+
+
+def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: Floats) -> dict[str, Any]:
+    """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
+    size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
+    names = [*draws.CORE, *(column for effect in line.material() for column in effect.columns())]
+    kept = {name: line.parameters[name] for name in names}
+    result: dict[str, Any] = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
+    if line.count < 30:
+        return result | {"sentence": "Fewer than 30 draws: no shares are computed."}
+    result["shared_draw"] = shares.shares(kept, size[0.0])
+    result["sd_mm"] = [{"specimen_spread": s, "sd_mm": 1e3 * float(v.std())} for s, v in size.items()]
+    return result
