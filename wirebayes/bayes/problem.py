@@ -177,12 +177,14 @@ def build(
     distributions: dict[str, Any] = {}
     samples = []
     for material, members in materials.items():
-        reference = float(np.exp(np.mean([np.log(e.length_mm) for e in members])))
+        lengths = {e.length_mm for e in members}
+        # one length is its own mean to the last bit, which exp(log) is not
+        reference = float(np.exp(np.mean(np.log([e.length_mm for e in members])))) if len(lengths) > 1 else max(lengths)
         defaults = wire_defaults(reference)
         mark = f"[{material}]" if several_materials else ""
         distributions |= {f"{name}{mark}": defaults[name] for name in MATERIAL}
         tension = tension_reference(np.concatenate([h.tension_N for e in members for h in e.holds]))
-        if len({e.length_mm for e in members}) > 1:
+        if len(lengths) > 1:
             distributions[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
         for effect in effects:
             suffix = mark if effect.scope == "material" else ""
