@@ -48,8 +48,8 @@ def test_the_version_is_printed(capsys):
             [
                 (["fit", "--together"], "--together"),
                 (["fit"], "Missing argument"),
-                (["fit", "a.toml", "--likelihood", "series"], "'series' is not one of"),
-                (["fit", "a.toml", "--seed", "-1"], "-1"),
+                (["fit", "a.toml", "--output", "o", "--likelihood", "series"], "'series' is not one of"),
+                (["fit", "a.toml", "--output", "o", "--seed", "-1"], "'--seed': found -1, expected a whole number, 0"),
             ]
             if "fit" in COMMANDS
             else []

@@ -180,10 +180,12 @@ BAD_TOML = [
     ("before_hold = 3", "before_hold = -1", "key unrecorded_holds[0].before_hold: found -1"),
     ("before_hold = 3", "before_hold = 3.0", "key unrecorded_holds[0].before_hold: found 3.0"),
     ("before_hold", "after_hold", "key unrecorded_holds[0].after_hold: found an unknown key (did you mean before_hold"),
-    (", duration_s = 45.0", "", "line 7, experiment 1, key unrecorded_holds[0].duration_s: found nothing"),
+    (", duration_s = 45.0", "", "line 7, experiment wire-a, key unrecorded_holds[0].duration_s: found nothing"),
     ("duration_s = 45.0", "duration_s = -1", "key unrecorded_holds[0].duration_s: found -1"),
     ("displacement_mm = 2.0", "displacement_mm = -2e3", "key unrecorded_holds[0].displacement_mm: found -2000.0"),
     ("[{ before_hold = 3", "[3, { before_hold = 3", "key unrecorded_holds[0]: found 3, expected a list of"),
+    ("length_mm", '"a\\nb"', "key 'a\\nb': found an unknown key"),
+    ('"wire-a"', '"wire\\na"', "experiment 'wire\\na', key name: found 'wire\\na'"),
     ("[[experiment]]", "prior = 3\n[[experiment]]", "key prior: found 3, expected a table of tables"),
     ("[[experiment]]", "[prior]\nk1 = 3\n[[experiment]]", "key prior.k1: found 3, expected a table"),
 ]

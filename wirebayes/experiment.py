@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.keys import Keys
 from wirebayes.readings import Hold, frozen, nearest, read_readings, read_text, shown
 from wirebayes.wire.protocol import Protocol
 
@@ -187,7 +188,7 @@ def read_experiments(path: str | Path) -> list[Experiment]:
         raise InputError(f"{source}: found a TOML error, {_lower(str(error))}; expected valid TOML") from None
     except RecursionError:
         raise InputError(f"{source}: found values nested too deeply, expected an experiment file") from None
-    top = _Keys(source, text, None, document)
+    top = Keys(source, text, None, document)
     top.only(("experiment", "prior"))
     tables = document.get("experiment")
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
@@ -196,7 +197,8 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     shared = top.priors()
     experiments: list[Experiment] = []
     for index, table in enumerate(tables):
-        keys = _Keys(source, text, index, table)
+        name = table.get("name")
+        keys = Keys(source, text, index, table, name if isinstance(name, str) else "")
         experiment = _read_one(keys, shared)
         if any(experiment.name == other.name for other in experiments):
             raise keys.complain("name", shown(experiment.name) + " a second time", "a name used once in the file")
@@ -204,79 +206,7 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     return experiments
 
 
-@dataclass(frozen=True)
-class _Keys:
-    """One TOML table, asked for its keys; knows where each stands, so that a complaint can say it."""
-
-    source: Path
-    text: str
-    index: int | None
-    table: dict[str, Any]
-    prefix: str = ""
-
-    def complain(self, key: str, found: str, expected: str) -> InputError:
-        place = str(self.source)
-        if self.index is not None:
-            line = self._line(key)
-            place += f", line {line}" if line else ""
-            name = self.table.get("name") if not self.prefix else None
-            place += (
-                f", experiment {name}" if isinstance(name, str) and name != found else f", experiment {self.index + 1}"
-            )
-        return InputError(f"{place}, key {self.prefix}{key}: found {found}, expected {expected}")
-
-    def _line(self, key: str) -> int | None:
-        """Line of a key in its [[experiment]], found in the text because the parser does not keep it."""
-        top = (self.prefix + key).split("[")[0].split(".")[0]
-        seen = -1
-        for number, line in enumerate(self.text.splitlines(), start=1):
-            seen += line.strip().startswith("[[experiment]]")
-            if seen == self.index and re.match(rf"\s*[\"']?{re.escape(top)}[\"']?\s*[=.]", line):
-                return number
-        return None
-
-    def only(self, known: tuple[str, ...]) -> None:
-        for key in self.table:
-            if key not in known:
-                hint = nearest(key, known)
-                raise self.complain(key, f"an unknown key{hint}", "only " + ", ".join(known))
-
-    def value(self, key: str, expected: str) -> Any:
-        if key not in self.table:
-            raise self.complain(key, "nothing", expected)
-        return self.table[key]
-
-    def string(self, key: str, expected: str) -> str:
-        value = self.value(key, expected)
-        if not isinstance(value, str) or not value.strip():
-            raise self.complain(key, shown(value), expected)
-        return value
-
-    def number(self, key: str, expected: str, above: float | None = None, least: float | None = None) -> float:
-        value = self.value(key, expected)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.complain(key, shown(value), expected)
-        try:
-            number = float(value)
-        except OverflowError:
-            raise self.complain(key, shown(value), expected) from None
-        if not np.isfinite(number) or (above is not None and number <= above) or (least is not None and number < least):
-            raise self.complain(key, shown(value), expected)
-        return number
-
-    def priors(self) -> dict[str, dict[str, Any]]:
-        """The ``[prior]`` table, left as written: what a prior may say is known to the statistics alone."""
-        tables = self.table.get("prior", {})
-        expected = "a table of tables, one for each parameter"
-        if not isinstance(tables, dict):
-            raise self.complain("prior", shown(tables), expected)
-        for name, table in tables.items():
-            if not isinstance(table, dict):
-                raise self.complain(f"prior.{name}", shown(table), "a table, such as { low = 0.0, high = 1.0 }")
-        return tables
-
-
-def _read_one(keys: _Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
+def _read_one(keys: Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
     keys.only(_KEYS)
     expected = "a name of letters, digits, '.', '_' and '-'"
     name = keys.string("name", expected)
@@ -294,7 +224,7 @@ def _read_one(keys: _Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
     return Experiment(name, material, length, resolution, holds, keys.source, {**shared, **keys.priors()})
 
 
-def _readings_path(keys: _Keys) -> Path:
+def _readings_path(keys: Keys) -> Path:
     expected = "a CSV file inside this file's folder, relative to it"
     readings = keys.string("readings", expected)
     folder = keys.source.parent
@@ -309,7 +239,7 @@ def _readings_path(keys: _Keys) -> Path:
     return folder / readings
 
 
-def _with_unrecorded(keys: _Keys, holds: tuple[Hold, ...], length_mm: float) -> tuple[Hold, ...]:
+def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float) -> tuple[Hold, ...]:
     """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
     entries = keys.value("unrecorded_holds", "") if "unrecorded_holds" in keys.table else []
     expected = "a list of { before_hold, displacement_mm, duration_s }"
@@ -320,7 +250,7 @@ def _with_unrecorded(keys: _Keys, holds: tuple[Hold, ...], length_mm: float) -> 
     for index, entry in enumerate(entries):
         if not isinstance(entry, dict):
             raise keys.complain(f"unrecorded_holds[{index}]", shown(entry), expected)
-        inner = _Keys(keys.source, keys.text, keys.index, entry, f"unrecorded_holds[{index}].")
+        inner = Keys(keys.source, keys.text, keys.index, entry, keys.name, f"unrecorded_holds[{index}].")
         inner.only(_HOLD_KEYS)
         reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table['readings']}"
         before = inner.value("before_hold", reach)

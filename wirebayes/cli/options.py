@@ -8,9 +8,16 @@ from typing import Annotated, Literal
 
 import typer
 
+
+def _seed(value: int) -> int:
+    if value < 0:
+        raise typer.BadParameter(f"found {value}, expected a whole number, 0 or more")
+    return value
+
+
 ExperimentFile = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Experiments, with their CSV files beside.")]
 Output = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same machine: same bytes.")]
+Seed = Annotated[int, typer.Option("--seed", callback=_seed, help="Same seed, same machine: same bytes.")]
 ExperimentName = Annotated[str | None, typer.Option("--experiment", metavar="NAME", help="This experiment only.")]
 TrainHolds = Annotated[
     int | None, typer.Option("--train-holds", metavar="K", help="Learn from the first K recorded holds only.")

@@ -1,0 +1,40 @@
+"""Sphinx: prose by hand, reference from docstrings, the table of mistakes by running the reader."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from malformed import CASES, message, write
+
+from wirebayes import __version__
+
+project = "wirebayes"
+author = "The wirebayes developers"
+copyright = "2026, the wirebayes developers"
+version = release = __version__
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+exclude_patterns = ["_build", "generated"]
+html_theme = "alabaster"
+html_theme_options = {"description": "A Bayesian toolkit for wires that creep", "page_width": "1080px"}
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+
+def _table_of_mistakes(_app: object) -> None:
+    lines = [".. list-table::", "   :header-rows: 1", "   :widths: 30 70", "", "   * - mistake", "     - what is said"]
+    for case in CASES:
+        with tempfile.TemporaryDirectory() as folder:
+            lines += [f"   * - {case.mistake}", f"     - ``{message(write(case, Path(folder)))}``"]
+    target = Path(__file__).parent / "generated" / "malformed.rst"
+    target.parent.mkdir(exist_ok=True)
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def setup(app: object) -> None:
+    """Called by Sphinx."""
+    app.connect("builder-inited", _table_of_mistakes)  # type: ignore[attr-defined]
