@@ -8,7 +8,6 @@ import pytest
 
 from wirebayes.cli import main
 from wirebayes.effects import named
-from wirebayes.errors import InputError
 from wirebayes.experiment import read_experiments
 from wirebayes.simulate import Bench, Truth, draw, effect_option, write
 
@@ -110,11 +109,6 @@ def test_wrong_options_are_said_and_nothing_is_written(options, said, tmp_path, 
     assert main(["simulate", "--output", str(tmp_path / "out"), *options]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_a_truth_without_finite_tension_is_refused():
-    with pytest.raises(InputError, match="no finite tension"):
-        draw([Bench()], Truth(TRUE | {"k1": 1e308, "preload": 1e6}))
 
 
 def test_effect_options_name_hold_and_amplitude():
