@@ -17,7 +17,7 @@ from wirebayes.bayes.fit import Fit
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample
 from wirebayes.bayes.replicate import readings as replicate
-from wirebayes.effects import named
+from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.output import write_bytes, write_json
 from wirebayes.wire.effect import Effect
@@ -95,7 +95,16 @@ class Stored:
         return np.column_stack(list(self.draws.values()))
 
 
-def load(folder: Path, experiment: str | None = None, known: Mapping[str, Effect] | None = None) -> Stored:
+def experiments_in(path: Path) -> tuple[str, ...]:
+    """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
+    try:
+        with xr.open_dataset(path, group="posterior", engine="h5netcdf") as posterior:
+            return tuple(json.loads(posterior.attrs["experiments"]))
+    except (OSError, KeyError, ValueError):
+        raise InputError(f"{path}: not a posterior of wirebayes") from None
+
+
+def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
     """Read the posterior of one experiment from a folder that `save` wrote.
 
     Parameters
@@ -104,8 +113,8 @@ def load(folder: Path, experiment: str | None = None, known: Mapping[str, Effect
         Holds ``posterior.nc``.
     experiment : str, optional
         Which sample, where several were fitted together.
-    known : mapping of key to Effect, optional
-        Effects of the user's own that the catalogue does not have.
+    own_effects : Path, optional
+        The user's Python file of effects, where the fit used one of them.
 
     Raises
     ------
@@ -135,8 +144,8 @@ def load(folder: Path, experiment: str | None = None, known: Mapping[str, Effect
             constant, observed = constant.isel(experiment=at), observed.isel(experiment=at)
         draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
         lengths = json.loads(about["lengths_mm"])
-        keys = json.loads(about["effects"])
-        model = Model(about["elastic_law"], about["history"], tuple((known or {}).get(k) or named(k) for k in keys),
+        keys, known = json.loads(about["effects"]), catalogue(own_effects)
+        model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
                       float(about["tension_ref_N"]))  # fmt: skip
         if len(names) > 1:
             reference = float(np.exp(np.mean(np.log(lengths))))

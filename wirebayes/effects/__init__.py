@@ -1,5 +1,9 @@
 """The catalogue of effects, one small class each, a module per part of the bench."""
 
+import importlib.util
+from collections.abc import Mapping
+from pathlib import Path
+
 from wirebayes.effects import creep, elastic, event, instrument
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Effect, EventEffect
@@ -31,26 +35,60 @@ CATALOGUE: dict[str, type[Effect]] = {
 }
 
 
-def named(key: str) -> Effect:
+def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
+    """The effects by name, with those of a user's own Python file behind them.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be run, holds no effect, or one of them lacks what `Effect` asks for.
+    """
+    if own is None:
+        return CATALOGUE
+    if not own.is_file():
+        raise InputError(f"{own}: no such file, expected a Python file with effects")
+    spec = importlib.util.spec_from_file_location(f"wirebayes_own_{own.stem}", own)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{own}: not a Python file (its name should end in .py)")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever the user's file raises is told in one line
+        raise InputError(f"{own}: cannot be run: {type(error).__name__}: {error}") from None
+    found = [v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Effect) and v.__module__ == spec.name]
+    effects = {}
+    for effect in found:
+        lacking = [a for a in ("name", "place", "scope", "amplitudes", "sentence") if not hasattr(effect, a)]
+        if lacking:
+            raise InputError(f"{own}: effect {effect.__name__} lacks {', '.join(lacking)}")
+        if effect.name in CATALOGUE:
+            raise InputError(f"{own}: effect {effect.__name__} takes the name {effect.name}, which the catalogue has")
+        effects[effect.name] = effect
+    if not effects:
+        raise InputError(f"{own}: no effect in it, expected a class derived from wirebayes.wire.effect.Effect")
+    return CATALOGUE | effects
+
+
+def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
     """The effect of a name, ``grip_slip@7`` for one that belongs to a hold.
 
     Raises
     ------
     InputError
-        If the catalogue has no such effect, or the hold is missing or superfluous.
+        If there is no such effect, or the hold is missing or superfluous.
     """
     name, _, variant = key.partition("@")
-    if name not in CATALOGUE:
-        raise InputError(f"--effect {key}: no such effect; known are {', '.join(sorted(CATALOGUE))}")
-    kind = CATALOGUE[name]
+    if name not in known:
+        raise InputError(f"effect {key}: no such effect; known are {', '.join(sorted(known))}")
+    kind = known[name]
     if issubclass(kind, EventEffect):
         if not variant.isdigit():
-            raise InputError(f"--effect {key}: this effect happens at one hold, name it as in {name}@7")
+            raise InputError(f"effect {key}: this effect happens at one hold, name it as in {name}@7")
         return kind(hold=int(variant))
     if issubclass(kind, elastic.LengthDependence):
         if variant not in ("k1", "B", "U", "N"):
-            raise InputError(f"--effect {key}: name the parameter as in {name}@k1 (one of k1, B, U, N)")
+            raise InputError(f"effect {key}: name the parameter as in {name}@k1 (one of k1, B, U, N)")
         return kind(which=variant)
     if variant:
-        raise InputError(f"--effect {key}: {name} takes no '@'")
+        raise InputError(f"effect {key}: {name} takes no '@'")
     return kind()

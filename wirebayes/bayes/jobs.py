@@ -1,0 +1,91 @@
+"""Many fits at once: each in a folder of its own, on all cores, resumed where a run was cut off."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.fit import fit, seed_of
+from wirebayes.bayes.problem import Likelihood, build
+from wirebayes.effects import catalogue, named
+from wirebayes.experiment import Experiment
+from wirebayes.wire.laws import ElasticLaw, History
+
+
+@dataclass(frozen=True)
+class Job:
+    """One fit to be done.
+
+    Attributes
+    ----------
+    folder : str
+        Where its results go, below the run's folder; also what its seed is made of.
+    experiments : tuple of Experiment
+    effects : tuple of str
+        Keys of effects.
+    own_effects : Path or None
+        The user's Python file that some of them come from.
+    law, history, likelihood, length_exponent
+        See `wirebayes.bayes.problem.build`.
+    provenance : dict
+    """
+
+    folder: str
+    experiments: tuple[Experiment, ...]
+    effects: tuple[str, ...] = ()
+    own_effects: Path | None = None
+    law: ElasticLaw = "hooke"
+    history: History = "saturating"
+    likelihood: Likelihood = "chain"
+    length_exponent: Any = 1.0
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+
+def run(
+    jobs: Sequence[Job],
+    directory: Path,
+    seed: int,
+    *,
+    policy: Policy = Policy(),
+    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+) -> None:
+    """Do all fits whose folder has no ``summary.json`` yet; the results do not depend on how many cores there are.
+
+    A fit cut off leaves a checkpoint in its folder, from which the next call goes on to the same bytes.
+    """
+    todo = [job for job in jobs if not (directory / job.folder / "summary.json").exists()]
+    if len(todo) == 1 or _cores() == 1:
+        for job in todo:
+            one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
+        return
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # inherited by the workers: one BLAS thread each
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with ProcessPoolExecutor(min(_cores(), max(len(todo), 1)), mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(one, job, directory, seed, policy) for job in todo]
+        for done, future in enumerate(as_completed(futures), 1):
+            future.result()
+            report("fits", done, len(todo))
+
+
+def one(job: Job, directory: Path, seed: int, policy: Policy, progress: Callable[[float], None] = lambda share: None) -> None:
+    """Do one fit and store it."""
+    from wirebayes.bayes.result import save  # xarray takes a second to load; not every user of jobs stores
+
+    folder = directory / job.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    known = catalogue(job.own_effects)
+    problem = build(job.experiments, [named(key, known) for key in job.effects], law=job.law, history=job.history,
+                    likelihood=job.likelihood, length_exponent=job.length_exponent)  # fmt: skip
+    own_seed = seed_of(seed, job.folder)
+    checkpoint = folder / ".checkpoint"
+    result = fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress)
+    save(result, folder, job.provenance | {"seed": seed, "policy": vars(policy)}, seed=own_seed)
+    checkpoint.unlink(missing_ok=True)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
