@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -220,21 +220,22 @@ def draw(e: Effect, rig: Rig, rng: np.random.Generator) -> Candidate:
     return Candidate(e.name, int(rng.choice(e.signs)), tuple(shapes.items()), benches)
 
 
-def library(rig: Rig, names: Iterator[str] | tuple[str, ...] = tuple(EFFECTS)) -> list[Candidate]:
-    """Every candidate of the named effects on a rig: both signs, three values of each shape constant, all holds."""
+def library(rig: Rig, names: Iterable[str] = tuple(EFFECTS), values: int = 3) -> list[Candidate]:
+    """Every candidate of the named effects on a rig: both signs, some values of each shape constant, all holds."""
     found = []
     for e in (effect(name) for name in names):
         if not fits(e, rig):
             continue
-        axes = {k: tuple(np.exp(np.linspace(np.log(lo), np.log(hi), 7)[1::2])) for k, (lo, hi) in e.shapes.items()}
-        axes |= e.choices
+        middles = (np.arange(values) + 0.5) / values
+        axes = {k: tuple(lo * (hi / lo) ** middles) for k, (lo, hi) in e.shapes.items()}
+        axes = axes | e.choices
         for benches in bench_sets(e, rig):
             places = tuple(float(j) for j in event_holds(rig.benches[benches[0]]))
             holds = {"hold": places} if e.scope == "event" else {}
             keys = list(axes) + list(holds)
-            for values in itertools.product(*axes.values(), *holds.values()):
+            for point in itertools.product(*axes.values(), *holds.values()):
                 for sign in e.signs:
-                    shapes = tuple((k, float(v)) for k, v in zip(keys, values, strict=True))
+                    shapes = tuple((k, float(v)) for k, v in zip(keys, point, strict=True))
                     found.append(Candidate(e.name, sign, shapes, benches))
     return found
 

@@ -175,6 +175,8 @@ def _late_first(
 ) -> Array:
     """Replace the first reading by the tension `reading_delay` seconds later."""
     rows = np.flatnonzero(fx["reading_delay"] > 0)
+    if not len(rows):
+        return force
     part, sub = m.rows(rows), fx.rows(rows)
     late = sub["reading_delay"] + bench.holds[j].times_s[0]
     grid = np.linspace(0, 1, 41) ** (1 / min(float(np.median(part.N)), 1.0)) * late[:, None]

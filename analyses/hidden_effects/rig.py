@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 MATERIAL_PARAMETERS = ("k1", "B", "U", "k2", "N")
 
@@ -93,7 +95,7 @@ class Bench:
         return signs
 
     @functools.cached_property
-    def hold_of_reading(self) -> NDArray[np.int64]:
+    def hold_of_reading(self) -> Index:
         """Index of the hold of each reading, shape (readings,)."""
         return np.concatenate([np.full(len(h.times_s), j, dtype=np.int64) for j, h in enumerate(self.holds)])
 

@@ -117,7 +117,8 @@ def _with_noise(rng: np.random.Generator, rig: Rig) -> Rig | None:
             return None
         recorded = [j for j, hold in enumerate(bench.holds) if hold.times_s]
         first = [y[part][bench.hold_of_reading == j][0] for j in recorded]
-        if sum(tau > 0 for tau in first) < 6 or (rig.protocol != "slack" and min(first) <= 0):
+        slack = bool(np.any(y[part] <= 0))
+        if sum(tau > 0 for tau in first) < 6 or slack != (rig.protocol == "slack"):
             return None
         sensor = float(np.clip(top * log_uniform(rng, 4e-4, 3e-3), 0.003, 0.04))
         benches.append(dataclasses.replace(bench, sensor_sd=sensor, setting_sd=setting))

@@ -1,0 +1,143 @@
+"""What the best possible judge could do on a case: groups, separability and the Bayes-optimal naming rate.
+
+The ideal judge knows the noise, the true parameters and every effect's exact finite signature; it does not know the
+effect, its sign, size, hold, wire or shape constants. Effects are equally likely, then their candidates, then log
+delta.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+
+from .cases import Case
+from .catalogue import Candidate, library
+from .delta import delta_curves, signature
+from .rig import Array
+
+GROUP_COSINE = 0.95
+SEPARABLE = 3.3
+DELTA_RANGE = (2.5, 25.0)  # the prior of log delta is flat here, up to what the effect can reach
+ALPHA = 0.04
+
+
+def nearest_direction(curve: Array, delta: float) -> Array:
+    """Unit signature of a candidate at the amplitude whose delta is nearest, from its curve (points, R)."""
+    size = np.linalg.norm(curve, axis=1)
+    best = int(np.argmin(np.abs(np.log(np.maximum(size, 1e-12) / delta))))
+    return curve[best] / max(float(size[best]), 1e-12)
+
+
+def cosines(z: Array, candidates: list[Candidate], curves: Array) -> dict[str, float]:
+    """Largest |cos| of the signature `z` (R,) with any candidate of each effect, by name."""
+    delta = float(np.linalg.norm(z))
+    found: dict[str, float] = {}
+    for candidate, curve in zip(candidates, curves, strict=True):
+        cosine = abs(float(nearest_direction(curve, delta) @ z)) / delta
+        found[candidate.name] = max(found.get(candidate.name, 0.0), cosine)
+    return found
+
+
+def hypotheses(candidates: list[Candidate], curves: Array) -> tuple[Array, Array, list[str], Array]:
+    """Points of the ideal judge's prior.
+
+    Returns
+    -------
+    signatures (k, R), log prior weights (k,), names in order, index of each point's name (k,).
+    """
+    points, owner, weight = [], [], []
+    names = list(dict.fromkeys(c.name for c in candidates))
+    reach: dict[str, list[tuple[Array, float]]] = {name: [] for name in names}
+    for candidate, curve in zip(candidates, curves, strict=True):
+        size = np.linalg.norm(curve, axis=1)
+        rising = int(np.argmax(size)) + 1  # beyond its largest delta a curve turns back: not needed
+        if size[rising - 1] > DELTA_RANGE[0]:
+            wanted = np.geomspace(DELTA_RANGE[0], min(DELTA_RANGE[1], float(size[rising - 1])), 33)
+            logs = np.maximum.accumulate(np.log(np.maximum(size[:rising], 1e-9))) + np.arange(rising) * 1e-12
+            units = curve[:rising] / np.maximum(size[:rising, None], 1e-9)
+            at = np.interp(np.log(wanted), logs, np.arange(rising))
+            low = np.minimum(at.astype(int), rising - 2)
+            part = (at - low)[:, None]
+            unit = (1 - part) * units[low] + part * units[low + 1]
+            unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
+            reach[candidate.name] += [(row, 1.0 / len(wanted)) for row in unit * wanted[:, None]]
+    kept = [name for name in names if reach[name]]
+    for i, name in enumerate(kept):
+        total = sum(w for _, w in reach[name])
+        for row, w in reach[name]:
+            points.append(row)
+            owner.append(i)
+            weight.append(np.log(w / total))
+    return np.array(points), np.array(weight), kept, np.array(owner)
+
+
+def posterior(data: Array, points: Array, weight: Array, owner: Array, n_names: int) -> tuple[Array, Array]:
+    """Log evidence of each effect against none, (m, names), and the largest likelihood ratio, (m,), of data (m, R)."""
+    ratio = data @ points.T - 0.5 * np.sum(points**2, axis=1)
+    evidence = np.stack([logsumexp(ratio[:, owner == i] + weight[owner == i], axis=1) for i in range(n_names)], axis=1)
+    return evidence, 2 * ratio.max(axis=1)
+
+
+def ninety_percent_sets(probability: Array) -> Array:
+    """Members of the smallest set holding 90 %, boolean (m, names)."""
+    order = np.argsort(-probability, axis=1)
+    sorted_p = np.take_along_axis(probability, order, axis=1)
+    inside = np.cumsum(sorted_p, axis=1) - sorted_p < 0.9
+    chosen = np.zeros_like(inside)
+    np.put_along_axis(chosen, order, inside, axis=1)
+    return chosen
+
+
+def judge(case: Case, draws: int = 200) -> dict[str, Any]:
+    """Group, separability and, for a catalogue effect, the ideal judge's rates on fresh noise, given its detection."""
+    geo = case.geo
+    candidates = library(case.rig, values=4)
+    _, curves = delta_curves(geo, candidates, points=25)
+    result: dict[str, Any] = {"key": case.spec.key}
+    share = [float(np.linalg.norm(geo.whiten(geo.floor)[0, part])) for part in case.rig.bench_slices]
+    if case.hidden:
+        z = signature(geo, [list(case.hidden)])[0]
+        share = [float(np.linalg.norm(z[part])) for part in case.rig.bench_slices]
+        parts = [signature(geo, [[one]])[0] for one in case.hidden]
+        near = [cosines(part, candidates, curves) for part in parts]
+        result["cosines"] = [{k: round(v, 4) for k, v in sorted(c.items(), key=lambda i: -i[1])} for c in near]
+        result["groups"] = [
+            sorted({name for name, c in each.items() if c > GROUP_COSINE} | {one[0].name})
+            for each, one in zip(near, case.hidden, strict=True)
+        ]
+        others = [c for name, c in near[0].items() if name != case.hidden[0][0].name]
+        worst = max(others, default=0.0)
+        result["separable"] = bool(np.linalg.norm(z) * np.sqrt(max(1 - worst**2, 0.0)) > SEPARABLE)
+    result["bench"] = case.rig.benches[int(np.argmax(share))].name
+    if case.spec.kind in ("single", "without") and case.hidden:
+        result["optimal"] = _optimal(case, candidates, curves, set(result["groups"][0]), draws)
+    return result
+
+
+def _optimal(case: Case, candidates: list[Candidate], curves: Array, group: set[str], draws: int) -> dict[str, Any]:
+    geo, rng = case.geo, np.random.default_rng(int(case.spec.key, 16))
+    points, weight, names, owner = hypotheses(candidates, curves)
+    truth = case.hidden[0][0].name
+    if truth not in names:
+        return {}
+    z = signature(geo, [list(case.hidden)])[0]
+    noise = rng.normal(size=(2 * draws, len(z)))
+    noise = noise - (noise @ geo.basis) @ geo.basis.T
+    _, null = posterior(noise[:draws], points, weight, owner, len(names))
+    evidence, statistic = posterior(z + noise[draws:], points, weight, owner, len(names))
+    seen = statistic > np.quantile(null, 1 - ALPHA)
+    if not seen.any():
+        return {"power": 0.0}
+    p = np.exp(evidence - logsumexp(evidence, axis=1, keepdims=True))[seen]
+    best, sets = p.argmax(axis=1), ninety_percent_sets(p)
+    target = names.index(truth)
+    in_group = np.isin(best, [i for i, name in enumerate(names) if name in group])
+    return {
+        "power": float(seen.mean()),
+        "top1": float(np.mean(best == target)),
+        "group": float(np.mean(in_group)),
+        "set_size": float(sets.sum(axis=1).mean()),
+        "coverage": float(sets[:, target].mean()),
+    }

@@ -1,0 +1,85 @@
+"""The table of targets: each row with its value, interval and whether it was met."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .score import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ratio
+
+Target = dict[str, Any]
+
+
+def _row(name: str, wanted: str, found: dict[str, Any] | None, passed: bool | None) -> Target:
+    return {"target": name, "wanted": wanted, "found": found, "passed": passed if found else None}
+
+
+def _at_least(name: str, found: dict[str, Any] | None, wanted: float) -> Target:
+    return _row(name, f">= {wanted:.0%}", found, found is not None and found["value"] >= wanted)
+
+
+def targets(rows: list[Row]) -> list[Target]:
+    """All rows that simulated cases can decide.
+
+    Parameters
+    ----------
+    rows : cases as `score.case_row` gives them.
+    """
+    clean = [r for r in rows if r["kind"] == "clean"]
+    single = [r for r in rows if r["kind"] == "single"]
+    seen = [r for r in single if r["detected"]]
+    foreign = [r for r in rows if r["kind"] in ("without", "foreign") and r["delta"] >= 8 and r["detected"]]
+    table = [_false_alarms(clean), *_clean_held_out(clean)]
+    for delta, detected, group in ((5.0, 0.90, 0.85), (10.0, 0.99, 0.95)):
+        at = [r for r in single if r["delta"] == delta]
+        table.append(_at_least(f"detected at delta {delta:g}", rate(r["detected"] for r in at), detected))
+        right = rate(r["right_group"] for r in at if r["detected"])
+        table.append(_at_least(f"best in the true group, delta {delta:g}", right, group))
+        claimed = rate(r["claimed_group"] for r in at if r["detected"])
+        table.append(_at_least(f"truth in the group given, delta {delta:g}", claimed, group))
+    table.append(_at_least("best right, separable cases", rate(r["right"] for r in seen if r["separable"]), 0.85))
+    table.append(_at_least("best right, over Bayes-optimal", against_optimal(seen), 0.90))
+    for delta in sorted({r["delta"] for r in seen}):
+        at = [r for r in seen if r["delta"] == delta]
+        table.append(_at_least(f"90 % set holds the truth, delta {delta:g}", rate(r["in_set"] for r in at), 0.90))
+    table.append(_set_size(seen))
+    for kind, label in (("without", "removed from the catalogue"), ("foreign", "in no catalogue")):
+        part = [r for r in foreign if r["kind"] == kind]
+        found = rate(r["chosen"] == "unknown" or r["right_group"] for r in part)
+        table.append(_at_least(f"form {label}: unknown or its group", found, 0.90))
+    for delta, wanted in ((10.0, 0.70), (20.0, 0.90)):
+        found = pooled([r for r in single if r["delta"] == delta], closed_of_oracle)
+        table.append(_at_least(f"gap closed over the oracle's, delta {delta:g}", found, wanted))
+    return table
+
+
+def _false_alarms(clean: list[Row]) -> Target:
+    found = rate(r["any_alarm"] for r in clean)
+    passed = found is not None and found["high"] <= 0.08 and found["n"] >= 600
+    return _row("false alarms on clean files", "upper bound <= 8 %, n >= 600", found, passed)
+
+
+def _clean_held_out(clean: list[Row]) -> list[Target]:
+    found = pooled(clean, rmse_ratio)
+    ratios = [(r["held_out"]["final"] / r["held_out"]["plain"]) ** 0.5 for r in clean if r["held_out"]]
+    worst = {"value": max(ratios), "n": len(ratios), "low": max(ratios), "high": max(ratios)} if ratios else None
+    return [
+        _row(
+            "clean data: held-out rmse, final over plain",
+            "<= 1.02",
+            found,
+            found is not None and found["value"] <= 1.02,
+        ),
+        _row("clean data: worst case of that ratio", "printed", worst, None),
+    ]
+
+
+def _set_size(seen: list[Row]) -> Target:
+    sizes = [(r["set_size"], r["optimal"]["set_size"]) for r in seen if "set_size" in r["optimal"]]
+    if not sizes:
+        return _row("size of the 90 % set above the optimal", "<= 1", None, None)
+    n = len(sizes)
+    excess = [a - b for a, b in sizes]
+    mean = sum(excess) / n
+    error = (sum((x - mean) ** 2 for x in excess) / max(n - 1, 1) / n) ** 0.5
+    found = {"value": mean, "n": n, "low": mean - 1.645 * error, "high": mean + 1.645 * error}
+    return _row("size of the 90 % set above the optimal", "<= 1", found, mean <= 1)
