@@ -50,10 +50,13 @@ class Variant:
         return MATERIAL if self.likelihood == "hold" else (*MATERIAL, "preload")
 
 
-VARIANTS = tuple(
-    Variant(likelihood, history, law)
-    for likelihood, history in (("hold", "saturating"), ("chain", "saturating"), ("chain", "additive"))
-    for law in ("hooke", "modified")
+VARIANTS = (
+    Variant("hold"),
+    Variant("hold", law="modified"),
+    Variant("chain"),
+    Variant("chain", law="modified"),
+    Variant("chain", "additive"),
+    Variant("chain", "additive", "modified"),
 )
 
 
@@ -191,7 +194,8 @@ def _descend(misfit: Callable[[Array], Array], start: Array, low: Array, high: A
         values = misfit(z + moves)
         return (values[:, : len(z)] - values[:, len(z) :]) / (2.0 * _STEP)
 
-    found = least_squares(
-        lambda z: misfit(z[None])[:, 0], start, jac=jacobian, bounds=(low, high), x_scale="jac", max_nfev=300, xtol=1e-10, ftol=1e-10
-    )
+    def at_point(z: Array) -> Array:
+        return np.asarray(misfit(z[None])[:, 0])
+
+    found = least_squares(at_point, start, jac=jacobian, bounds=(low, high), x_scale="jac", max_nfev=300)
     return np.asarray(found.x)
