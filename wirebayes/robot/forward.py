@@ -22,7 +22,7 @@ STATUS = {
     NOT_CONVERGED: "not converged",
     NO_EQUILIBRIUM: "no equilibrium: the wires cannot carry the platform",
 }
-_CHUNK = 2048
+_CHUNK, _QUICK = 2048, 7
 
 
 @dataclass(frozen=True)
@@ -86,15 +86,28 @@ def solve(
     rotation = np.array(np.moveaxis(np.broadcast_to(start_rotation, (n, 3, 3)), 0, -1))
     zero = np.ascontiguousarray(zero_m.T)
     offset = np.ascontiguousarray(np.broadcast_to(offset_m, zero_m.shape).T)
-    parts = []
-    for first in range(0, n, _CHUNK):
-        cut = slice(first, first + _CHUNK)
-        parts.append(
-            _solve(robot, wires.part(cut), zero[:, cut], offset[:, cut], position[:, cut], rotation[..., cut],
-                   max_iterations)
-        )  # fmt: skip
-    x, R, tau, status, count, left = (np.concatenate(a, -1) for a in zip(*parts, strict=True))
+    quick = min(_QUICK, max_iterations)
+    x, R, tau, status, count, left = _in_chunks(robot, wires, zero, offset, position, rotation, quick)
+    slow = np.flatnonzero(status == NOT_CONVERGED)
+    if slow.size and max_iterations > quick:
+        # The few slow cases of all chunks go on together: small arrays waste the machine.
+        rest = _in_chunks(
+            robot, wires.part(slow), zero[:, slow], offset[:, slow], x[:, slow], R[..., slow], max_iterations - quick
+        )
+        x[:, slow], R[..., slow], tau[:, slow], status[slow], left[slow] = *rest[:4], rest[5]
+        count[slow] += rest[4]
     return Equilibria(x.T, np.moveaxis(R, -1, 0), tau.T, status, count, left)
+
+
+def _in_chunks(
+    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+) -> list[NDArray[Any]]:
+    parts = []
+    for first in range(0, zero.shape[1], _CHUNK):
+        cut = slice(first, first + _CHUNK)
+        part = wires.part(cut), zero[:, cut], offset[:, cut], x[:, cut], R[..., cut]
+        parts.append(_solve(robot, *part, max_iterations))
+    return [np.concatenate(arrays, -1) for arrays in zip(*parts, strict=True)]
 
 
 def _solve(
@@ -134,8 +147,8 @@ def _solve(
         # Uphill or indefinite: shorter, more cautious steps; as foretold: back towards pure Newton.
         predicted = 0.5 * (damping * level * length * length - downhill)
         foretold = at.energy - new.energy > 0.5 * predicted - noise
-        calmer = np.where(foretold, np.where(damping < 1e-6, 0.0, damping / 30), damping)
-        tried, damping = damping, np.where(accept, calmer, np.maximum(1e-4, damping * 10))
+        calmer = np.where(foretold, np.where(damping < 2e-5, 0.0, damping / 100), damping)
+        tried, damping = damping, np.where(accept, calmer, np.maximum(1e-3, damping * 10))
         x, R = np.where(accept, new_x, x), np.where(accept, new_R, R)
         at = at.where(accept, new)
         small = (length < 1e-9 * size) | (at.size <= floor)

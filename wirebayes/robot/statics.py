@@ -36,7 +36,8 @@ class Geometry:
 
 def turned(points_m: Floats, rotation: Floats) -> Floats:
     """Platform points ``(w, 3)`` in the world's axes, ``(3, w, n)``."""
-    return np.asarray(np.einsum("ijn,wj->iwn", rotation, points_m, optimize=False))
+    x, y, z = points_m.T[:, :, None]
+    return np.asarray(rotation[:, 0, None] * x + rotation[:, 1, None] * y + rotation[:, 2, None] * z)
 
 
 def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
