@@ -24,13 +24,14 @@ lint: .venv/test.stamp
 	$(BIN)/mypy
 
 calibration: .venv/run.stamp
-	$(BIN)/python analyses/calibration.py --output out/calibration
+	$(BIN)/python -m analyses.calibration --output out/calibration
 
 discover-benchmark: .venv/run.stamp
-	$(BIN)/python analyses/discover_benchmark.py --output out/discover-benchmark
+	$(BIN)/python -m analyses.hidden_effects --size full --output out/discover-benchmark
 
-benchmark: .venv/benchmark.stamp
-	$(BIN)/python analyses/benchmark.py --output out/benchmark
+benchmark: .venv/test.stamp
+	$(BIN)/python analyses/robot_speed.py
+	$(BIN)/python analyses/robot_agreement.py
 
 docs: .venv/docs.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
