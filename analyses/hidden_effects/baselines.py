@@ -20,7 +20,7 @@ from .cases import Case
 from .catalogue import Candidate, library
 from .delta import Geometry, delta_curves
 from .fitting import fit, held_out_mask, last_third, rmse
-from .rig import Array, Rig
+from .rig import Array, Mask, Rig
 
 SETTING_GRID_MM = np.geomspace(0.001, 0.06, 8)
 
@@ -76,7 +76,7 @@ def blind(rig: Rig, y: Array) -> Rig:
     return dataclasses.replace(rig, benches=tuple(benches))
 
 
-def linearise(rig: Rig, y: Array, keep: Array) -> tuple[Linear, Rig]:
+def linearise(rig: Rig, y: Array, keep: Mask) -> tuple[Linear, Rig]:
     """Residuals and library signatures at a plain fit, and the rig as fitted: twice, to weigh by the setting error."""
     guess = blind(rig, y)
     for _ in range(2):
@@ -84,7 +84,7 @@ def linearise(rig: Rig, y: Array, keep: Array) -> tuple[Linear, Rig]:
     return linear, here
 
 
-def _linearise_once(rig: Rig, guess: Rig, y: Array, keep: Array) -> tuple[Linear, Rig, Rig]:
+def _linearise_once(rig: Rig, guess: Rig, y: Array, keep: Mask) -> tuple[Linear, Rig, Rig]:
     plain = fit(guess, y, keep)
     wires = {}
     for i, material in enumerate(rig.materials):
@@ -95,7 +95,7 @@ def _linearise_once(rig: Rig, guess: Rig, y: Array, keep: Array) -> tuple[Linear
     here = dataclasses.replace(guess, wires=wires, benches=tuple(benches))
     candidates = library(here)
     geo = Geometry(here, plain.model, np.eye(len(y)), np.zeros((len(y), 1)), np.ones(len(y)))
-    sizes, curves = delta_curves(geo, candidates, points=5, decades=3.0)
+    sizes, curves = delta_curves(geo, candidates, grid=np.array([0.03]))
     sensor = np.concatenate([np.full(b.n_readings, b.sensor_sd**2) for b in guess.benches])[keep]
     residuals, signatures, penalty, chols, bases = [], [], [], [], []
     for setting in SETTING_GRID_MM:
@@ -103,7 +103,7 @@ def _linearise_once(rig: Rig, guess: Rig, y: Array, keep: Array) -> tuple[Linear
         chol = np.linalg.cholesky(v)
         basis, _ = np.linalg.qr(solve_triangular(chol, plain.by_theta[keep], lower=True))
         z = solve_triangular(chol, (y - plain.model)[keep], lower=True)
-        lines = solve_triangular(chol, curves[:, 2][:, keep].T, lower=True).T  # amplitude: geometric middle
+        lines = solve_triangular(chol, curves[:, 0][:, keep].T, lower=True).T
         residuals.append(z - basis @ (basis.T @ z))
         signatures.append(lines - (lines @ basis) @ basis.T)
         penalty.append(2 * np.log(np.diag(chol)).sum())
@@ -114,7 +114,7 @@ def _linearise_once(rig: Rig, guess: Rig, y: Array, keep: Array) -> tuple[Linear
         np.array(signatures),
         np.array(penalty),
         candidates,
-        sizes[:, 2],
+        sizes[:, 0],
         np.array(chols),
         np.array(bases),
     )
@@ -131,7 +131,8 @@ def linear_sizes(linear: Linear, chosen: list[int]) -> Array:
     """Amplitudes (c,) of the chosen candidates by linear least squares, kept on the candidates' own side of zero."""
     place = int(np.argmin(np.sum(linear.residuals**2, axis=1) + linear.penalty))
     factors = np.linalg.lstsq(linear.signatures[place][chosen].T, linear.residuals[place], rcond=None)[0]
-    return np.clip(factors, 0.05, 20.0) * linear.sizes[chosen]
+    sizes: Array = np.clip(factors, 0.05, 20.0) * linear.sizes[chosen]
+    return sizes
 
 
 def forward(linear: Linear, most: int = 3) -> tuple[list[int], dict[str, float]]:
@@ -197,7 +198,7 @@ def lasso(linear: Linear, penalties: int = 25, sweeps: int = 60) -> list[int]:
     return best[1]
 
 
-def gaussian_process(rig: Rig, keep: Array) -> list[Array]:
+def gaussian_process(rig: Rig, keep: Mask) -> list[Array]:
     """Kernels over (hold, log time) of all readings, (R, R), unit variance scaled by bench: 3 x 3 length scales."""
     hold = np.concatenate([b.hold_of_reading for b in rig.benches]).astype(float)
     time = np.concatenate([np.log1p(b.reading_times_s / 5) for b in rig.benches])
@@ -208,7 +209,7 @@ def gaussian_process(rig: Rig, keep: Array) -> list[Array]:
     return [same * np.exp(-0.5 * far / a**2 - 0.5 * late / b**2) for a in (1.5, 4.0, 10.0) for b in (0.7, 2.0, 50.0)]
 
 
-def flexible(linear: Linear, here: Rig, keep: Array) -> tuple[bool, Array | None]:
+def flexible(linear: Linear, here: Rig, keep: Mask) -> tuple[bool, Array | None]:
     """Whether a Gaussian process lowers BIC by its three numbers, and its covariance (R, R) at the best of a grid."""
     scores = np.sum(linear.residuals**2, axis=1) + linear.penalty
     base = float(scores.min())
@@ -281,7 +282,7 @@ def _without(linear: Linear, names: list[str]) -> None:
 def _form(
     rig: Rig,
     y: Array,
-    held: Array,
+    held: Mask,
     holds: dict[str, list[int]],
     plain: Array,
     final: Array,

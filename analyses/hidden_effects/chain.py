@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .creep import radau, remaining
-from .rig import Array
+from .rig import Array, Index
 from .state import Effects
 
 
@@ -25,7 +25,7 @@ class Carried:
         """Elongation by creep (mm), shape (n,)."""
         return self.main + self.second + self.viscous
 
-    def rows(self, index: Array) -> Carried:
+    def rows(self, index: Index) -> Carried:
         """The chosen rows."""
         clocks = [(left[index], age[index]) for left, age in self.clocks]
         return Carried(self.main[index], self.second[index], self.viscous[index], clocks)
@@ -42,7 +42,7 @@ class Material:
     N: Array
     tau_ref: float
 
-    def rows(self, index: Array) -> Material:
+    def rows(self, index: Index) -> Material:
         """The chosen rows."""
         return Material(self.k1[index], self.B[index], self.U[index], self.k2[index], self.N[index], self.tau_ref)
 
@@ -99,5 +99,5 @@ def grow(m: Material, before: Carried, fx: Effects, order: int, tau0: Array, gri
         fade = np.concatenate([np.ones((len(steps), 1)), np.cumprod(steps, axis=1)], axis=1)
         second = aim + (second - aim) * fade
     total = main + second + viscous
-    ends = [np.broadcast_to(part, total.shape)[:, -1].copy() for part in (main, second, viscous)]
-    return total, Carried(*ends, clocks)
+    end_main, end_second, end_viscous = (np.broadcast_to(p, total.shape)[:, -1].copy() for p in (main, second, viscous))
+    return total, Carried(end_main, end_second, end_viscous, clocks)

@@ -11,6 +11,9 @@ from .catalogue import Candidate, largest, members
 from .generator import simulate
 from .rig import MATERIAL_PARAMETERS, Array, Rig
 
+# log steps for effects that show early, even steps at the top where curves bend and even turn back
+COARSE_GRID = np.concatenate([np.geomspace(1e-4, 0.08, 12), np.linspace(0.1, 1.0, 19)])
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -71,18 +74,20 @@ def covariance(rig: Rig, by_eta: Array) -> Array:
     for bench in rig.benches:
         rounding = (bench.resolution_N or 0.0) ** 2 / 12
         blocks.append((bench.sensor_sd**2 + rounding) * np.eye(bench.n_readings))
-    return block_diag(*blocks) + (by_eta * variances) @ by_eta.T
+    v: Array = block_diag(*blocks) + (by_eta * variances) @ by_eta.T
+    return v
 
 
 def geometry(rig: Rig) -> Geometry:
     """Metric of a rig at its true parameters."""
     y, by_theta, by_eta = derivatives(rig)
     v = covariance(rig, by_eta)
-    chol = np.linalg.cholesky(v)
+    chol = np.asarray(np.linalg.cholesky(v), dtype=np.float64)
     columns = solve_triangular(chol, by_theta, lower=True)
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return Geometry(rig, y, chol, left[:, size > 1e-7 * size[0]], np.sqrt(np.diag(v)))
+    basis = left[:, size > 1e-7 * size[0]]
+    return Geometry(rig, y, chol, basis, np.sqrt(np.diag(v)))
 
 
 def signature(geo: Geometry, rows: list[list[tuple[Candidate, float]]]) -> Array:
@@ -90,20 +95,17 @@ def signature(geo: Geometry, rows: list[list[tuple[Candidate, float]]]) -> Array
     return geo.project(simulate(geo.rig, members=members(geo.rig, rows)) - geo.plain)
 
 
-def delta_curves(
-    geo: Geometry, candidates: list[Candidate], points: int = 17, decades: float = 4.0
-) -> tuple[Array, Array]:
-    """Signatures of candidates over a log grid of amplitudes up to the largest sensible one.
+def delta_curves(geo: Geometry, candidates: list[Candidate], grid: Array = COARSE_GRID) -> tuple[Array, Array]:
+    """Signatures of candidates over a grid of amplitudes, in shares of the largest sensible one.
 
     Returns
     -------
     amplitudes (c, points), signatures (c, points, R).
     """
-    grid = np.geomspace(10.0**-decades, 1.0, points)
     sizes = np.array([largest(geo.rig, c, geo.plain) for c in candidates])[:, None] * grid
     rows = [[(c, float(a))] for c, line in zip(candidates, sizes, strict=True) for a in line]
     z = signature(geo, rows)
-    return sizes, z.reshape(len(candidates), points, -1)
+    return sizes, z.reshape(len(candidates), len(grid), -1)
 
 
 def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float) -> float:

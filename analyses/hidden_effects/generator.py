@@ -11,7 +11,7 @@ from .chain import Carried, Material, grow
 from .creep import time_grid
 from .elastic import natural_length, positions, tension
 from .instrument import lagging, readings, sticking
-from .rig import MATERIAL_PARAMETERS, Array, Bench, Rig
+from .rig import MATERIAL_PARAMETERS, Array, Bench, Index, Rig
 from .state import Effects
 
 SLOW = ("memory", "sensor_lag", "sensor_hysteresis", "second_relaxation")  # rows with these are simulated apart
@@ -26,7 +26,7 @@ class Members:
     amplitudes: dict[str, Array]
     shapes: dict[str, Array]
 
-    def rows(self, index: Array) -> Members:
+    def rows(self, index: Index) -> Members:
         """The chosen rows; effects neutral in all of them are dropped."""
         kept = {name: value[index] for name, value in self.amplitudes.items() if np.any(value[index] != 0)}
         return Members(len(index), kept, {key: value[index] for key, value in self.shapes.items()})

@@ -13,9 +13,11 @@ import numpy as np
 from scipy.special import logsumexp
 
 from .cases import Case
-from .catalogue import Candidate, library
-from .delta import delta_curves, signature
-from .rig import Array
+from .catalogue import Candidate, library, members
+from .delta import Geometry, delta_curves, signature
+from .fitting import delta_after_refit
+from .generator import simulate
+from .rig import Array, Index, Mask
 
 GROUP_COSINE = 0.95
 SEPARABLE = 3.3
@@ -27,7 +29,8 @@ def nearest_direction(curve: Array, delta: float) -> Array:
     """Unit signature of a candidate at the amplitude whose delta is nearest, from its curve (points, R)."""
     size = np.linalg.norm(curve, axis=1)
     best = int(np.argmin(np.abs(np.log(np.maximum(size, 1e-12) / delta))))
-    return curve[best] / max(float(size[best]), 1e-12)
+    unit: Array = curve[best] / max(float(size[best]), 1e-12)
+    return unit
 
 
 def cosines(z: Array, candidates: list[Candidate], curves: Array) -> dict[str, float]:
@@ -40,47 +43,46 @@ def cosines(z: Array, candidates: list[Candidate], curves: Array) -> dict[str, f
     return found
 
 
-def hypotheses(candidates: list[Candidate], curves: Array) -> tuple[Array, Array, list[str], Array]:
-    """Points of the ideal judge's prior.
+def hypotheses(
+    geo: Geometry, candidates: list[Candidate], sizes: Array, curves: Array, points: int = 24
+) -> tuple[Array, Array, list[str], Index]:
+    """Points of the ideal judge's prior: finite effects whose delta is log-uniform, up to what the effect can reach.
+
+    Parameters
+    ----------
+    sizes, curves : amplitudes (c, p) and signatures (c, p, R) of the candidates on a coarse grid.
 
     Returns
     -------
     signatures (k, R), log prior weights (k,), names in order, index of each point's name (k,).
     """
-    points, owner, weight = [], [], []
-    names = list(dict.fromkeys(c.name for c in candidates))
-    reach: dict[str, list[tuple[Array, float]]] = {name: [] for name in names}
-    for candidate, curve in zip(candidates, curves, strict=True):
-        size = np.linalg.norm(curve, axis=1)
-        rising = int(np.argmax(size)) + 1  # beyond its largest delta a curve turns back: not needed
-        if size[rising - 1] > DELTA_RANGE[0]:
-            wanted = np.geomspace(DELTA_RANGE[0], min(DELTA_RANGE[1], float(size[rising - 1])), 33)
-            logs = np.maximum.accumulate(np.log(np.maximum(size[:rising], 1e-9))) + np.arange(rising) * 1e-12
-            units = curve[:rising] / np.maximum(size[:rising, None], 1e-9)
-            at = np.interp(np.log(wanted), logs, np.arange(rising))
-            low = np.minimum(at.astype(int), rising - 2)
-            part = (at - low)[:, None]
-            unit = (1 - part) * units[low] + part * units[low + 1]
-            unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
-            reach[candidate.name] += [(row, 1.0 / len(wanted)) for row in unit * wanted[:, None]]
-    kept = [name for name in names if reach[name]]
-    for i, name in enumerate(kept):
-        total = sum(w for _, w in reach[name])
-        for row, w in reach[name]:
-            points.append(row)
-            owner.append(i)
-            weight.append(np.log(w / total))
-    return np.array(points), np.array(weight), kept, np.array(owner)
+    rows: list[list[tuple[Candidate, float]]] = []
+    for candidate, grid, curve in zip(candidates, sizes, curves, strict=True):
+        height = np.linalg.norm(curve, axis=1)
+        rising = int(np.argmax(height)) + 1  # beyond its largest delta a curve turns back: not needed
+        top = min(DELTA_RANGE[1], float(height[rising - 1]))
+        if top > DELTA_RANGE[0]:
+            climb = np.maximum.accumulate(np.log(np.maximum(height[:rising], 1e-9)))
+            wanted = np.linspace(np.log(DELTA_RANGE[0]), np.log(top), points)
+            rows += [[(candidate, float(a))] for a in np.exp(np.interp(wanted, climb, np.log(grid[:rising])))]
+    exact = signature(geo, rows).reshape(-1, points, curves.shape[2])
+    between = 0.5 * (exact[:, 1:] + exact[:, :-1])  # closer together than the noise
+    z = np.concatenate([exact, between], axis=1).reshape(-1, curves.shape[2])
+    owners = [row[0][0].name for row in rows[::points]]
+    names = list(dict.fromkeys(owners))
+    owner = np.repeat([names.index(name) for name in owners], 2 * points - 1)
+    weight = -np.log(np.bincount(owner)[owner])
+    return z, weight, names, owner
 
 
-def posterior(data: Array, points: Array, weight: Array, owner: Array, n_names: int) -> tuple[Array, Array]:
+def posterior(data: Array, points: Array, weight: Array, owner: Index, n_names: int) -> tuple[Array, Array]:
     """Log evidence of each effect against none, (m, names), and the largest likelihood ratio, (m,), of data (m, R)."""
     ratio = data @ points.T - 0.5 * np.sum(points**2, axis=1)
     evidence = np.stack([logsumexp(ratio[:, owner == i] + weight[owner == i], axis=1) for i in range(n_names)], axis=1)
     return evidence, 2 * ratio.max(axis=1)
 
 
-def ninety_percent_sets(probability: Array) -> Array:
+def ninety_percent_sets(probability: Array) -> Mask:
     """Members of the smallest set holding 90 %, boolean (m, names)."""
     order = np.argsort(-probability, axis=1)
     sorted_p = np.take_along_axis(probability, order, axis=1)
@@ -94,11 +96,13 @@ def judge(case: Case, draws: int = 200) -> dict[str, Any]:
     """Group, separability and, for a catalogue effect, the ideal judge's rates on fresh noise, given its detection."""
     geo = case.geo
     candidates = library(case.rig, values=4)
-    _, curves = delta_curves(geo, candidates, points=25)
+    sizes, curves = delta_curves(geo, candidates)
     result: dict[str, Any] = {"key": case.spec.key}
     share = [float(np.linalg.norm(geo.whiten(geo.floor)[0, part])) for part in case.rig.bench_slices]
     if case.hidden:
         z = signature(geo, [list(case.hidden)])[0]
+        hidden = simulate(case.rig, members=members(case.rig, [list(case.hidden)]))[0]
+        result["delta_after_refit"] = delta_after_refit(case.rig, geo.chol, hidden)
         share = [float(np.linalg.norm(z[part])) for part in case.rig.bench_slices]
         parts = [signature(geo, [[one]])[0] for one in case.hidden]
         near = [cosines(part, candidates, curves) for part in parts]
@@ -112,13 +116,15 @@ def judge(case: Case, draws: int = 200) -> dict[str, Any]:
         result["separable"] = bool(np.linalg.norm(z) * np.sqrt(max(1 - worst**2, 0.0)) > SEPARABLE)
     result["bench"] = case.rig.benches[int(np.argmax(share))].name
     if case.spec.kind in ("single", "without") and case.hidden:
-        result["optimal"] = _optimal(case, candidates, curves, set(result["groups"][0]), draws)
+        result["optimal"] = _optimal(case, candidates, sizes, curves, set(result["groups"][0]), draws)
     return result
 
 
-def _optimal(case: Case, candidates: list[Candidate], curves: Array, group: set[str], draws: int) -> dict[str, Any]:
+def _optimal(
+    case: Case, candidates: list[Candidate], sizes: Array, curves: Array, group: set[str], draws: int
+) -> dict[str, Any]:
     geo, rng = case.geo, np.random.default_rng(int(case.spec.key, 16))
-    points, weight, names, owner = hypotheses(candidates, curves)
+    points, weight, names, owner = hypotheses(geo, candidates, sizes, curves)
     truth = case.hidden[0][0].name
     if truth not in names:
         return {}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .rig import Array
+from .rig import Array, Index
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Effects:
         """Shape constant of every row; 1 where the row does not have the effect."""
         return self.shapes[key]
 
-    def rows(self, index: Array) -> Effects:
+    def rows(self, index: Index) -> Effects:
         """The chosen rows; effects neutral in all of them are dropped."""
         kept = {name: value[index] for name, value in self.amplitudes.items() if np.any(value[index] != 0)}
         return Effects(len(index), kept, {key: value[index] for key, value in self.shapes.items()})
