@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +163,8 @@ BAD_TOML = [
     ("1000.0", "0", "key length_mm: found 0"),
     ("1000.0", "inf", "key length_mm: found inf"),
     ("1000.0", "nan", "key length_mm: found nan"),
+    ("1000.0", "1" * 9999, "found a TOML error"),
+    ("1000.0", "0x" + "f" * 9999, "key length_mm: found a number of thousands of digits"),
     ("1000.0", "1" + "0" * 400, "key length_mm: found 1000"),
     ("resolution_N = 0.01", "resolution_N = -1", "line 5, experiment wire-a, key resolution_N: found -1"),
     ("resolution_N = 0.01", "resolution_N = 0.0", "key resolution_N: found 0.0"),
@@ -317,6 +320,29 @@ def test_whatever_a_csv_holds_it_is_read_or_refused_in_one_line(tmp_path, data):
         assert np.isfinite([*hold.time_s, *hold.tension_N, hold.displacement_mm]).all()
 
 
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=300)
+@given(data=st.data())
+def test_whatever_a_toml_holds_it_is_read_or_refused_in_one_line(experiment_file, data):
+    """Replace a key, a value or a bracket of a valid file at random."""
+    path = experiment_file()
+    words = re.split(r"(\s*[=,]\s*|\n|[{}\[\]])", path.read_text())
+    for _ in range(data.draw(st.integers(1, 2))):
+        words[data.draw(st.integers(0, len(words) - 1))] = data.draw(WORDS)
+    path.write_bytes("".join(words).encode("utf-8", "surrogatepass"))
+    try:
+        (experiment,) = read_experiments(path)
+    except InputError as error:
+        assert str(error).startswith((str(path), str(path.parent / "a.csv")))
+        assert "found" in str(error)
+        assert "expected" in str(error)
+        assert len(str(error).splitlines()) == 1
+        return
+    assert experiment.length_mm > 0
+    assert experiment.resolution_N >= 0
+    assert experiment.protocol().mask.sum() == 6
+    assert all(hold.duration_s >= 0 for hold in experiment.holds)
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=200)
 @given(raw=st.binary(max_size=200))
 def test_no_bytes_crash_the_reader(tmp_path, raw):
@@ -334,5 +360,14 @@ CELLS = st.one_of(
     st.sampled_from(["", "nan", "-1", "0", "1", "2.5", "1e400", "hold", "time_s", "١", "1_0", "4", "\ufeff", "\x00"]),
     st.floats(-1e3, 1e3).map(str),
     st.integers(-3, 9).map(str),
+)
+WORDS = st.one_of(
+    st.text(max_size=4),
+    st.sampled_from(
+        ["", "0", "-1", "1e400", "nan", "true", '"a"', '"a\\nb"', "[]", "{}", "[1]", "{ a = 1 }", "1979-05-27"]
+    ),
+    st.sampled_from(
+        ["name", "prior", '"a.csv"', '".."', "\n", "[[experiment]]\n", "[prior]\n", "[prior.k1]\n", "3", "9" * 400]
+    ),
 )
 SUMS = [255.83, 145.11, 243.77, 303.65]  # the second with 1.61 for the printed .161: 143.661 without it

@@ -184,7 +184,7 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     text = read_text(source)
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
         raise InputError(f"{source}: found a TOML error, {_lower(str(error))}; expected valid TOML") from None
     except RecursionError:
         raise InputError(f"{source}: found values nested too deeply, expected an experiment file") from None

@@ -59,7 +59,10 @@ class Hold:
 
 def shown(value: object) -> str:
     """What was found, on one short line."""
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # Python does not print integers of thousands of digits
+        return "a number of thousands of digits"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
