@@ -1,0 +1,55 @@
+"""Leave one hold out by importance sampling against posteriors that never saw the hold."""
+
+import numpy as np
+import pytest
+
+from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.fit import Fit, fit
+from wirebayes.bayes.problem import build
+from wirebayes.discrepancy.loho import LeftOut, difference, loho, without_hold
+from wirebayes.paper import experiments
+
+QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Fit:
+    return fit(build([experiments()[0].train(6)]), 1, policy=QUICK)
+
+
+@pytest.mark.statistical
+def test_importance_sampling_agrees_with_refitting_without_the_hold(fitted: Fit) -> None:
+    fast = loho(fitted, policy=QUICK)
+    exact = loho(fitted, policy=QUICK, exact=True)
+    assert exact.refitted.all() and not fast.refitted.all()
+    assert list(fast.hold) == [1, 2, 3, 4, 6, 7]
+    easy = ~fast.refitted
+    # Monte-Carlo error of 500 effective draws at Pareto k up to 0.7
+    assert np.abs(fast.elpd - exact.elpd)[easy].max() < 0.25
+    # leaving a hold out costs: the density that has seen it is higher in sum
+    recorded = fitted.problem.samples[0].protocol.recorded
+    seen = np.log(np.exp(fitted.problem.leave_one_hold_out(fitted.flat)[0]).mean(axis=1))[recorded]
+    assert fast.total < seen.sum() - 1.0
+
+
+def test_a_hold_left_out_still_happened(fitted: Fit) -> None:
+    problem = fitted.problem
+    rows = fitted.flat[:50]
+    without = without_hold(problem, 0, 2)
+    assert not without.samples[0].protocol.mask[2].any()
+    assert np.array_equal(without.samples[0].protocol.duration_s, problem.samples[0].protocol.duration_s)
+    before, after = problem.hold_log_likelihood(rows)[0], without.hold_log_likelihood(rows)[0]
+    # p(all) = p(all but the hold) p(hold | all but it): the chain rule, computed in two independent ways
+    assert np.allclose(before.sum(axis=0) - after.sum(axis=0), problem.leave_one_hold_out(rows)[0][2], atol=1e-6)
+
+
+def test_difference_and_its_standard_error() -> None:
+    hold = np.array([1, 2, 3, 4])
+    names, none = ("a",) * 4, np.zeros(4)
+    one = LeftOut(names, hold, np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
+    other = LeftOut(names, hold, np.array([2.0, 2.0, 2.0, 2.0]), none, none > 0)
+    total, se = difference(one, other)
+    assert total == 4.0
+    assert se == pytest.approx(2 * np.std([1, 0, 3, 0], ddof=1))
+    with pytest.raises(ValueError, match="same holds"):
+        difference(one, LeftOut(names, hold + 1, none, none, none > 0))

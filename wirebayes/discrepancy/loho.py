@@ -1,0 +1,144 @@
+"""Leave one hold out: how well each hold's readings are predicted from all the others.
+
+Leaving a hold out drops its readings, never its displacement and duration: the wire creeps there all the same. The
+posterior without a hold is reached from the full one by Pareto-smoothed importance sampling with the ratios
+``1 / p(readings of the hold | all other readings, parameters)``; where the ratios' tail is too heavy to trust, that
+posterior is sampled itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from arviz_stats.base import array_stats
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.fit import Fit, fit, seed_of
+from wirebayes.bayes.problem import Problem
+
+Array = NDArray[np.float64]
+LARGEST_K = 0.7  # above it, importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling)
+REFIT = Policy(walkers=128, ess=1000.0)
+_DRAWS = 4000
+_statistics: Any = array_stats
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Each recorded hold predicted from all the others.
+
+    Attributes
+    ----------
+    sample : tuple of str
+        Which experiment each hold belongs to.
+    hold : (m,) int array
+        Hold numbers.
+    elpd : (m,) array
+        log p(readings of the hold | readings of all other holds).
+    pareto_k : (m,) array
+        Of the importance ratios; above `LARGEST_K` they were not used.
+    refitted : (m,) bool array
+        Where the posterior without the hold was sampled itself.
+    converged : bool
+        All those samplings converged.
+    """
+
+    sample: tuple[str, ...]
+    hold: NDArray[np.int64]
+    elpd: Array
+    pareto_k: Array
+    refitted: NDArray[np.bool_]
+    converged: bool = True
+
+    @property
+    def total(self) -> float:
+        """Sum over the holds."""
+        return float(self.elpd.sum())
+
+    @property
+    def se(self) -> float:
+        """Standard error of the sum, from the spread between holds."""
+        return _se(self.elpd)
+
+
+def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
+    """How much better `one` predicts than `other`: the elpd difference and its standard error over holds.
+
+    Raises
+    ------
+    ValueError
+        When they are not about the same holds.
+    """
+    if one.sample != other.sample or not np.array_equal(one.hold, other.hold):
+        raise ValueError("the two do not leave out the same holds")
+    gained = one.elpd - other.elpd
+    return float(gained.sum()), _se(gained)
+
+
+def loho(
+    fitted: Fit,
+    seed: int = 0,
+    *,
+    policy: Policy = REFIT,
+    exact: bool = False,
+    progress: Callable[[float], None] = lambda share: None,
+) -> LeftOut:
+    """Leave out each recorded hold in turn.
+
+    Parameters
+    ----------
+    fitted : Fit
+        With a likelihood hold by hold, a hold's first reading stays given.
+    seed : int
+        For the exact refits.
+    policy : Policy
+        Of the exact refits.
+    exact : bool
+        Refit without every hold, whatever the diagnostic says.
+    progress : function of a share between 0 and 1
+
+    Returns
+    -------
+    LeftOut
+    """
+    problem = fitted.problem
+    theta = thinned(fitted.flat)
+    conditional = problem.leave_one_hold_out(theta)
+    where = [(s, int(j)) for s, sample in enumerate(problem.samples) for j in np.flatnonzero(sample.protocol.recorded)]
+    elpd, k, refitted, converged = np.zeros(len(where)), np.zeros(len(where)), np.zeros(len(where), bool), True
+    for i, (s, j) in enumerate(where):
+        log_p = conditional[s][j]
+        log_weight, k[i] = _statistics.psislw(log_p)
+        elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
+        if exact or not k[i] <= LARGEST_K:
+            without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy)
+            log_p = problem.leave_one_hold_out(thinned(without.flat))[s][j]
+            elpd[i], refitted[i] = logsumexp(log_p) - np.log(len(log_p)), True
+            converged &= without.chains.converged
+        progress((i + 1) / len(where))
+    names = tuple(problem.samples[s].name for s, _ in where)
+    numbers = np.array([problem.samples[s].protocol.number[j] for s, j in where])
+    return LeftOut(names, numbers, elpd, k, refitted, bool(converged))
+
+
+def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
+    """The problem that does not see the readings of one hold (a row of a sample's protocol)."""
+    here = problem.samples[sample]
+    mask = here.protocol.mask.copy()
+    mask[hold] = False
+    kept = replace(here, protocol=replace(here.protocol, mask=mask))
+    return replace(problem, samples=(*problem.samples[:sample], kept, *problem.samples[sample + 1 :]))
+
+
+def thinned(theta: Array, draws: int = _DRAWS) -> Array:
+    """At most so many rows, evenly spread."""
+    rows = np.linspace(0, len(theta) - 1, min(draws, len(theta))).round().astype(int)
+    kept: Array = theta[rows]
+    return kept
+
+
+def _se(values: Array) -> float:
+    return float(np.sqrt(len(values) * values.var(ddof=1))) if len(values) > 1 else float("nan")
