@@ -5,11 +5,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 # Before anything draws or multiplies: no window, and one thread, so that bytes do not depend on the machine's load.
 os.environ.setdefault("MPLBACKEND", "Agg")
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
+
+# The same examples every time, and no clock: a red test stays red, a busy machine does not make one.
+settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("repeatable")
 
 CSV = """hold,displacement_mm,time_s,tension_N
 1,1,0,1.00

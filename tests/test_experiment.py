@@ -291,7 +291,7 @@ def test_the_papers_tables_are_all_there():
     assert long_roc.holds[3].tension_N.tolist() == [1.73, 1.67, 1.64, 1.62, 1.61]  # printed .161
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=300)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], max_examples=300)
 @given(data=st.data())
 def test_whatever_a_csv_holds_it_is_read_or_refused_in_one_line(tmp_path, data):
     """Damage a valid file at random: the answer is holds that obey the rules, or an InputError, never a crash."""
@@ -320,7 +320,7 @@ def test_whatever_a_csv_holds_it_is_read_or_refused_in_one_line(tmp_path, data):
         assert np.isfinite([*hold.time_s, *hold.tension_N, hold.displacement_mm]).all()
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=300)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], max_examples=300)
 @given(data=st.data())
 def test_whatever_a_toml_holds_it_is_read_or_refused_in_one_line(experiment_file, data):
     """Replace a key, a value or a bracket of a valid file at random."""
@@ -343,7 +343,7 @@ def test_whatever_a_toml_holds_it_is_read_or_refused_in_one_line(experiment_file
     assert all(hold.duration_s >= 0 for hold in experiment.holds)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=200)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], max_examples=200)
 @given(raw=st.binary(max_size=200))
 def test_no_bytes_crash_the_reader(tmp_path, raw):
     for name in ("x.toml", "x.csv"):
