@@ -1,9 +1,11 @@
 """What the documentation shows is true: mistakes and their answers, the effect of one's own, the example."""
 
+import csv
 import importlib.util
 import re
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 from types import ModuleType
 
@@ -66,6 +68,33 @@ def test_the_effect_of_ones_own_is_neutral_at_its_neutral_value_to_the_last_bit(
 def test_the_effect_of_ones_own_is_fitted_as_shown():
     done = subprocess.run([sys.executable, DOCS / "own_effect.py"], capture_output=True, text=True, check=True)
     assert re.fullmatch(r"p = 0\.2\d, standard deviation 0\.0\d, converged: True\n", done.stdout)
+
+
+@pytest.mark.slow
+def test_the_tutorial_can_be_followed(tmp_path):
+    """Its commands as they stand, its protocol, its Python; all but the last section, which is ``make run``."""
+    text = (DOCS / "tutorial.rst").read_text()
+    for file in (DOCS.parent / "data" / "paper").iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    protocol = re.search(r"::\n\n((?:    (?:hold,|\d).*\n)+)", text)[1]
+    (tmp_path / "protocol.csv").write_text(re.sub("^    ", "", protocol, flags=re.MULTILINE))
+    commands = re.findall(r"^    wirebayes (.*)", text, re.MULTILINE)
+    assert [command.split()[0] for command in commands] == ["fit", "predict", "reproduce"]
+    for command in commands[:-1]:
+        done = run("-m", "wirebayes", *command.split(), cwd=tmp_path)
+        assert done.stderr == ""
+    rows = list(csv.DictReader((tmp_path / "predicted.csv").read_text().splitlines()))
+    assert [row["hold"] for row in rows] == ["8"] * 5 + ["9"] * 5
+    measured = re.search(r"measured there: (.*) N\.", text.replace("\n", " "))[1]
+    for row, reading in zip(rows[5:], re.findall(r"\d\.\d\d", measured), strict=True):
+        assert abs(float(row["mean_N"]) - float(reading)) < 0.2
+    for block in re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", text):
+        done = run("-W", "ignore", "-c", textwrap.dedent(block), cwd=tmp_path)
+        assert done.stdout in ("", "nylon-1.5m 1500.0 (11, 5)\n")
+
+
+def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=True)
 
 
 def test_the_readmes_python_runs():
