@@ -16,6 +16,7 @@ from .noise import measure
 from .rig import Array, Rig
 from .truth import PROTOCOLS, draw_rig
 
+GENERATION = 1  # raised with every change that makes other data of the same specification: old answers then lapse
 KINDS = ("clean", "single", "pair", "without", "foreign", "gross")
 DELTAS = (3.0, 5.0, 10.0, 20.0)
 ATTEMPTS = 60  # rigs tried before an effect counts as out of reach of a protocol
@@ -35,7 +36,9 @@ class Spec:
     @property
     def key(self) -> str:
         """Name of the case: says nothing of what it hides."""
-        text = f"{self.seed}|{self.kind}|{self.protocol}|{','.join(self.names)}|{self.delta:g}|{self.repeat}"
+        text = (
+            f"{GENERATION}|{self.seed}|{self.kind}|{self.protocol}|{','.join(self.names)}|{self.delta:g}|{self.repeat}"
+        )
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def rng(self) -> np.random.Generator:

@@ -108,20 +108,23 @@ def delta_curves(geo: Geometry, candidates: list[Candidate], grid: Array = COARS
     return sizes, z.reshape(len(candidates), len(grid), -1)
 
 
-def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float) -> float:
+def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float, tolerance: float = 2e-3) -> float:
     """Smallest amplitude (its size) whose signature has the given delta; nan when no sensible one has.
 
-    Grids inside the bracket of the one before, then log-log interpolation; effects with kinks need the third.
+    A grid, then finer grids inside the bracket with the log-log interpolated point among them, until one point agrees
+    to the relative tolerance: thresholds make delta bend sharply.
     """
     sizes, z = delta_curves(geo, [candidate])
     grid, height = sizes[0], np.linalg.norm(z[0], axis=1)
-    for _ in range(3):
+    for _ in range(12):
         above = np.flatnonzero(height >= delta)
         if not len(above) or above[0] == 0:
             return float("nan")
-        low, high = grid[above[0] - 1], grid[above[0]]
-        grid = np.geomspace(low, high, 7)
+        near = slice(int(above[0]) - 1, int(above[0]) + 1)
+        guess = np.exp(np.interp(np.log(delta), np.log(np.maximum(height[near], 1e-12)), np.log(grid[near])))
+        grid = np.sort(np.append(np.geomspace(grid[near][0], grid[near][1], 5), guess))
         height = np.linalg.norm(signature(geo, [[(candidate, float(a))] for a in grid]), axis=1)
-    above = np.flatnonzero(height >= delta)
-    i = int(above[0]) if len(above) and above[0] > 0 else len(grid) - 1
-    return float(np.exp(np.interp(np.log(delta), np.log(height[i - 1 : i + 1]), np.log(grid[i - 1 : i + 1]))))
+        error = np.abs(height / delta - 1)
+        if error.min() < tolerance:
+            return float(grid[np.argmin(error)])
+    return float("nan")  # delta jumps over the value asked for

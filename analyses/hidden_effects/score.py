@@ -10,6 +10,7 @@ from scipy.stats import beta
 
 Row = dict[str, Any]
 NOTHING = "nothing-missing"
+VISIBLE = 0.8  # share of delta that must survive a refit of the plain model for a case to count as visible
 
 
 def upper_bound(k: int, n: int, level: float = 0.95) -> float:
@@ -62,6 +63,7 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "accepted": list(spoken.get("accepted") or []),
         "right_hold": None if hold is None or found_hold is None else found_hold == hold,
         "separable": judged.get("separable"),
+        "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],
         "optimal": judged.get("optimal") or {},
         "held_out": _held_out(judged, spoken),
         "seconds": record["seconds"],
@@ -90,7 +92,7 @@ def _held_out(judged: dict[str, Any], spoken: dict[str, Any]) -> dict[str, float
 def pooled(rows: list[Row], statistic: Any, draws: int = 400) -> dict[str, Any] | None:
     """A statistic of held-out sums over cases with a 90 % bootstrap interval over cases."""
     table = np.array(
-        [[r["held_out"][k] for k in ("plain", "final", "judge_plain", "oracle")] for r in rows if r["held_out"]]
+        [[r["held_out"][k] for k in ("plain", "final", "judge_plain", "oracle")] for r in rows if _comparable(r)]
     )
     if len(table) < 3:
         return None
@@ -99,6 +101,11 @@ def pooled(rows: list[Row], statistic: Any, draws: int = 400) -> dict[str, Any] 
     low, high = np.nanquantile(spread, [0.05, 0.95])
     value = statistic(table.sum(axis=0), len(table))
     return {"value": float(value), "n": len(table), "low": float(low), "high": float(high)}
+
+
+def _comparable(row: Row) -> bool:
+    """Whether the answer held out the same holds as the oracle."""
+    return bool(row["held_out"] and row["held_out"]["same_holds"])
 
 
 def rmse_ratio(sums: Any, n: int) -> float:
@@ -182,6 +189,7 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
     single = [r for r in rows if r["kind"] == "single"]
     return {
         "targets": targets(rows),
+        "targets_visible": targets([r for r in rows if r["visible"]]),
         "confusion": confusion(single),
         "by_effect": breakdown(single, "effect"),
         "by_protocol": breakdown(single, "protocol"),
@@ -198,6 +206,7 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
             for d in sorted({r["delta"] for r in single})
         },
         "seconds": _seconds([r["seconds"] for r in rows]),
+        "other_holds_held_out": sum(bool(r["held_out"]) and not _comparable(r) for r in rows),
         "failed": failed,
         "rows": rows,
     }

@@ -1,0 +1,129 @@
+"""Scores on made-up answers whose rates are known by hand."""
+
+import pytest
+from scipy.stats import binom
+
+from analyses.hidden_effects.score import (
+    closed,
+    closed_of_oracle,
+    confusion,
+    lower_bound,
+    pooled,
+    rate,
+    rmse_ratio,
+    score,
+    upper_bound,
+)
+
+HOLDS = {"sample-1": [9, 10]}
+
+
+def truth(key, kind="single", name="toe", delta=10.0):
+    effects = [] if kind == "clean" else [{"name": name, "hold": None, "experiments": ["sample-1"]}]
+    return {
+        "key": key,
+        "kind": kind,
+        "protocol": "paper",
+        "delta": delta if effects else 0.0,
+        "law": "gaussian",
+        "effects": effects,
+        "benches": {"sample-1": {}},
+    }
+
+
+def judged(group=("toe",)):
+    return {
+        "bench": "sample-1",
+        "groups": [list(group)],
+        "separable": True,
+        "delta_after_refit": 10.0,
+        "optimal": {"top1": 0.8, "set_size": 1.5},
+        "held_out_holds": HOLDS,
+        "held_out": {"plain": 3.0, "oracle": 1.0, "floor": 1.0},
+    }
+
+
+def said(best, members=(), final=2.0):
+    verdict = "nothing-missing" if best is None else "unknown" if best == "unknown" else "named"
+    spoken = {
+        "verdict": verdict,
+        "best": best,
+        "set": list(members),
+        "group": list(members),
+        "accepted": [best],
+        "held_out": {"holds": [9, 10], "plain": {"rmse_N": 3.0}, "final": {"rmse_N": final}},
+    }
+    return {"answer": {"experiments": {"sample-1": spoken}}, "error": None, "seconds": 1.0}
+
+
+def found(result, start, which="targets"):
+    return next(row for row in result[which] if row["target"].startswith(start))
+
+
+def test_bounds_are_clopper_pearson():
+    assert binom.cdf(3, 100, upper_bound(3, 100)) == pytest.approx(0.05, abs=1e-6)
+    assert binom.sf(2, 100, lower_bound(3, 100)) == pytest.approx(0.05, abs=1e-6)
+    assert upper_bound(5, 5) == 1.0 and lower_bound(0, 5) == 0.0
+    assert rate([]) is None
+
+
+def test_rates_of_named_missed_and_wrong():
+    truths = {k: truth(k) for k in "abcd"}
+    answers = {
+        "a": said("toe", ["toe", "memory"]),
+        "b": said("memory", ["memory"]),
+        "c": said(None),
+        "d": said("ageing", ["ageing", "toe"]),
+    }
+    result = score(truths, dict.fromkeys("abcd", judged(("toe", "ageing"))), answers)
+    assert found(result, "detected at delta 10")["found"]["value"] == 0.75
+    assert found(result, "best in the true group, delta 10")["found"]["value"] == pytest.approx(2 / 3)
+    assert found(result, "90 % set holds the truth, delta 10")["found"]["value"] == pytest.approx(2 / 3)
+    assert found(result, "best right, separable")["found"]["value"] == pytest.approx(1 / 3)
+    assert found(result, "best right, over Bayes")["found"]["value"] == pytest.approx(1 / 2.4)
+    assert found(result, "size of the 90 % set")["found"]["value"] == pytest.approx(5 / 3 - 1.5)
+    assert result["confusion"]["toe"] == {"toe": 1, "memory": 1, "nothing-missing": 1, "ageing": 1}
+    assert not found(result, "detected at delta 10")["passed"]
+
+
+def test_false_alarms_need_numbers_to_pass():
+    few = {f"c{i}": truth(f"c{i}", "clean") for i in range(50)}
+    many = {f"c{i}": truth(f"c{i}", "clean") for i in range(700)}
+    quiet = said(None, final=3.0)
+    for truths, loud, passed in ((few, 0, False), (many, 20, True), (many, 60, False)):
+        answers = {k: said("toe") if i < loud else quiet for i, k in enumerate(truths)}
+        row = found(score(truths, dict.fromkeys(truths, judged()), answers), "false alarms")
+        assert row["found"]["k"] == loud
+        assert row["passed"] is passed
+
+
+def test_gap_is_pooled_in_noise_floors():
+    sums = [90.0, 40.0, 90.0, 10.0]  # ten cases: plain 9, final 4, judge's plain 9, oracle 1, floor 1
+    assert closed(sums, 10) == pytest.approx(50 / 80)
+    assert closed_of_oracle(sums, 10) == pytest.approx(50 / 80)
+    assert rmse_ratio(sums, 10) == pytest.approx(2 / 3)
+    rows = [{"held_out": {"plain": 9.0, "final": 4.0, "judge_plain": 9.0, "oracle": 1.0, "same_holds": 1.0}}] * 10
+    assert pooled(rows, closed)["value"] == pytest.approx(50 / 80)
+    assert pooled(rows[:2], closed) is None
+
+
+def test_unknown_counts_where_the_form_is_in_no_catalogue():
+    truths = {k: truth(k, "foreign", "screw_thread") for k in "abc"}
+    answers = {"a": said("unknown"), "b": said("memory", ["memory"]), "c": said("toe", ["toe"])}
+    result = score(truths, dict.fromkeys("abc", judged(("screw_thread", "toe"))), answers)
+    assert found(result, "form in no catalogue")["found"]["value"] == pytest.approx(2 / 3)
+
+
+def test_cases_the_refitted_plain_model_swallows_are_also_shown_apart():
+    truths = {k: truth(k) for k in "ab"}
+    swallowed = judged() | {"delta_after_refit": 2.0}
+    answers = {"a": said("toe", ["toe"]), "b": said(None)}
+    result = score(truths, {"a": judged(), "b": swallowed}, answers)
+    assert found(result, "detected at delta 10")["found"]["value"] == 0.5
+    assert found(result, "detected at delta 10", "targets_visible")["found"]["value"] == 1.0
+
+
+def test_a_case_that_failed_is_counted_as_failed():
+    result = score({"a": truth("a")}, {"a": judged()}, {"a": {"answer": None, "error": "boom", "seconds": 0.1}})
+    assert result["failed"] == [{"key": "a", "error": "boom"}]
+    assert confusion(result["rows"]) == {}
