@@ -165,9 +165,14 @@ def _wait(bench: Bench, m: Material, carried: Carried, fx: Effects, j: int, here
     grid = np.linspace(0, 1, 81) ** (1 / min(float(np.median(part.N)), 1.0)) * sub["unrecorded_hold"][:, None]
     start = _tension_now(bench, part, before, sub, j, here[rows])
     _, after = grow(part, before, sub, j, start, grid)
-    result = Carried(carried.main.copy(), carried.second.copy(), carried.viscous.copy(), carried.clocks)
+    result = Carried(carried.main.copy(), carried.second.copy(), carried.viscous.copy())
     result.main[rows], result.second[rows], result.viscous[rows] = after.main, after.second, after.viscous
-    return result
+    nothing = (np.zeros(fx.n), np.ones(fx.n))
+    for i, clock in enumerate(after.clocks):  # the last one is the waiting's own, new to the other rows
+        owed, age = (part.copy() for part in (carried.clocks[i] if i < len(carried.clocks) else nothing))
+        owed[rows], age[rows] = clock
+        result.clocks.append((owed, age))
+    return result if after.clocks else dataclasses.replace(result, clocks=carried.clocks)
 
 
 def _late_first(

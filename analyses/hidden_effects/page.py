@@ -48,6 +48,17 @@ def table(how: str, result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _comparison(results: dict[str, dict[str, Any]]) -> str:
+    """Every target of every answerer side by side."""
+    head = "<tr><th>target</th><th>wanted</th>" + "".join(f"<th>{escape(how)}</th>" for how in results) + "</tr>"
+    rows = []
+    for lines in zip(*(result["targets"] for result in results.values()), strict=True):
+        cells = [escape(lines[0]["target"]), escape(lines[0]["wanted"])]
+        cells += [_number(line["found"]["value"]) if line["found"] else "-" for line in lines]
+        rows.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
+    return f"<h2>Side by side</h2><table>{head}{''.join(rows)}</table>"
+
+
 def _targets(found: list[dict[str, Any]]) -> str:
     rows = []
     for row in found:
@@ -171,7 +182,7 @@ def write_page(path: Path, results: dict[str, dict[str, Any]], lost: list[Spec])
         f"<style>{STYLE}</style></head><body><h1>Hidden effects</h1>"
         "<p>Simulated tests in which one effect, two or none is hidden; delta is its size in standard deviations after"
         " everything the plain model can absorb. Intervals: Clopper-Pearson for rates, bootstrap over cases for pooled"
-        f" figures.</p>{body}<h2>Out of reach</h2><p>No sensible amplitude gives these:</p><ul>{listed}</ul>"
-        "</body></html>\n"
+        f" figures.</p>{_comparison(results)}{body}"
+        f"<h2>Out of reach</h2><p>No sensible amplitude gives these:</p><ul>{listed}</ul></body></html>\n"
     )
     write_atomically(path, html)

@@ -169,3 +169,16 @@ def test_a_wire_goes_slack_in_the_slack_protocol():
         rig = draw_rig(np.random.default_rng(seed), "slack")
         y = simulate(rig)[0]
         assert y.min() == 0.0 < y.max()
+
+
+def test_memory_runs_on_through_an_unrecorded_time():
+    """Two effects at once: the waiting at hold 2's position is a hold, and hold 1's clock runs through it."""
+    rig = one_wire(path=(1, 2, 3, 4))
+    memory = draw(EFFECTS["memory"], rig, np.random.default_rng(0))
+    wait = dataclasses.replace(draw(EFFECTS["unrecorded_hold"], rig, np.random.default_rng(0)), shapes=(("hold", 1.0),))
+    y = simulate(rig, members=members(rig, [[(memory, 0.7), (wait, 60.0)], [(memory, 0.7)]]))
+    bench = rig.benches[0]
+    longer = dataclasses.replace(bench, holds=(bench.holds[0], Hold(9, 2.0, (), 60.0), *bench.holds[1:]))
+    as_hold = dataclasses.replace(rig, benches=(longer,))
+    assert y[0] == pytest.approx(simulate(as_hold, members=members(as_hold, [[(memory, 0.7)]]))[0], abs=1e-4)
+    assert y[1] == pytest.approx(simulate(rig, members=members(rig, [[(memory, 0.7)]]))[0], abs=1e-12)
