@@ -171,6 +171,8 @@ BAD_TOML = [
     ('"wire-a"', '"wire a"', "line 2, experiment wire a, key name: found 'wire a', expected a name of letters"),
     ('"wire-a"', '".."', "key name: found '..'"),
     ('"wire-a"', '"wire-ä"', "key name: found 'wire-ä'"),
+    ('"wire-a"', '"configuration.json"', "key name: found 'configuration.json', expected a name of letters"),
+    ('"wire-a"', '"' + "w" * 101 + '"', "key name: found 'www"),
     ('"wire-a"', "7", "key name: found 7"),
     ('"Roc Line 2.2 kg"', '"../up"', "key material: found '../up'"),
     ('"Roc Line 2.2 kg"', '" "', "key material: found ' '"),

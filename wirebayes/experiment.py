@@ -20,7 +20,8 @@ __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
 
 _KEYS = ("name", "material", "length_mm", "resolution_N", "readings", "unrecorded_holds", "prior")
 _HOLD_KEYS = ("before_hold", "displacement_mm", "duration_s")
-_NAME = re.compile(r"[A-Za-z0-9._-]+", re.ASCII)
+_NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
+_TAKEN = re.compile(r"\.{1,2}|.*\.(json|html|partial)", re.IGNORECASE)  # a folder beside the results' own files
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,13 +209,17 @@ def read_experiments(path: str | Path) -> list[Experiment]:
 
 def _read_one(keys: Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
     keys.only(_KEYS)
-    expected = "a name of letters, digits, '.', '_' and '-'"
+    expected = "a name of letters, digits, '.', '_' and '-' for a folder of results"
     name = keys.string("name", expected)
-    if not _NAME.fullmatch(name) or name in (".", ".."):
+    if not _NAME.fullmatch(name) or _TAKEN.fullmatch(name):
         raise keys.complain("name", shown(name), expected)
-    expected = "a name without '/', '\\' or control characters"
+    expected = "a name of at most 100 characters without '/', '\\' or control characters"
     material = keys.string("material", expected)
-    if material.strip() in (".", "..") or any(c in "/\\" or not c.isprintable() for c in material):
+    if (
+        len(material) > 100
+        or _TAKEN.fullmatch(material.strip())
+        or any(c in "/\\" or not c.isprintable() for c in material)
+    ):
         raise keys.complain("material", shown(material), expected)
     length = keys.number("length_mm", "a length above 0 mm", above=0.0)
     resolution = 0.0
