@@ -66,8 +66,10 @@ def test_a_wheel_works_outside_the_checkout(tmp_path):
     run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, tmp_path / "source")
     (wheel,) = tmp_path.glob("*.whl")
     inside = zipfile.ZipFile(wheel).namelist()
-    carried = {file.relative_to(ROOT).as_posix() for file in (ROOT / "data").rglob("*.*") if file.is_file()}
-    assert {f"wirebayes/{name}" for name in carried} <= set(inside)
+    source = tmp_path / "source"
+    carried = {f"wirebayes/{file.relative_to(source).as_posix()}" for file in (source / "data").rglob("*.*")}
+    ours = {file.relative_to(source).as_posix() for file in (source / "wirebayes").rglob("*.*")}
+    assert {name for name in carried | ours if "__pycache__" not in name} <= set(inside)
     assert not [name for name in inside if not name.startswith("wirebayes")]
     run(sys.executable, "-m", "venv", "--system-site-packages", tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
