@@ -84,7 +84,7 @@ def work(
         return
     begin, shown = time.monotonic(), 0.0
     spawn = multiprocessing.get_context("spawn")  # workers that may have children of their own, unlike a Pool's
-    with ProcessPoolExecutor(min(workers, len(todo)), mp_context=spawn, max_tasks_per_child=200) as pool:
+    with ProcessPoolExecutor(min(workers, len(todo)), mp_context=spawn) as pool:
         for i, future in enumerate(as_completed([pool.submit(do, job) for job in todo]), 1):
             append_line(path, future.result())
             now = time.monotonic() - begin
