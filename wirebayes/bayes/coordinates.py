@@ -1,6 +1,6 @@
 """The coordinates that are sampled: what the data see, so that the curved ridge in (B, k2, N) lies nearly straight.
 
-Positive parameters become logarithms; then, one after the other,
+Positive parameters become logarithms, others count in standard deviations of their prior; then, one after the other,
 
 - log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
 - log B becomes the log tension lost in one typical hold at a typical tension,
@@ -38,6 +38,7 @@ class Coordinates:
         names = problem.names
         self.problem = problem
         self.log_columns = np.array([name in problem.prior.logarithmic for name in names])
+        self.scale = np.array([1.0 if log else _spread(problem.prior.distributions[n]) for n, log in zip(names, self.log_columns, strict=True)])
         self.ridges = []
         for mark in dict.fromkeys(_mark(problem, s.material) for s in problem.samples):
             sample = next(s for s in problem.samples if _mark(problem, s.material) == mark)
@@ -53,7 +54,7 @@ class Coordinates:
 
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
-        z = theta.copy()
+        z = theta / self.scale
         z[:, self.log_columns] = np.log(theta[:, self.log_columns])
         for ridge in self.ridges:
             creep, hazard = self._shifts(theta, ridge)
@@ -65,7 +66,7 @@ class Coordinates:
 
     def to_natural(self, z: Array) -> Array:
         """Natural parameters of sampled coordinates."""
-        theta = z.copy()
+        theta = z * self.scale
         with np.errstate(over="ignore"):
             theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
             for ridge in self.ridges:
@@ -77,7 +78,7 @@ class Coordinates:
 
     def log_jacobian(self, theta: Array) -> Array:
         """(n,) log |d natural / d sampled|."""
-        return np.log(theta[:, self.log_columns]).sum(axis=1)
+        return np.asarray(np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum())
 
     def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:
         return theta[:, ridge.where[name]] if name in ridge.where else ridge.fixed[name]
@@ -92,6 +93,11 @@ class Coordinates:
             reached = np.log(np.maximum(-np.expm1(-k2 * ridge.hold_s**N), 1e-300))
         creep = U * ridge.log_tension + reached + np.log(k1) - ridge.log_length
         return creep, self._hazard(theta, ridge)
+
+
+def _spread(distribution: Any) -> float:
+    sd = float(distribution.std())
+    return sd if np.isfinite(sd) and sd > 0 else 1.0
 
 
 class Target:

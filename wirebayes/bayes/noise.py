@@ -110,12 +110,14 @@ def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance:
     holds, width, n = line.tension.shape
     jac = np.moveaxis(jacobian(line), -1, 0) * mask[None, :, :, None]
     residual = np.moveaxis(np.where(mask[..., None], readings - line.tension, 0.0), -1, 0)
-    flat = jac.reshape(n, holds * width, holds)
-    scaled = flat * setting_sd[:, None, None]
-    # Woodbury: V^-1 = (I - K (variance I + Kᵀ K)^-1 Kᵀ) / variance with K = setting J.
-    inner = np.linalg.inv(variance[:, None, None] * np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
+    # Woodbury: V^-1 = (I - K (I + Kᵀ K)^-1 Kᵀ) / variance with K = setting J / sd of a reading.
+    scaled = jac.reshape(n, holds * width, holds) * (setting_sd / np.sqrt(variance))[:, None, None]
+    usable = np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(residual).all(axis=(1, 2))
+    scaled, residual = np.where(usable[:, None, None], scaled, 0.0), np.where(usable[:, None, None], residual, 0.0)
+    inner = np.linalg.inv(np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
     r = residual.reshape(n, holds * width)
-    pulled = (r - np.einsum("nai,nij,nbj,nb->na", scaled, inner, scaled, r, optimize=True)) / variance[:, None]
+    along = np.einsum("nbj,nb->nj", scaled, r)
+    pulled = (r - np.einsum("nai,ni->na", scaled, np.einsum("nij,nj->ni", inner, along))) / variance[:, None]
     out = np.zeros((holds, n))
     for j in np.flatnonzero(mask.any(axis=1)):
         rows = j * width + np.flatnonzero(mask[j])
@@ -123,7 +125,8 @@ def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance:
         block = (np.eye(len(rows)) - k @ inner @ np.swapaxes(k, 1, 2)) / variance[:, None, None]
         q = pulled[:, rows]
         _, logdet = np.linalg.slogdet(block)
-        out[j] = -0.5 * (np.einsum("na,na->n", q, np.linalg.solve(block, q[..., None])[..., 0]) - logdet + len(rows) * _LOG_2PI)
+        square = np.einsum("na,na->n", q, np.linalg.solve(block, q[..., None])[..., 0])
+        out[j] = np.where(usable, -0.5 * (square - logdet + len(rows) * _LOG_2PI), -np.inf)
     return out
 
 

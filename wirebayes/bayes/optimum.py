@@ -14,6 +14,7 @@ from wirebayes.bayes.coordinates import Target
 
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
+_LEAST_CURVATURE = 0.3
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 
@@ -43,9 +44,13 @@ class Optimum:
 
     @property
     def log_evidence(self) -> Array:
-        """(n,) Laplace approximation of the log evidence of each mode."""
+        """(n,) Laplace approximation of the log evidence of each mode.
+
+        No direction counts as wider than the prior makes it (sampled coordinates are of order one under the prior).
+        """
         d = self.z.shape[1]
-        return self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(self.curvature)[1]
+        eigen = np.maximum(np.linalg.eigvalsh(self.curvature), _LEAST_CURVATURE)
+        return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
 
 
 def climb(density: Density, start: Array, *, iterations: int = 60, tolerance: float = 1e-5) -> Optimum:

@@ -1,0 +1,104 @@
+"""Samples of one material with the effects accepted so far: fitted, ready to be tested for one more effect."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.optimum import Optimum, climb, modes
+from wirebayes.bayes.problem import Problem, build
+from wirebayes.experiment import Experiment
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.laws import ElasticLaw, History
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Block:
+    """What shares parameters, fitted.
+
+    Attributes
+    ----------
+    experiments : tuple of Experiment
+        All of one material.
+    effects : tuple of Effect
+        Accepted so far.
+    law, history
+        See `wirebayes.wire.laws`.
+    target : Target
+    modes : Optimum
+        Distinct modes, best first.
+    """
+
+    experiments: tuple[Experiment, ...]
+    effects: tuple[Effect, ...]
+    law: ElasticLaw
+    history: History
+    target: Target
+    modes: Optimum
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(e.name for e in self.experiments)
+
+    @property
+    def log_evidence(self) -> float:
+        return float(self.modes.log_evidence.max())
+
+
+def fitted(
+    experiments: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History, rng: np.random.Generator
+) -> Block:
+    """Fit a block from many starts."""
+    target = Target(build(experiments, effects, law=law, history=history))
+    return Block(tuple(experiments), tuple(effects), law, history, target, modes(target, rng))
+
+
+class Pinned:
+    """The density of a block with one more effect, its amplitude pinned row by row; shape constants stay free.
+
+    Points lack the amplitude's column; what is left is climbed or integrated. The amplitude has a flat prior here:
+    the evidence puts its own on it, the same for every effect.
+    """
+
+    def __init__(self, block: Block, effect: Effect) -> None:
+        problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
+        self.column = _column(problem, effect)
+        free = problem.prior.distributions | {problem.names[self.column]: stats.uniform(-0.5e9, 1e9)}
+        self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
+        self.log_flat = float(np.log(self.target.coordinates.scale[self.column]) - np.log(1e9))
+        self._plain = block
+
+    def starts(self, best: int = 2) -> Array:
+        """(k, d) where the block's own best modes lie, shape constants at their prior medians."""
+        names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
+        known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
+        theta = np.empty((min(best, len(self._plain.modes.z)), len(names)))
+        natural = self._plain.target.coordinates.to_natural(self._plain.modes.z[: len(theta)])
+        for i, name in enumerate(names):
+            theta[:, i] = natural[:, known[name]] if name in known else self.target.problem.prior.distributions[name].median()
+        return self._drop(self.target.coordinates.to_sampled(np.insert(theta, self.column, 0.0, axis=1)))
+
+    def climb(self, start: Array, amplitude: Array) -> Optimum:
+        """Climb every row with its own amplitude."""
+
+        def density(points: Array, rows: Array) -> Array:
+            return self.target(self._insert(points, amplitude[rows])) - self.log_flat
+
+        return climb(density, start, iterations=40, tolerance=1e-3)
+
+    def _insert(self, z: Array, amplitude: Array) -> Array:
+        return np.insert(z, self.column, amplitude / self.target.coordinates.scale[self.column], axis=1)
+
+    def _drop(self, z: Array) -> Array:
+        return np.delete(z, self.column, axis=1)
+
+
+def _column(problem: Problem, effect: Effect) -> int:
+    main = effect.columns()[0]
+    return next(i for i, name in enumerate(problem.names) if name.split("[")[0] == main)

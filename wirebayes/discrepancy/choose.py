@@ -1,0 +1,108 @@
+"""From screened candidates to names: refit those that stand a chance, add up their evidence, weigh against unknown."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.discrepancy.block import Block
+from wirebayes.discrepancy.expansion import Probe, Scan
+from wirebayes.discrepancy.naming import Refit, probabilities, refit, smallest_set
+from wirebayes.discrepancy.screen import Candidate, flexible_log_bayes, log_bayes
+from wirebayes.wire.effect import Effect
+
+Array = NDArray[Any]
+UNKNOWN_WEIGHT = 1.0  # prior odds of *something unknown* to one named effect
+_MARGIN, _SHARE = 6.0, 0.4  # linear screening errs, and errs more for a large effect
+_MOST, _MOST_A_NAME = 20, 4
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Names and their evidence.
+
+    Attributes
+    ----------
+    log_bayes : dict
+        Of each name against no effect.
+    unknown : float
+        The same of the flexible reference.
+    winners : dict of name to list of Refit
+        Of its best form: one refit, or one a block.
+    shares : dict
+        Probabilities over names and *unknown*.
+    """
+
+    log_bayes: dict[str, float]
+    unknown: float
+    winners: dict[str, list[Refit]]
+    shares: dict[str, float]
+
+    @property
+    def best(self) -> str:
+        return max(self.shares, key=lambda name: self.shares[name])
+
+    @property
+    def set(self) -> list[str]:
+        return smallest_set(self.shares)
+
+    def amplitudes(self, name: str) -> dict[int, Refit]:
+        """Refit of a name by block."""
+        return {b: r for r in self.winners[name] for b in r.blocks}
+
+
+def choose(blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]) -> Choice:
+    """Evidence of every name, refitted where it matters."""
+    linear = [tuple(float(v[0]) for v in log_bayes(c, scans)) for c in candidates]
+    forms: dict[tuple[str, str, tuple[int, ...], bool], int] = {}
+    for i, c in enumerate(candidates):
+        effect = trials[c.probe].effect
+        form = (c.name, _variant(effect), c.blocks, c.shared)
+        if form not in forms or linear[i][0] > linear[forms[form]][0]:
+            forms[form] = i
+    ranked = sorted(forms.items(), key=lambda item: -linear[item[1]][0])
+    top = linear[ranked[0][1]][0]
+    refitted: dict[tuple[str, str, tuple[int, ...], bool], list[Refit]] = {}
+    for form, i in ranked:
+        of_name = sum(f[0] == form[0] for f in refitted)
+        if linear[i][0] < top - _MARGIN - _SHARE * max(top, 0.0) or len(refitted) >= _MOST or of_name >= _MOST_A_NAME:
+            continue
+        c = candidates[i]
+        effect = trials[c.probe].effect
+        if c.shared:
+            refitted[form] = [refit(blocks, c.blocks, effect, linear[i][2], linear[i][1])]
+        else:
+            alone = [Candidate(c.probe, c.name, (b,), True) for b in c.blocks]
+            parts = [log_bayes(a, scans) for a in alone]
+            refitted[form] = [refit(blocks, a.blocks, effect, float(p[2][0]), float(p[1][0])) for a, p in zip(alone, parts, strict=True)]
+    values: dict[str, dict[tuple[str, tuple[int, ...], bool], float]] = {}
+    for form, i in forms.items():
+        value = sum(r.log_bayes for r in refitted[form]) if form in refitted else linear[i][0]
+        values.setdefault(form[0], {})[form[1:]] = value
+    evidence = {name: _average(v, len(blocks)) for name, v in values.items()}
+    loose = flexible_log_bayes(scans)[:, 0]
+    unknown = float(loose[-1]) if len(blocks) == 1 else float(logsumexp([loose[-1] + np.log(0.5), *(loose[:-1] - np.log(2.0 * len(blocks)))]))
+    winners = {}
+    for name in evidence:
+        own = {form: r for form, r in refitted.items() if form[0] == name}
+        if own:
+            winners[name] = max(own.values(), key=lambda r: sum(x.log_bayes for x in r))
+    shares = probabilities({n: v for n, v in evidence.items() if n in winners}, unknown, UNKNOWN_WEIGHT)
+    return Choice(evidence, unknown, winners, shares)
+
+
+def _variant(effect: Effect) -> str:
+    return f"{effect.key}/{getattr(effect, 'test', '')}"
+
+
+def _average(values: dict[tuple[str, tuple[int, ...], bool], float], blocks: int) -> float:
+    """Log of the mean Bayes factor over an effect's forms: its variants equally, on all blocks as often as on one."""
+    variants = {key[0] for key in values}
+    logs = []
+    for (_, on, _), value in values.items():
+        weight = 1.0 if blocks == 1 or len(on) == blocks else 0.5 / blocks
+        logs.append(value + np.log(weight))
+    return float(logsumexp(logs) - np.log(len(variants)))

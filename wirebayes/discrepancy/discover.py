@@ -1,0 +1,351 @@
+"""Find the missing effect: nothing is missing, this is, one of these is, or something that is not in the catalogue.
+
+The order is: gross errors; fits; one global test calibrated by refitted simulations; names by refitted evidence beside
+a flexible reference; further effects by leave-one-hold-out; the gap on held-out holds; what could not have been seen.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes.fit import seed_of
+from wirebayes.discrepancy import choose, gap, gross, locate, power, screen
+from wirebayes.discrepancy.block import Block, fitted
+from wirebayes.discrepancy.choose import Choice
+from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
+from wirebayes.discrepancy.screen import Candidate, GlobalTest
+from wirebayes.effects import CATALOGUE
+from wirebayes.errors import InputError
+from wirebayes.experiment import Experiment
+from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.laws import ElasticLaw, History
+
+Array = NDArray[Any]
+ALPHA = 0.04
+KEEP_ELPD = 4.0
+_MOST_EFFECTS = 3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked.
+
+    Attributes
+    ----------
+    law, history
+        Of the plain model.
+    kinds : mapping of name to effect class
+        The catalogue searched.
+    simulations : int
+        Refitted data sets behind the p-value.
+    """
+
+    law: ElasticLaw = "hooke"
+    history: History = "saturating"
+    kinds: Mapping[str, type[Effect]] = None  # type: ignore[assignment]
+    simulations: int = 999
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What was found in a file.
+
+    Attributes
+    ----------
+    report : dict
+        The content of ``discovery.json``.
+    effects : dict of experiment name to tuple of Effect
+        Of each experiment's final model.
+    experiments : tuple of Experiment
+        As given, gross errors struck out.
+    """
+
+    report: dict[str, Any]
+    effects: dict[str, tuple[Effect, ...]]
+    experiments: tuple[Experiment, ...]
+
+
+def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = CATALOGUE) -> dict[str, type[Effect]]:
+    """The catalogue less some effects.
+
+    Raises
+    ------
+    InputError
+        If it has no such effect.
+    """
+    for name in names:
+        if name not in known:
+            raise InputError(f"--without {name}: no such effect; known are {', '.join(sorted(known))}")
+    return {name: kind for name, kind in known.items() if name not in names}
+
+
+def discover(experiments: Sequence[Experiment], *, without: Sequence[str] = (), seed: int = 0, **settings: Any) -> dict[str, Any]:
+    """The content of ``discovery.json`` for the experiments of one file (see `investigate`)."""
+    kinds = catalogue_without(without, settings.pop("kinds", CATALOGUE))
+    return investigate(experiments, Settings(kinds=kinds, **settings), seed).report
+
+
+def investigate(
+    experiments: Sequence[Experiment],
+    settings: Settings,
+    seed: int = 0,
+    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+) -> Findings:
+    """Judge the experiments of one file together.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    settings : Settings
+    seed : int
+    report : function of (what, done, total)
+        Told as the work goes on.
+
+    Returns
+    -------
+    Findings
+    """
+    rng = np.random.default_rng(seed_of(seed, "discover"))
+    groups: dict[str, list[Experiment]] = {}
+    for e in experiments:
+        groups.setdefault(e.material, []).append(e)
+    plain = [fitted(members, (), settings.law, settings.history, rng) for members in groups.values()]
+    trials, candidates = screen.candidate_probes(plain, settings.kinds)
+    if not candidates:
+        raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
+    struck: list[dict[str, Any]] = []
+    for i, block in enumerate(plain):
+        plain[i], gone = _strike_gross_errors(block, trials, candidates, i, settings, rng)
+        struck += gone
+    data, nulls, patterns, expansions = [], [], [], []
+    for i, block in enumerate(plain):
+        listed, columns = locate.patterns(block.target.problem)
+        x = expand(block.target, block.modes.z[:1], trials, columns=columns)
+        expansions.append(x)
+        data.append(scan(x))
+        nulls.append(screen.replicated(block, trials, settings.simulations, rng, columns))
+        patterns.append(listed)
+        report("simulations", i + 1, len(plain))
+    test = screen.global_test(candidates, data, nulls)
+    where = [
+        locate.findings(p, len(trials), d, n, ", ".join(b.names)) for p, d, n, b in zip(patterns, data, nulls, plain, strict=True)
+    ]
+    if test.p > ALPHA:
+        verdict, choice, accepted = "nothing-missing", None, []
+        final = plain
+    else:
+        report("naming", 0, 1)
+        choice = choose.choose(plain, trials, candidates, data)
+        verdict, accepted, final, choice = _decide(plain, choice, settings, rng)
+        report("naming", 1, 1)
+    ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
+    alike = power.similarity([_only(x, len(trials)) for x in expansions], trials, ratios)
+    out: dict[str, Any] = {}
+    effects: dict[str, tuple[Effect, ...]] = {}
+    for i, block in enumerate(plain):
+        report("held-out holds", i, len(plain))
+        affected = [a for a in accepted if i in a.blocks]
+        common = _common(verdict, choice, affected, plain, i, test, where[i], alike)
+        common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
+        checks = _held_out(block, final[i], verdict, choice, i, rng)
+        for e, check in zip(block.experiments, checks, strict=True):
+            effects[e.name] = final[i].effects
+            out[e.name] = common | {"held_out": check, "gross_errors": [g for g in struck if g["experiment"] == e.name]}
+    report("held-out holds", len(plain), len(plain))
+    return Findings({"version": 1, "experiments": out}, effects, tuple(e for b in plain for e in b.experiments))
+
+
+@dataclass(frozen=True)
+class _Accepted:
+    """An effect taken into the model."""
+
+    name: str
+    blocks: tuple[int, ...]
+    amplitudes: dict[int, dict[str, Any]]
+
+
+def _strike_gross_errors(
+    block: Block, trials: list[Probe], candidates: list[Candidate], i: int, settings: Settings, rng: np.random.Generator
+) -> tuple[Block, list[dict[str, Any]]]:
+    struck: list[dict[str, Any]] = []
+    most = max(1, int(gross.MOST * gross.readings_of(block.experiments)))
+    while len(struck) < most:
+        own = [c for c in candidates if i in c.blocks]
+        here = scan(expand(block.target, block.modes.z[:1], trials))
+        rival = max((float(here.effects[0, c.probe]) for c in own), default=0.0)
+        found = gross.suspect(block, max(rival, float(here.flexible[0])))
+        if found is None:
+            break
+        name, hold, reading, value = found
+        members = [gross.without(e, hold, reading) if e.name == name else e for e in block.experiments]
+        block = fitted(members, (), settings.law, settings.history, rng)
+        struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
+    return block, struck
+
+
+def _decide(
+    plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator
+) -> tuple[str, list[_Accepted], list[Block], Choice]:
+    """Verdict, accepted effects in order, final blocks, and the choice as revised by pairs of effects."""
+    if choice.best == "unknown":
+        choice = _try_pairs(plain, choice, settings, rng)
+    if choice.best == "unknown":
+        return "unknown", [], plain, choice
+    verdict = "named" if choice.set == [choice.best] else "ambiguous"
+    blocks, accepted = _add(plain, choice, choice.best, settings, rng)
+    done = [accepted]
+    while len(done) < _MOST_EFFECTS:
+        trials, candidates = screen.candidate_probes(blocks, settings.kinds)
+        if not candidates:
+            break
+        scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+        if max(float(screen.log_bayes(c, scans)[0][0]) for c in candidates) < KEEP_ELPD - 2.0:
+            break
+        further = choose.choose(blocks, trials, candidates, scans)
+        name = max(further.winners, key=lambda n: further.log_bayes[n])
+        if further.log_bayes[name] < 2.0:
+            break
+        more, extra = _add(blocks, further, name, settings, rng)
+        gain = sum(float((gap.leave_one_hold_out(m, rng) - gap.leave_one_hold_out(b, rng)).sum()) for i, (m, b) in enumerate(zip(more, blocks, strict=True)) if i in extra.blocks)
+        if gain <= KEEP_ELPD:
+            break
+        blocks, done = more, [*done, extra]
+    return verdict, done, blocks, choice
+
+
+def _try_pairs(plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator) -> Choice:
+    """Whether two named effects together explain what one cannot: then the first of them is named after all.
+
+    A pair has prior odds of a tenth to one effect, shared by all pairs.
+    """
+    names = sorted(choice.winners, key=lambda n: -choice.log_bayes[n])[:3]
+    odds = np.log(0.1) - np.log(max(len(choice.winners), 1))
+    evidence = dict(choice.log_bayes)
+    for name in names:
+        blocks, _ = _add(plain, choice, name, settings, rng)
+        trials, candidates = screen.candidate_probes(blocks, settings.kinds)
+        if not candidates:
+            continue
+        scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+        further = choose.choose(blocks, trials, candidates, scans)
+        if further.winners:
+            evidence[name] = float(np.logaddexp(evidence[name], evidence[name] + odds + max(further.log_bayes[n] for n in further.winners)))
+    shares = choose.probabilities({n: evidence[n] for n in choice.winners}, choice.unknown, choose.UNKNOWN_WEIGHT)
+    return replace(choice, log_bayes=evidence, shares=shares)
+
+
+def _add(blocks: list[Block], choice: Choice, name: str, settings: Settings, rng: np.random.Generator) -> tuple[list[Block], _Accepted]:
+    """The blocks refitted with a name's best form."""
+    out, amplitudes = list(blocks), {}
+    for b, r in choice.amplitudes(name).items():
+        main = r.effect.amplitudes[0]
+        hold = r.effect.hold if isinstance(r.effect, EventEffect) else None
+        amplitudes[b] = {"mean": r.amplitude, "q05": r.amplitude - 1.645 * r.sd, "q95": r.amplitude + 1.645 * r.sd, "unit": main.unit, "hold": hold}
+        out[b] = fitted(blocks[b].experiments, (*blocks[b].effects, r.effect), settings.law, settings.history, rng)
+    return out, _Accepted(name, tuple(amplitudes), amplitudes)
+
+
+def _common(
+    verdict: str, choice: Choice | None, affected: list[_Accepted], plain: list[Block], i: int, test: GlobalTest,
+    where: list[dict[str, Any]], alike: dict[tuple[str, str], float],
+) -> dict[str, Any]:  # fmt: skip
+    """What the experiments of one block share in the report."""
+    names = [a.name for a in affected]
+    if choice is None or (verdict != "unknown" and not names):
+        verdict, members, shares, best = "nothing-missing", [], {}, None
+    else:
+        shares, best = choice.shares, choice.best
+        members = choice.set
+    named = [m for m in members if m != "unknown"]
+    shared = [n for a in affected for b in a.blocks if b != i for n in plain[b].names]
+    return {
+        "verdict": verdict,
+        "effects": names if verdict == "named" else named if verdict == "ambiguous" else [],
+        "best": best,
+        "set": members,
+        "group": (power.group_of(named, alike) if named else []) + (["unknown"] if "unknown" in members else []),
+        "accepted": names,
+        "amplitudes": {a.name: a.amplitudes[i] for a in affected},
+        "probabilities": shares,
+        "p_global": test.p,
+        "shared_with": list(dict.fromkeys(shared)),
+        "where": where,
+    }
+
+
+def _outlook(
+    block: Block, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest, settings: Settings,
+    choice: Choice | None, verdict: str, alike: dict[tuple[str, str], float],
+) -> dict[str, Any]:  # fmt: skip
+    """What could have been seen, what cannot be, and what to measure next."""
+    threshold = test.threshold(ALPHA)
+    seen: dict[str, dict[str, Any]] = {}
+    best_probe: dict[str, Probe] = {}
+    for c in candidates:
+        if i not in c.blocks:
+            continue
+        probe = trials[c.probe]
+        amplitude = power.amplitude_80(null, probe, c.probe, threshold)
+        main = probe.effect.amplitudes[0]
+        known = seen.get(c.name)
+        if amplitude is not None and (known is None or known["amplitude_80"] is None or amplitude < known["amplitude_80"]):
+            seen[c.name] = {"amplitude_80": amplitude, "unit": main.unit}
+            best_probe[c.name] = probe
+        elif known is None:
+            seen[c.name] = {"amplitude_80": None, "unit": main.unit}
+    possible = [c.name for c in candidates if i in c.blocks]
+    hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
+    pair, weakest = None, None
+    if choice is not None and verdict in ("ambiguous", "named"):
+        rivals = [n for n in sorted(choice.winners, key=lambda n: -choice.shares.get(n, 0.0)) if n in best_probe]
+        group = [n for n in rivals if n == rivals[0] or alike.get((rivals[0], n), 0.0) > power.ALIKE]
+        rivals = [n for n in rivals if n in choice.set or n in group]
+        if len(rivals) > 1:
+            pair = (best_probe[rivals[0]], best_probe[rivals[1]])
+        elif rivals:
+            weakest = best_probe[rivals[0]]
+    if pair is None and weakest is None and best_probe:
+        # Relative to what a person expects before the test, which effect was hidden best?
+        def hiddenness(name: str) -> float:
+            return float(seen[name]["amplitude_80"] / best_probe[name].effect.amplitudes[0].prior.std())
+
+        weakest = best_probe[max(best_probe, key=hiddenness)]
+    return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
+
+
+def _held_out(block: Block, final: Block, verdict: str, choice: Choice | None, i: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Plain and final model on the last third of the holds, and by leaving out one hold at a time."""
+    train = [gap.last_third(e) for e in block.experiments]
+    if not all(train):
+        nothing: dict[str, Any] = {"rmse_N": None, "elpd": None}
+        return [{"holds": [], "plain": nothing, "final": nothing | {"elpd_difference_se": None}, "gap_closed": None, "shrinks": False} for _ in block.experiments]
+    plain = gap.held_out(block.experiments, train, (), block, rng)
+    better = plain if not final.effects else gap.held_out(block.experiments, train, final.effects, block, rng)
+    shrinks, loho = False, None
+    if final.effects:
+        difference = gap.leave_one_hold_out(final, rng) - gap.leave_one_hold_out(block, rng)
+        se = float(difference.std(ddof=1) * np.sqrt(len(difference)))
+        loho = {"elpd_difference": float(difference.sum()), "elpd_difference_se": se}
+        shrinks = bool(difference.sum() > KEEP_ELPD and difference.sum() > 2 * se)
+    out = []
+    for a, b in zip(plain, better, strict=True):
+        d = b.elpd - a.elpd
+        out.append({
+            "holds": a.holds,
+            "plain": {"rmse_N": a.rmse_N, "elpd": float(a.elpd.sum()), "coverage_90": a.inside},
+            "final": {"rmse_N": b.rmse_N, "elpd": float(b.elpd.sum()), "coverage_90": b.inside,
+                      "elpd_difference_se": float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None},
+            "floor_N": float(np.sqrt(b.floor)),
+            "gap_closed": gap.gap_closed(a, b) if final.effects else None,
+            "leave_one_hold_out": loho,
+            "shrinks": shrinks,
+        })  # fmt: skip
+    return out
+
+
+def _only(x: Expansion, m: int) -> Expansion:
+    """The expansion with its first m signatures."""
+    return replace(x, signatures=x.signatures[..., :m], one_sided=x.one_sided[:m])

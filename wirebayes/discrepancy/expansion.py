@@ -1,0 +1,358 @@
+"""A fitted plain model made linear: residuals, what the parameters can absorb, and what each effect would add.
+
+Everything later rests on inner products in the metric ``V0(ρ) = I + ρ K Kᵀ`` of readings divided by their standard
+deviation: K is the derivative by the setting errors, ρ their unknown size against the sensor's error. The overall
+scale of the noise is integrated out, ρ is summed over a grid, so no test trusts the noise of a model that may be wrong.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.bayes import noise
+from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.problem import Problem
+from wirebayes.discrepancy import flexible
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.staircase import Model, linearise, simulate
+
+Array = NDArray[Any]
+RATIOS = np.logspace(-2.0, 6.0, 13)
+SIZES = np.array([4.0, 8.0, 16.0, 32.0])
+_NOISE = ("sensor_sd", "setting_sd")
+
+
+@dataclass(frozen=True)
+class Probe:
+    """An effect at a finite amplitude: what it would add to the readings is its signature.
+
+    Attributes
+    ----------
+    effect : Effect
+    own : dict
+        Its amplitudes by column name, shape constants included.
+    step : float
+        The amplitude's distance from neutral, by which the signature is divided.
+    one_sided : bool
+        True where only amplitudes above neutral have a meaning.
+    """
+
+    effect: Effect
+    own: dict[str, float]
+    step: float
+    one_sided: bool
+
+
+def probes(effect: Effect) -> list[Probe]:
+    """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it is one-sided."""
+    main, *shapes = zip(effect.columns(), effect.amplitudes, strict=True)
+    column, amplitude = main
+    low, high = amplitude.prior.support()
+    scale = float(amplitude.prior.std())
+    one_sided = bool(low >= amplitude.neutral)
+    steps = [0.1 * scale] if not one_sided else [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
+    steps = [s for s in steps if amplitude.neutral + s <= high] or [0.5 * (high - amplitude.neutral)]
+    forms: list[dict[str, float]] = [{}]
+    for name, shape in shapes:
+        forms = [f | {name: float(v)} for f in forms for v in shape.prior.ppf([0.1, 0.5, 0.9])]
+    return [Probe(effect, form | {column: amplitude.neutral + s}, s, one_sided) for form in forms for s in steps]
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """Linear pieces of a block of samples at n parameter sets, rows scaled by each sample's reading error.
+
+    Attributes
+    ----------
+    residual : (n, N)
+    parameters : (n, N, p)
+        Derivatives by the sampled coordinates that move the mean.
+    signatures : (n, N, m)
+        What each probe adds, per unit amplitude.
+    flexible : (n, N, q)
+    left, singular : (n, N, H), (n, H)
+        Left singular vectors and values of K.
+    one_sided : (m,) bool
+    ratio : (n,)
+        The fitted ρ.
+    prior_gradient, prior_precision : (n, p), (n, p, p)
+    floor : float
+        Rounding's share of the scaled variance: noise cannot be smaller.
+    """
+
+    residual: Array
+    parameters: Array
+    signatures: Array
+    one_sided: Array
+    flexible: Array
+    left: Array
+    singular: Array
+    ratio: Array
+    prior_gradient: Array
+    prior_precision: Array
+    floor: Array
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Log Bayes factors against the plain model, and the geometry behind them.
+
+    Attributes
+    ----------
+    effects : (n, m)
+        Of each probe, its amplitude at its best.
+    flexible : (n,)
+        Of the flexible reference, its size summed over `SIZES`.
+    amplitude : (n, m)
+        Best amplitude (distance from neutral).
+    norm : (n, m)
+        Length of the projected signature per unit amplitude, at the most probable noise: δ per amplitude.
+    pieces : Pieces
+    """
+
+    effects: Array
+    flexible: Array
+    amplitude: Array
+    norm: Array
+    pieces: "Pieces"
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``.
+
+    Attributes
+    ----------
+    shared, rss : (k, n)
+    along, square : (k, n, m)
+        Inner product of projected signature and residual, and the signature with itself.
+    degrees : int
+    least : (n,)
+    one_sided : (m,) bool
+    """
+
+    shared: Array
+    rss: Array
+    along: Array
+    square: Array
+    degrees: int
+    least: Array
+    one_sided: Array
+
+    def log_bayes(self, added: Array, which: int) -> Array:
+        """(n,) of probe `which` had its amplitude `added` (n,) been in the data besides."""
+        c = np.where(np.isfinite(self.square[..., which]), self.square[..., which], 0.0)
+        rss = self.rss + 2.0 * added * self.along[..., which] + added**2 * c
+        b = self.along[..., which] + added * c
+        b = np.where(self.one_sided[which], np.maximum(b, 0.0), b)
+        left = rss - b**2 / np.where(c > 0, c, np.inf)
+        half = -0.5 * self.degrees
+        with_it = self.shared + half * np.log(np.maximum(left, self.least))
+        without = self.shared + half * np.log(np.maximum(rss, self.least))
+        return np.asarray(logsumexp(with_it, axis=0) - logsumexp(without, axis=0))
+
+
+def joined(scans: Sequence[Scan]) -> Scan:
+    """Scans of consecutive rows as one."""
+    first = scans[0].pieces
+    pieces = Pieces(
+        *(np.concatenate([getattr(s.pieces, k) for s in scans], axis=1) for k in ("shared", "rss", "along", "square")),
+        first.degrees, np.concatenate([s.pieces.least for s in scans]), first.one_sided,
+    )  # fmt: skip
+    return Scan(*(np.concatenate([getattr(s, k) for s in scans]) for k in ("effects", "flexible", "amplitude", "norm")), pieces)
+
+
+def expand(
+    target: Target,
+    z: Array,
+    trials: Sequence[Probe],
+    readings: Sequence[Array] | None = None,
+    columns: Callable[[Problem, int, Array, Array], Array] | None = None,
+) -> Expansion:
+    """Linearise a block at the rows of `z` (n, d), for its readings or for replicates (H, R, n) row by row.
+
+    `columns` adds further signatures behind the probes': given the problem, the sample's number, the tension
+    (H, R, n) and its derivatives (H, R, n, p), it returns (H, R, n, more), N.
+    """
+    problem = target.problem
+    n = len(z)
+    moving = [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
+    theta = target.coordinates.to_natural(z)
+    steps = []
+    for i in moving:
+        shifted = z.copy()
+        shifted[:, i] += _STEP
+        steps.append(target.coordinates.to_natural(shifted))
+    parts: dict[str, list[Array]] = {key: [] for key in ("r", "a", "s", "f", "k", "floor")}
+    for at, sample in enumerate(problem.samples):
+        protocol, mask = sample.protocol, sample.protocol.mask
+        own = problem.parameters(theta, sample)
+        sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
+        line = linearise(protocol, own, sample.model)
+        y = sample.readings if readings is None else readings[at]
+
+        def rows(values: Array, mask: Array = mask, sd: Array = sd) -> Array:
+            """(H, R, n) to (n, N) in units of the reading error."""
+            return np.asarray((values[mask] / sd).T)
+
+        mean = line.tension
+        parts["r"].append(rows(y - mean))
+        both = np.concatenate([theta, *steps])
+        moved = simulate(protocol, problem.parameters(both, sample), sample.model)
+        moved = moved.reshape(*moved.shape[:2], len(moving) + 1, n)
+        slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
+        parts["a"].append(np.stack([rows(slopes[..., i]) for i in range(len(moving))], axis=-1))
+        added = [rows(signature(problem, own, sample.model, at, probe) / probe.step) for probe in trials]
+        if columns is not None:
+            more = columns(problem, at, mean, slopes)
+            added += [rows(more[..., i]) for i in range(more.shape[-1])]
+        parts["s"].append(np.stack(added, axis=-1) if added else np.zeros((n, int(mask.sum()), 0)))
+        functions = flexible.basis(protocol, 1.0)[mask]
+        parts["f"].append(functions[None] / sd[:, None, None])
+        jac = noise.jacobian(line)[mask]
+        parts["k"].append(np.moveaxis(jac / sd * (own["setting_sd"] / sd), -1, 0))
+        parts["floor"].append(np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2)
+    k = _block_diagonal(parts["k"])
+    # K's size is what ρ measures: give it a typical column of length one.
+    ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
+    k = k / np.sqrt(ratio)[:, None, None]
+    left, singular, _ = np.linalg.svd(k, full_matrices=False)
+    gradient, precision = _prior(target, z, moving)
+    return Expansion(
+        np.concatenate(parts["r"], axis=1), np.concatenate(parts["a"], axis=1), np.concatenate(parts["s"], axis=1),
+        np.array([i < len(trials) and trials[i].one_sided for i in range(parts["s"][0].shape[-1])], bool),
+        _block_diagonal(parts["f"]) if len(parts["f"]) > 1 else parts["f"][0], left, singular, ratio, gradient, precision,
+        np.min(parts["floor"], axis=0),
+    )  # fmt: skip
+
+
+def signature(problem: Problem, own: dict[str, Array], model: Model, at: int, probe: Probe) -> Array:
+    """(H, R, n) what a probe adds to the readings of sample `at`."""
+    sample = problem.samples[at]
+    effect = probe.effect
+    if getattr(effect, "test", "") not in ("", sample.name):
+        return np.zeros((*sample.protocol.time_s.shape, len(own["k1"])))
+    full = own | {name: np.full(len(own["k1"]), value) for name, value in probe.own.items()}
+    more = Model(model.law, model.history, (*model.effects, effect), model.tension_ref_N, model.length_ref_mm)
+    with np.errstate(all="ignore"):
+        added = simulate(sample.protocol, full, more) - simulate(sample.protocol, own, model)
+    return np.where(np.isfinite(added), added, 0.0)
+
+
+def scan(x: Expansion) -> Scan:
+    """Log Bayes factors of every probe and of the flexible reference."""
+    n, rows, p = x.parameters.shape
+    m = x.signatures.shape[2]
+    degrees = rows - p
+    columns = np.concatenate([x.parameters, x.signatures, x.flexible, x.residual[..., None]], axis=2)
+    levels = np.swapaxes(x.left, 1, 2) @ columns
+    plain_product = np.swapaxes(x.parameters, 1, 2) @ columns
+    functions = slice(p + m, p + m + x.flexible.shape[2])
+    square = (columns[..., p : p + m] ** 2).sum(axis=1)
+    mr0 = np.einsum("nam,na->nm", x.signatures, x.residual)
+    rr0 = (x.residual**2).sum(axis=1)
+    ff0 = np.swapaxes(x.flexible, 1, 2) @ x.flexible
+    fr0 = np.einsum("naf,na->nf", x.flexible, x.residual)
+    plain, effects, loose, amplitude, norm = [], [], [], [], []
+    kept: dict[str, list[Array]] = {"shared": [], "rss": [], "along": [], "square": []}
+    for ratio in RATIOS:
+        with np.errstate(over="ignore"):
+            damp = ratio * x.singular**2 / (1.0 + ratio * x.singular**2)
+        weighted = damp[..., None] * levels
+        gram = plain_product - np.swapaxes(levels[..., :p], 1, 2) @ weighted
+        pp = gram[..., :p] + x.prior_precision
+        pr = gram[..., -1] + x.prior_gradient
+        pm, pf = gram[..., p : p + m], gram[..., functions]
+        mm = square - (levels[..., p : p + m] * weighted[..., p : p + m]).sum(axis=1)
+        mr = mr0 - (levels[..., p : p + m] * weighted[..., -1:]).sum(axis=1)
+        rr = rr0 - (levels[..., -1] * weighted[..., -1]).sum(axis=1)
+        solved = np.linalg.solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
+        sr, sm, sf = solved[..., 0], solved[..., 1 : m + 1], solved[..., m + 1 :]
+        rss = rr - (pr * sr).sum(axis=1) + np.einsum(
+            "np,np->n", x.prior_gradient, np.linalg.solve(x.prior_precision, x.prior_gradient[..., None])[..., 0]
+        )
+        least = degrees * x.floor
+        b = mr - np.einsum("npm,np->nm", pm, sr)
+        c = mm - (pm * sm).sum(axis=1)
+        c = np.where(c > _ABSORBED * square, c, np.inf)
+        shared = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
+        for key, piece in (("shared", shared), ("rss", rss), ("along", b), ("square", c)):
+            kept[key].append(piece)
+        b = np.where(x.one_sided, np.maximum(b, 0.0), b)
+        plain.append(shared - 0.5 * degrees * np.log(np.maximum(rss, least)))
+        effects.append(shared[:, None] - 0.5 * degrees * np.log(np.maximum(rss[:, None] - b**2 / c, least[:, None])))
+        amplitude.append(b / c)
+        norm.append(np.sqrt(np.where(np.isfinite(c), c, 0.0) * degrees / np.maximum(rss[:, None] - b**2 / c, least[:, None])))
+        ff = ff0 - np.swapaxes(levels[..., functions], 1, 2) @ weighted[..., functions] - np.swapaxes(pf, 1, 2) @ sf
+        fr = fr0 - np.einsum("nhf,nh->nf", levels[..., functions], weighted[..., -1]) - np.einsum("npf,np->nf", pf, sr)
+        values, vectors = np.linalg.eigh(ff)
+        values = np.maximum(values, 0.0)
+        along = np.einsum("nfg,nf->ng", vectors, fr) ** 2
+        variance = np.maximum(rss, least) / degrees
+        for size in SIZES:
+            s2 = (size**2 * variance / np.maximum(values.sum(axis=1), 1e-300))[:, None] / variance[:, None]
+            # The process is measured in units of the noise that is left beside it.
+            left = np.maximum(rss - (along * s2 / (1.0 + s2 * values)).sum(axis=1), least)
+            loose.append(shared - 0.5 * np.log1p(s2 * values).sum(axis=1) - 0.5 * degrees * np.log(left))
+    reference = logsumexp(plain, axis=0)
+    best = np.argmax(effects, axis=0)
+    return Scan(
+        logsumexp(effects, axis=0) - reference[:, None],
+        logsumexp(loose, axis=0) - np.log(len(SIZES)) - reference,
+        np.take_along_axis(np.array(amplitude), best[None], axis=0)[0],
+        np.take_along_axis(np.array(norm), best[None], axis=0)[0],
+        Pieces(*(np.array(kept[k]) for k in ("shared", "rss", "along", "square")), degrees, degrees * x.floor, x.one_sided),
+    )
+
+
+def projected(x: Expansion, ratio: float) -> Array:
+    """(N, m) signatures of the first row, whitened at a noise ratio, free of what the parameters absorb."""
+    def whiten(columns: Array) -> Array:
+        shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
+        return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
+
+    basis, _ = np.linalg.qr(whiten(x.parameters[0]))
+    signatures = whiten(x.signatures[0])
+    return np.asarray(signatures - basis @ (basis.T @ signatures))
+
+
+def _prior(target: Target, z: Array, moving: list[int]) -> tuple[Array, Array]:
+    """Gradient and (diagonal, positive) precision of the prior in the sampled coordinates that move the mean."""
+    h = 1e-3
+
+    def density(points: Array) -> Array:
+        theta = target.coordinates.to_natural(points)
+        return target.log_prior(theta) + target.coordinates.log_jacobian(theta)
+
+    # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
+    centre = density(z)
+    gradient, precision = np.zeros((len(z), len(moving))), np.zeros((len(z), len(moving), len(moving)))
+    for a, i in enumerate(moving):
+        up, down = z.copy(), z.copy()
+        up[:, i] += h
+        down[:, i] -= h
+        plus, minus = density(up), density(down)
+        inside = np.isfinite(plus) & np.isfinite(minus)
+        with np.errstate(invalid="ignore"):
+            gradient[:, a] = np.where(inside, (plus - minus) / (2 * h), 0.0)
+            precision[:, a, a] = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
+    return gradient, precision
+
+
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Batched (n, rows, columns) blocks along a diagonal."""
+    n = max(b.shape[0] for b in blocks)
+    out = np.zeros((n, sum(b.shape[1] for b in blocks), sum(b.shape[2] for b in blocks)))
+    row = column = 0
+    for b in blocks:
+        out[:, row : row + b.shape[1], column : column + b.shape[2]] = b
+        row, column = row + b.shape[1], column + b.shape[2]
+    return out
+
+
+_STEP = 1e-5
+_ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

@@ -1,0 +1,127 @@
+"""Where simulation and measurement disagree: residual patterns along what was varied, each with a simulated p-value."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes.problem import Problem
+from wirebayes.discrepancy.expansion import Scan
+
+Array = NDArray[Any]
+_PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """One column of the search.
+
+    Attributes
+    ----------
+    covariate : str
+    hold : int or None
+        The hold it belongs to, where it is one.
+    moves : str or None
+        The parameter that would move with the covariate.
+    """
+
+    covariate: str
+    hold: int | None = None
+    moves: str | None = None
+
+
+def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, Array, Array], Array]]:
+    """The patterns to look for in a block, and the function that makes their columns.
+
+    Along each covariate: smooth functions of it as an added tension, and the model's own parameters moving with it.
+    """
+    covariates = _covariates(problem)
+    moving = [n.split("[")[0] for n in problem.names if n.split("[")[0] not in ("sensor_sd", "setting_sd")]
+    listed: list[Pattern] = []
+    for name, _, degrees in covariates:
+        listed += [Pattern(name)] * degrees
+    for name in ("displacement", "elapsed time"):
+        if any(c[0] == name for c in covariates):
+            listed += [Pattern(name, moves=p) for p in _PARAMETERS if p in moving]
+    holds = [(at, int(n), j) for at, s in enumerate(problem.samples) for j, n in enumerate(s.protocol.number) if s.protocol.recorded[j]]
+    listed += [Pattern("hold", hold=n) for _, n, _ in holds]
+
+    def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
+        n = tension.shape[2]
+        out: list[Array] = []
+        by_name = {}
+        for name, values, degrees in covariates:
+            x = values[at]
+            by_name[name] = x
+            out += [np.broadcast_to((x**d)[..., None], tension.shape) for d in range(1, degrees + 1)]
+        for name in ("displacement", "elapsed time"):
+            if name in by_name:
+                out += [slopes[..., moving.index(p)] * by_name[name][..., None] for p in _PARAMETERS if p in moving]
+        for sample, _, j in holds:
+            one = np.zeros(tension.shape)
+            if sample == at:
+                one[j] = 1.0
+            out.append(one)
+        return np.stack(out, axis=-1).reshape(*tension.shape[:2], n, -1)
+
+    return listed, columns
+
+
+def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
+    """Name, values (H, R) for each sample scaled to about one, and the highest power."""
+    samples = problem.samples
+    out: list[tuple[str, list[Array], int]] = []
+
+    def add(name: str, values: list[Array], degrees: int) -> None:
+        everything = np.concatenate([v[s.protocol.mask] for v, s in zip(values, samples, strict=True)])
+        middle, spread = everything.mean(), everything.std()
+        if spread > 1e-9 * (1.0 + abs(middle)):
+            out.append((name, [(v - middle) / spread for v in values], degrees))
+
+    shape = [s.protocol.time_s.shape for s in samples]
+    add("displacement", [np.broadcast_to(s.protocol.displacement_mm[:, None], h) for s, h in zip(samples, shape, strict=True)], 3)
+    add("time in hold", [np.log1p(s.protocol.time_s / max(0.1 * s.typical_hold_s, 1e-9)) for s in samples], 3)
+    add("elapsed time", [s.protocol.start_s[:, None] + s.protocol.time_s for s in samples], 3)
+    add("tension", [s.readings[..., 0] for s in samples], 3)
+    directions = [np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0)) for s in samples]
+    add("direction", [np.broadcast_to(d[:, None], h) for d, h in zip(directions, shape, strict=True)], 1)
+    add("temperature", [np.zeros(h) if s.protocol.warming_K is None else s.protocol.warming_K for s, h in zip(samples, shape, strict=True)], 2)
+    add("length", [np.full(h, s.protocol.length_mm) for s, h in zip(samples, shape, strict=True)], 1)
+    return out
+
+
+def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names: str) -> list[dict[str, Any]]:
+    """The covariates along which the data disagree, most improbable first.
+
+    Parameters
+    ----------
+    listed : sequence of Pattern
+    skip : int
+        Columns before the patterns' (the probes').
+    data, null : Scan
+    names : str
+        The experiments, for the sentence.
+    """
+    out = []
+    for covariate in dict.fromkeys(p.covariate for p in listed):
+        columns = [skip + i for i, p in enumerate(listed) if p.covariate == covariate]
+        here, chance = data.effects[0, columns], null.effects[:, columns].max(axis=1)
+        p = float((1 + (chance >= here.max()).sum()) / (1 + len(chance)))
+        best = columns[int(np.argmax(here))]
+        pattern = listed[best - skip]
+        out.append({"covariate": covariate, "hold": pattern.hold, "p": p, "sentence": _sentence(pattern, float(data.amplitude[0, best]), p, names)})
+    return sorted(out, key=lambda item: item["p"])
+
+
+def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
+    chance = f"p = {p:.3f}"
+    if p > 0.05:
+        return f"{names}: the residuals show no pattern along the {pattern.covariate} ({chance})."
+    if pattern.hold is not None:
+        return f"{names}: hold {pattern.hold} lies {abs(amplitude):.3g} N {'above' if amplitude > 0 else 'below'} what the others predict ({chance})."
+    if pattern.moves is not None:
+        way = "rise" if amplitude > 0 else "fall"
+        return f"{names}: {_PARAMETERS[pattern.moves]} wants to {way} with the {pattern.covariate}, by a factor of {np.exp(np.clip(2 * abs(amplitude), 0, 20)):.3g} over two standard deviations of it ({chance})."
+    return f"{names}: the readings depart from the plain model along the {pattern.covariate} ({chance})."

@@ -1,0 +1,190 @@
+"""What could have been seen: detectable amplitudes, look-alikes, what this protocol hides, and what to measure next."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.problem import with_protocols
+from wirebayes.discrepancy.block import Block
+from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, projected
+from wirebayes.discrepancy.naming import LARGEST
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.protocol import Protocol
+
+Array = NDArray[Any]
+ALIKE = 0.95
+
+
+def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
+    """Amplitude of a probe that passes the global test's threshold in 80 % of simulations; None beyond δ of `LARGEST`."""
+    norm = float(np.median(null.norm[:, i]))
+    if norm <= 0:
+        return None
+    occam = 0.5 * np.log(2 * np.pi) - np.log(LARGEST * (1 if probe.one_sided else 2))
+    low, high = 0.0, LARGEST / norm
+    n = null.effects.shape[0]
+    if np.mean(null.pieces.log_bayes(np.full(n, high), i) + occam > threshold) < 0.8:
+        return None
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        seen = np.mean(null.pieces.log_bayes(np.full(n, middle), i) + occam > threshold)
+        low, high = (middle, high) if seen < 0.8 else (low, middle)
+    return high
+
+
+def similarity(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> dict[tuple[str, str], float]:
+    """Largest |cos| between the projected signatures of any two effects, over their forms, at a noise ratio a block.
+
+    An effect with one amplitude a block may put any size on each, so it is as alike as the best sizes make it.
+    """
+    parts = [projected(x, r) for x, r in zip(expansions, ratios, strict=True)]
+    lengths = np.array([(p**2).sum(axis=0) for p in parts])
+    products = np.array([p.T @ p for p in parts])
+    names = [t.effect.name for t in trials]
+    material = np.array([t.effect.scope == "material" for t in trials]) & (len(expansions) > 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        together = products.sum(axis=0) ** 2 / (lengths.sum(axis=0)[:, None] * lengths.sum(axis=0)[None])
+        loose = (products**2 / lengths[:, None, :]).sum(axis=0) / lengths.sum(axis=0)[:, None]
+    square = np.nan_to_num(np.where(material[None, :], loose, together))
+    square = np.maximum(square, square.T)
+    out: dict[tuple[str, str], float] = {}
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            out[a, b] = max(out.get((a, b), 0.0), float(np.sqrt(min(square[i, j], 1.0))))
+    return out
+
+
+def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> list[str]:
+    """The members and every effect whose signature is as good as one of theirs."""
+    names = dict.fromkeys([*members, *(b for (a, b), cos in alike.items() if a in members and cos > ALIKE)])
+    return list(names)
+
+
+class _SensorGain(Effect):
+    name, place, scope = "gain of the force sensor", "reading", "instrument"
+    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The force sensor's gain is off."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value * (1.0 + own["a"])
+
+
+class _ForceOffset(Effect):
+    name, place, scope = "constant force offset", "reading", "instrument"
+    amplitudes = (Amplitude("a", "N", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The force sensor's zero is off."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value + own["a"]
+
+
+class _DisplacementScale(Effect):
+    name, place, scope = "scale of the displacement", "position", "instrument"
+    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The displacement's scale is off."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value + own["a"] * hold.displacement_mm
+
+
+class _Compliance(Effect):
+    name, place, scope = "compliance of the fixture", "strain", "instrument"
+    amplitudes = (Amplitude("c", "mm/N", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The bench gives way."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value / (1.0 + own["c"] * hold.theta["k1"] / hold.length_mm)
+
+
+_ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _DisplacementScale, _Compliance)
+
+
+def not_identifiable(block: Block, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
+    """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show."""
+    trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in _ABSORBABLE]
+    x = expand(block.target, block.modes.z[:1], trials)
+    whole = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
+    left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
+    out = [
+        f"{t.effect.name}: {100 * (1 - l / w):.1f} % of it is taken up by the model's own parameters"
+        for t, w, l in zip(trials, whole, left, strict=True)
+        if l < 0.1 * w
+    ]
+    return out + [f"{kind.name}: this protocol cannot show it ({kind.shows})" for kind in kinds if kind.name not in possible]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """A measurement one could make next, in words and as holds."""
+
+    words: str
+    protocol: Protocol
+
+
+def _plans(p: Protocol) -> list[_Plan]:
+    recorded = p.recorded
+    x = p.displacement_mm[recorded]
+    down = x[-2::-1] if len(x) > 1 else x
+    log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
+
+    def holds(displacement: Array, times: Array, length: float, warming: bool = False) -> Protocol:
+        h = len(displacement)
+        time = np.tile(times, (h, 1))
+        start = np.concatenate([[0.0], np.cumsum(np.full(h, times[-1]))[:-1]])
+        # A slow swing of the room, three degrees up and down again.
+        warm = 3.0 * np.sin(2 * np.pi * (start[:, None] + time) / max(start[-1] + times[-1], 1.0)) if warming else None
+        return Protocol(length, displacement, time, np.ones(time.shape, bool), np.full(h, times[-1]), np.arange(1, h + 1), warm)
+
+    times = p.time_s[int(np.argmax(p.mask.sum(axis=1)))][: int(p.mask.sum(axis=1).max())]
+    span = f"{x.min():g} to {x.max():g} mm"
+    return [
+        _Plan(f"unload the wire after the last hold: the same displacements back from {x.max():g} to {x.min():g} mm, each held {times[-1]:g} s", holds(np.concatenate([x, down]), times, p.length_mm)),
+        _Plan(f"hold each of the displacements {span} for 600 s with 25 readings spaced evenly in the logarithm of time", holds(x, log_times, p.length_mm)),
+        _Plan(f"load and unload over {span} with holds of 600 s and 25 readings spaced evenly in the logarithm of time", holds(np.concatenate([x, down]), log_times, p.length_mm)),
+        _Plan(f"take twice as many, half as large steps over {span}", holds(np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)])), times, p.length_mm)),
+        _Plan(f"repeat the test at a second length, {2 * p.length_mm:g} mm, with steps scaled alike", holds(2 * x, times, 2 * p.length_mm)),
+    ]  # fmt: skip
+
+
+def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
+    """The plan that tells two candidates apart best, or shows the least visible effect best, by projected signatures."""
+    problem = block.target.problem
+    first = problem.samples[0]
+    trials = list(pair) if pair else [weakest] if weakest else []
+    if not trials:
+        return "No candidate remains; more of the same holds would narrow the parameters."
+    scored = []
+    here = _separation(block.target, block, trials)
+    for plan in _plans(first.protocol):
+        empty = np.zeros((*plan.protocol.time_s.shape, 1))
+        other = with_protocols(replace(problem, samples=(first,)), [plan.protocol], [empty])
+        scored.append((_separation(replace_problem(block.target, other), block, trials), plan.words))
+    best, words = max(scored)
+    ratio = best / here if here > 0 else np.inf
+    gain = f"{ratio:.1f} times as far apart as now" if np.isfinite(ratio) and ratio < 1e3 else "apart, which they are not now"
+    if pair:
+        return f"To tell {trials[0].effect.name} from {trials[1].effect.name}: {words}. They would lie {gain}."
+    return f"To see a smaller {trials[0].effect.name}: {words}. It would stand out {ratio:.1f} times as far as now."
+
+
+def replace_problem(target: Target, problem: Any) -> Target:
+    """A target on other holds whose coordinates mean the same."""
+    out = Target(problem)
+    out.coordinates.ridges = target.coordinates.ridges
+    return out
+
+
+def _separation(target: Target, block: Block, trials: Sequence[Probe]) -> float:
+    """Length of the first signature left when parameters, and the second where there is one, have taken their part."""
+    x = expand(target, block.modes.z[:1], trials)
+    p = projected(x, float(x.ratio[0]))
+    first = p[:, 0]
+    if p.shape[1] > 1 and (p[:, 1] ** 2).sum() > 0:
+        second = p[:, 1] / np.sqrt((p[:, 1] ** 2).sum())
+        first = first - second * (second @ first)
+    return float(np.sqrt(first @ first))
