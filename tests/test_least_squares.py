@@ -67,7 +67,9 @@ def made_up(variant: Variant, truth: dict[str, float]):
     return replace(wire, holds=tuple(holds))
 
 
-@pytest.mark.parametrize("variant", [v for v in VARIANTS if v.likelihood == "chain"], ids=lambda v: f"{v.history}-{v.law}")
+@pytest.mark.parametrize(
+    "variant", [v for v in VARIANTS if v.likelihood == "chain"], ids=lambda v: f"{v.history}-{v.law}"
+)
 def test_noise_free_readings_give_their_parameters_back(variant):
     truth = {"k1": 3000.0, "B": 0.8, "U": 0.7, "k2": 0.03, "N": 0.6, "preload": 0.4}
     found = identify(made_up(variant, truth), variant, np.random.default_rng(1))

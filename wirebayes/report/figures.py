@@ -1,0 +1,175 @@
+"""Pictures of tests and posteriors, each a small panel that stays readable on a phone."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+from wirebayes.bayes.result import unit_of
+from wirebayes.report.blocks import unit_text
+from wirebayes.wire.protocol import Protocol
+
+Array = NDArray[Any]
+CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
+COLOURS = {"chain": CHAIN, "hold": HOLD}
+WORDS = {"chain": "holds as one chain", "hold": "hold by hold"}
+_SIZE = (4.7, 3.4)
+
+
+def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] = _SIZE) -> tuple[Figure, Any]:
+    """An empty panel with labelled axes."""
+    figure = Figure(figsize=size, layout="constrained")
+    axes: Any = figure.subplots()
+    axes.set_xlabel(xlabel)
+    axes.set_ylabel(ylabel)
+    if title:
+        axes.set_title(title, fontsize=10.5, loc="left", color=INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=9)
+    return figure, axes
+
+
+def legend(axes: Any, **where: Any) -> None:
+    """A quiet legend."""
+    axes.legend(frameon=False, fontsize=8.5, handlelength=1.6, borderaxespad=0.2, **where)
+
+
+def legend_below(figure: Figure, axes: Any, columns: int = 2) -> None:
+    """A legend under the panel, where it hides nothing."""
+    place: Any = "outside lower center"
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc=place, ncols=columns, frameon=False, fontsize=8.5, handlelength=1.6
+    )
+
+
+def measured(protocol: Protocol, tension_N: Array, title: str) -> Figure:
+    """Tension against displacement: each hold's readings from the first (dark) to the last (light).
+
+    Parameters
+    ----------
+    protocol : Protocol
+    tension_N : (H, R) array
+    """
+    figure, axes = panel("displacement, mm", "tension, N", title)
+    first = True
+    for j in range(len(protocol.displacement_mm)):
+        x, seen = protocol.displacement_mm[j], protocol.mask[j]
+        if not seen.any():
+            axes.axvline(x, color=QUIET, ls=":", lw=1.2, label="held, not recorded")
+            continue
+        y = tension_N[j][seen]
+        axes.plot([x] * len(y), y, color=QUIET, lw=1.5, zorder=1)
+        axes.scatter([x], y[:1], s=22, color=CHAIN, zorder=3, label="when the hold begins" if first else None)
+        if len(y) > 1:
+            label = "later readings" if first else None
+            axes.scatter([x] * (len(y) - 1), y[1:], s=11, color=HOLD, zorder=2, label=label)
+        first = False
+    legend(axes, loc="lower right")
+    axes.set_ylim(bottom=0)
+    return figure
+
+
+def joint(
+    x: Mapping[str, Array], y: Mapping[str, Array], xlabel: str, ylabel: str, title: str = "",
+    mark: tuple[float, float] | None = None,
+) -> Figure:  # fmt: skip
+    """Draws of two positive quantities, on logarithmic axes.
+
+    Parameters
+    ----------
+    x, y : mapping of likelihood to (n,) array
+    mark : (x, y), optional
+        The published pair.
+    """
+    figure, axes = panel(xlabel, ylabel, title)
+    for kind, across in x.items():
+        axes.scatter(across, y[kind], s=3, alpha=0.35, lw=0, color=COLOURS.get(kind, QUIET), rasterized=True)
+        axes.scatter([], [], s=18, color=COLOURS.get(kind, QUIET), label=WORDS.get(kind, kind))
+    if mark is not None:
+        axes.scatter(*mark, marker="X", s=90, color=INK, edgecolor="white", lw=1.2, zorder=5, label="published")
+    logarithmic(axes, "both")
+    legend_below(figure, axes, 3)
+    return figure
+
+
+def named(name: str, effects: tuple[Any, ...] = ()) -> str:
+    """A parameter with its unit, as an axis says it."""
+    unit = unit_text(unit_of(name, effects))
+    return f"{name}, {unit}" if unit else name
+
+
+def logarithmic(axes: Any, which: str = "x") -> None:
+    """Logarithmic axes that print plain numbers."""
+    for name in ("x", "y") if which == "both" else (which,):
+        getattr(axes, f"set_{name}scale")("log")
+        axis = getattr(axes, f"{name}axis")
+        low, high = sorted(getattr(axes, f"get_{name}lim")())
+        decades = np.log10(high / low)
+        subs = (1.0, 2.0, 5.0) if decades < 1.6 else (1.0, 3.0) if decades < 2.6 else (1.0,)
+        axis.set_major_locator(LogLocator(subs=subs))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", "\u2009")))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def marginals(
+    draws: Mapping[str, Array], prior: Mapping[str, Array] | None = None, effects: tuple[Any, ...] = ()
+) -> list[tuple[str, Figure]]:
+    """One histogram a parameter, the prior behind it: (name, figure)."""
+    out = []
+    for name, values in draws.items():
+        figure, axes = panel(named(name, effects), "density", size=(3.4, 2.4))
+        low, high = np.quantile(values, [0.0005, 0.9995])
+        positive = values.min() > 0 and np.quantile(values, 0.95) > 4 * np.quantile(values, 0.05)
+        bins = np.geomspace(max(low, 1e-12), high, 60) if positive else np.linspace(low, high, 60)
+        if positive:
+            axes.set_xscale("log")
+        before = prior.get(name) if prior else None
+        for sample, colour, label in ((before, QUIET, "prior"), (values, CHAIN, "posterior")):
+            if sample is not None:
+                heights, edges = np.histogram(sample, bins)
+                width = np.diff(np.log(edges)) if positive else np.diff(edges)
+                axes.stairs(heights / (len(sample) * width), edges, fill=True, color=colour, alpha=0.75, label=label)
+        if positive:
+            logarithmic(axes)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+        if prior:
+            legend(axes)
+        out.append((name, figure))
+    return out
+
+
+def residuals(
+    hold: Array, time_s: Array, measured_N: Array, band_N: Array, title: str, colour: str = CHAIN,
+    paper_N: Array | None = None,
+) -> Figure:  # fmt: skip
+    """Measured minus predicted, hold after hold, inside the 90 % band.
+
+    Parameters
+    ----------
+    hold, time_s, measured_N : (m,) arrays
+    band_N : (3, m) array
+        5 %, 50 % and 95 % of the prediction.
+    paper_N : (m,) array, optional
+        The paper's prediction.
+    """
+    figure, axes = panel("hold (readings in order of time within each)", "measured − predicted, N", title)
+    numbers = list(dict.fromkeys(hold.tolist()))
+    longest = max(float(time_s.max()), 1e-9)
+    place = np.array([numbers.index(h) for h in hold]) - 0.35 + 0.7 * time_s / longest
+    for i, h in enumerate(numbers):
+        here = hold == h
+        low, middle, high = band_N[:, here]
+        axes.fill_between(place[here], low - middle, high - middle, color=colour, alpha=0.22, lw=0,
+                          label="90 % band" if i == 0 else None)  # fmt: skip
+    axes.axhline(0, color=colour, lw=1)
+    axes.scatter(place, measured_N - band_N[1], s=14, color=colour, zorder=3, label="measured − posterior median")
+    if paper_N is not None:
+        left = measured_N - paper_N
+        axes.scatter(place, left, s=18, marker="x", lw=1, color=INK, zorder=2, label="measured − paper's curve")
+    axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
+    legend_below(figure, axes, 3 if paper_N is None else 2)
+    return figure

@@ -1,0 +1,71 @@
+"""One self-contained page of whatever a folder of results holds."""
+
+import json
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from wirebayes import __version__
+from wirebayes.errors import InputError
+from wirebayes.output import CONFIGURATION, write_text
+from wirebayes.report.blocks import Page
+
+# who knows how to tell a command's results; each module has ``page(folder, configuration)``
+_TELLERS = {
+    "reproduce": "wirebayes.report.of_reproduce",
+    "fit": "wirebayes.report.of_fit",
+    "compare": "wirebayes.report.of_compare",
+    "discover": "wirebayes.report.of_discover",
+    "pose": "wirebayes.report.of_pose",
+}
+
+
+def write(folder: Path) -> Path:
+    """Write ``report.html`` into a folder of results and return its path.
+
+    Raises
+    ------
+    InputError
+        The folder is not one that a command of ours has written.
+    """
+    path = folder / "report.html"
+    write_text(path, render(tell(folder)))
+    return path
+
+
+def tell(folder: Path) -> Page:
+    """The page of a folder, by the command that wrote it."""
+    absent = f"{folder}: found no {CONFIGURATION}, expected a folder of results"
+    configuration = read_json(folder / CONFIGURATION, absent)
+    command = configuration.get("command") if isinstance(configuration, dict) else None
+    if command not in _TELLERS:
+        known = ", ".join(_TELLERS)
+        raise InputError(f"{folder / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
+    teller: Callable[[Path, dict[str, Any]], Page] = import_module(_TELLERS[command]).page
+    return teller(folder, configuration)
+
+
+def render(page: Page) -> str:
+    """The page as HTML with everything inside."""
+    environment = Environment(loader=PackageLoader("wirebayes.report", "."), undefined=StrictUndefined)
+    environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
+    return environment.get_template("page.html.jinja").render(page=page, version=__version__) + "\n"
+
+
+def read_json(path: Path, otherwise: str = "") -> Any:
+    """A JSON file of ours.
+
+    Raises
+    ------
+    InputError
+        It is absent or not JSON.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        raise InputError(otherwise or f"{path}: no such file, expected the results of a finished command") from None
+    except ValueError:
+        raise InputError(f"{path}: found no valid JSON, expected what the command wrote") from None

@@ -1,0 +1,101 @@
+"""Tables of the paper reproduced, from the rows that ``reproduce`` wrote."""
+
+from typing import Any
+
+from wirebayes.report.blocks import Table, number, span, unit_text
+
+Rows = list[dict[str, Any]]
+VERDICTS = {"inside": "good", "outside": "bad", "not determined": "open", "yes": "good", "no": "bad"}
+LIKELIHOOD = {"chain": "chain", "hold": "hold by hold"}
+LEAST_COVERAGE = 0.75  # of readings in a band that promises 0.9
+_TIMES = {120.0: "2 min", 3600.0: "1 h", 86400.0: "1 day"}
+
+
+def measured(rows: Rows) -> Table:
+    """What each test consisted of."""
+    header = ["sample", "material", "length, mm", "holds", "not recorded", "readings", "tension, N", "median loss, %"]
+    lines = []
+    for r in rows:
+        tension = f"{r['smallest_tension_N']:.2f} … {r['largest_tension_N']:.2f}"
+        counts = (str(r[key]) for key in ("holds", "unrecorded_holds", "readings"))
+        loss = f"{r['median_loss_percent']:.1f}"
+        lines.append([r["experiment"], r["material"], number(r["length_mm"], 4), *counts, tension, loss])
+    return Table(header, lines)
+
+
+def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -> Table:
+    """Published and refitted parameters in one reading of the model."""
+    chosen = [r for r in rows if (r["likelihood"], r["history"], r["elastic_law"]) == (likelihood, history, law)]
+    header = ["sample", "parameters", "k1, N", "B, mm N⁻ᵁ", "U", "k2, s⁻ᴺ", "N", "preload, mm"]
+    header += ["rms, first five, N", "rms, rest, N", "rms, all, N", "at the edge of the search"]
+    lines = []
+    for r in chosen:
+        values = (number(r[key], 4) for key in ("k1_N", "B", "U", "k2", "N", "preload_mm"))
+        misses = (f"{r[key]:.3f}" for key in ("rms_first_N", "rms_rest_N", "rms_all_N"))
+        lines.append([r["experiment"], r["parameters"], *values, *misses, r["at_edge_of_search"] or "–"])
+    return Table(header, lines, caption)
+
+
+def posterior(rows: Rows, caption: str) -> Table:
+    """Intervals and verdicts of both likelihoods beside every published value."""
+    header = ["sample", "parameter", "published"]
+    for likelihood in LIKELIHOOD.values():
+        header += [f"{likelihood}: 90 % interval", "shrunk by", "verdict"]
+    lines = []
+    for r, s in _pairs(rows, "parameter"):
+        unit = unit_text(r["unit"])
+        name = r["parameter"].replace("*", "·") + (f", {unit}" if unit else "")
+        line = [r["experiment"], name, number(r["published"], 4)]
+        for q in (r, s):
+            line += [span(q["q05"], q["q95"]), f"{100 * q['contraction']:.0f} %", q["verdict"]]
+        lines.append(line)
+    return Table(header, lines, caption, VERDICTS)
+
+
+def held_out(rows: Rows, caption: str) -> Table:
+    """How the forecasts of the unused holds did."""
+    header = ["sample", "reading of the model", "unused readings", "rms, N", "median width of band, N"]
+    lines = []
+    for r in rows:
+        kept = "yes" if r["coverage_90"] >= LEAST_COVERAGE else "no"
+        misses = (f"{r[key]:.3f}" for key in ("rms_N", "median_band_width_N"))
+        covered = f"{100 * r['coverage_90']:.0f} %"
+        lines.append([r["experiment"], LIKELIHOOD[r["likelihood"]], str(r["readings"]), *misses, covered, kept])
+    return Table([*header, "in the 90 % band", "kept its promise"], lines, caption, VERDICTS)
+
+
+def creep(rows: Rows, caption: str) -> Table:
+    """Creep elongation at a tension after some times."""
+    header = ["sample", "tension, N", "after", "Table 4, mm"]
+    for likelihood in LIKELIHOOD.values():
+        header += [f"{likelihood}, mm", "90 % interval"]
+    lines = []
+    for r, s in _pairs(rows, "time_s"):
+        line = [r["experiment"], f"{r['tension_N']:.2f}", _TIMES.get(r["time_s"], f"{r['time_s']:g} s")]
+        line.append(number(r["published_mm"]))
+        for q in (r, s):
+            line += [number(q["q50_mm"]), span(q["q05_mm"], q["q95_mm"])]
+        lines.append(line)
+    return Table(header, lines, caption)
+
+
+def sampling(rows: Rows) -> Table:
+    """How the sampler did."""
+    header = ["sample", "reading of the model", "trained on", "converged", "autocorrelation time, steps"]
+    header += ["smallest ESS", "nested R-hat", "likelihood evaluations"]
+    header += ["draws per evaluation", "per kept evaluation", "modes"]
+    lines = []
+    for r in rows:
+        done = "yes" if r["converged"] else "no"
+        line = [r["experiment"], LIKELIHOOD[r["likelihood"]], r["trained_on"], done]
+        line += [f"{r['autocorrelation_steps']:.1f}", number(round(r["smallest_ess"]))]
+        line += [f"{r['largest_nested_r_hat']:.4f}", number(r["likelihood_evaluations"])]
+        line += [number(r[f"effective_draws_per_{kind}evaluation"], 2) for kind in ("", "kept_")]
+        lines.append([*line, str(r["modes_found"])])
+    return Table(header, lines, words=VERDICTS)
+
+
+def _pairs(rows: Rows, key: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Rows of the chain, each with its counterpart hold by hold."""
+    alone = {(r["experiment"], r[key]): r for r in rows if r["likelihood"] == "hold"}
+    return [(r, alone[r["experiment"], r[key]]) for r in rows if r["likelihood"] == "chain"]

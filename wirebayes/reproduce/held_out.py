@@ -1,0 +1,118 @@
+"""The unused holds predicted from the first ones, and how far the measurement lies from the prediction."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes.noise import hold_courses
+from wirebayes.bayes.result import Stored
+from wirebayes.discrepancy.predictive import Question, predict
+from wirebayes.experiment import Experiment
+from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.staircase import Model
+
+Array = NDArray[Any]
+_DRAWS = 2000
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Predicted and measured readings of the holds that were not trained on.
+
+    Attributes
+    ----------
+    hold : (m,) int array
+        Hold number of each reading.
+    time_s, measured_N : (m,) arrays
+    drawn_N : (m, n) array
+        Predictive draws: parameter, setting, sensor and rounding error.
+    """
+
+    hold: NDArray[np.int64]
+    time_s: Array
+    measured_N: Array
+    drawn_N: Array
+
+    @property
+    def band_N(self) -> Array:
+        """(3, m) 5 %, 50 % and 95 % quantiles."""
+        return np.asarray(np.quantile(self.drawn_N, [0.05, 0.5, 0.95], axis=1))
+
+    @property
+    def rms_N(self) -> float:
+        """Root mean square of measured minus median prediction."""
+        return float(np.sqrt(np.mean((self.measured_N - self.band_N[1]) ** 2)))
+
+    @property
+    def coverage(self) -> float:
+        """Share of readings inside the 90 % band."""
+        low, _, high = self.band_N
+        return float(np.mean((self.measured_N >= low) & (self.measured_N <= high)))
+
+
+def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -> HeldOut:
+    """Predict what `stored`, trained on the first holds of an experiment, has not seen.
+
+    As a chain the training readings fix the creep carried in, the displacements say the rest; hold by hold each hold
+    is given its own first reading, which is then not predicted.
+    """
+    protocol, measured = experiment.protocol(), experiment.tension()
+    trained = len(stored.sample.protocol.displacement_mm)
+    alone = stored.likelihood == "hold"
+    unused = protocol.recorded & (np.arange(len(protocol.displacement_mm)) >= trained)
+    question = Question(protocol, 0 if alone else trained, unused, _first(measured, alone))
+    drawn = predict(stored.problem, some(stored.theta), stored.sample, question, rng)
+    wanted = protocol.mask & unused[:, None]
+    if alone:
+        wanted[:, 0] = False
+    number = np.broadcast_to(protocol.number[:, None], wanted.shape)
+    return HeldOut(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
+
+
+def last_hold_course(
+    stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator
+) -> Array:
+    """(len(time_s), n) predicted readings of the last hold given its first reading, hold by hold."""
+    protocol, first = _last_alone(experiment, time_s)
+    question = Question(protocol, 0, np.array([True]), first)
+    drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, question, rng)[0]
+    return drawn
+
+
+def published_course(published: dict[str, float], experiment: Experiment, time_s: Array) -> Array:
+    """(len(time_s),) the paper's curve of the last hold."""
+    protocol, first = _last_alone(experiment, time_s)
+    theta = {name: np.array([value]) for name, value in published.items()}
+    course = hold_courses(protocol, theta, Model(), first[:, None])[0]
+    assert course is not None
+    tension: Array = course[0][:, 0]
+    return tension
+
+
+def some(theta: Array) -> Array:
+    """At most a few thousand rows, evenly spread."""
+    rows: Array = theta[np.linspace(0, len(theta) - 1, min(len(theta), _DRAWS)).astype(int)]
+    return rows
+
+
+def _first(measured: Array, given: bool) -> Array:
+    return measured[:, 0] if given else np.full(len(measured), np.nan)
+
+
+def _last_alone(experiment: Experiment, time_s: Array) -> tuple[Protocol, Array]:
+    """The last hold as a test of its own, asked at other times, and its first reading."""
+    hold = experiment.recorded_holds[-1]
+    whole = experiment.protocol()
+    times = np.concatenate([[0.0], time_s[time_s > 0]])[None]
+    one = replace(
+        whole,
+        displacement_mm=np.array([hold.displacement_mm]),
+        time_s=times,
+        mask=np.ones(times.shape, bool),
+        duration_s=np.array([float(times[0, -1])]),
+        number=np.array([hold.number or 0]),
+        warming_K=None,
+    )
+    return one, hold.tension_N[:1]

@@ -1,0 +1,72 @@
+"""Table 4 beside least squares of our own: published and refitted parameters in every reading of the model."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from wirebayes.bayes.fit import seed_of
+from wirebayes.bayes.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
+from wirebayes.experiment import Experiment
+
+Row = dict[str, Any]
+
+
+def rows(
+    experiments: Sequence[Experiment],
+    published: Mapping[str, Mapping[str, float]],
+    training_holds: int,
+    seed: int,
+    pool: ProcessPoolExecutor | None = None,
+) -> list[Row]:
+    """One row for each wire, variant and source of the parameters.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    published : mapping of experiment name to parameters
+    training_holds : int
+        Both are adjusted to these first holds: all parameters, or the preload that the published ones lack.
+    seed : int
+    pool : ProcessPoolExecutor, optional
+
+    Returns
+    -------
+    list of dict
+        Parameters, and the rms of what each predicts on the training holds, on the rest and on all, in N.
+    """
+    wires = [(e, dict(published[e.name]), training_holds, seed) for e in experiments]
+    found = map(_wire, wires) if pool is None else pool.map(_wire, wires)
+    return [row for part in found for row in part]
+
+
+def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
+    experiment, published, training_holds, seed = task
+    first, cut = experiment.train(training_holds), leading(experiment, training_holds)
+    out = []
+    for variant in VARIANTS:
+        words = ("least squares", experiment.name, variant.likelihood, variant.history, variant.law)
+        for source, known in (("published", published), ("refitted", None)):
+            rng = np.random.default_rng(seed_of(seed, *words))
+            out.append(_row(experiment, variant, source, identify(first, variant, rng, known), cut))
+    return out
+
+
+def _row(experiment: Experiment, variant: Variant, source: str, found: Identified, cut: int) -> Row:
+    left = residuals(experiment, at(found.parameters), variant)
+    return {
+        "experiment": experiment.name,
+        "likelihood": variant.likelihood,
+        "history": variant.history if variant.likelihood == "chain" else "",
+        "elastic_law": variant.law,
+        "parameters": source,
+        **{f"{name}_{_UNITS[name]}".rstrip("_"): found.parameters.get(name) for name in _UNITS},
+        "rms_first_N": rms(left[:cut]),
+        "rms_rest_N": rms(left[cut:]),
+        "rms_all_N": rms(left),
+        "at_edge_of_search": " ".join(found.at_edge),
+    }
+
+
+_UNITS = {"k1": "N", "B": "", "U": "", "k2": "", "N": "", "preload": "mm"}

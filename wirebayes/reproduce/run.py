@@ -1,0 +1,225 @@
+"""``wirebayes reproduce``, step by step: fits, tables, pictures, page."""
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes import __version__, paper
+from wirebayes.bayes.ensemble import Policy, describe
+from wirebayes.bayes.fit import seed_of
+from wirebayes.bayes.jobs import Job
+from wirebayes.bayes.jobs import run as run_jobs
+from wirebayes.bayes.problem import Likelihood, build
+from wirebayes.bayes.result import Stored, load
+from wirebayes.experiment import Experiment
+from wirebayes.output import open_run, write_csv, write_json
+from wirebayes.report.page import write as write_page
+from wirebayes.reproduce import identification, pictures, section_4, verdicts
+from wirebayes.reproduce.held_out import HeldOut, held_out
+
+Array = NDArray[Any]
+Row = dict[str, Any]
+LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
+# Five holds leave a longer ridge than twelve: more burn-in rounds than usual pay for themselves many times.
+POLICY = Policy(rounds=8)
+_PRIOR_DRAWS = 20_000
+
+
+def reproduce(
+    directory: Path, seed: int = 0, report: Callable[[str, float, float], None] = lambda name, done, total: None
+) -> list[str]:
+    """Everything the paper shows, on its own tables, with posteriors.
+
+    Parameters
+    ----------
+    directory : Path
+        Gets the page, the tables, the pictures, and ``NAME/LIKELIHOOD`` for each fit: of all holds, and of the first
+        five with ``-first-5`` behind.
+    seed : int
+    report : callable
+        ``report(name, done, total)``, for a progress bar.
+
+    Returns
+    -------
+    list of str
+        A line for each fit that did not converge.
+
+    Raises
+    ------
+    InputError
+        The folder belongs to something else.
+    """
+    experiments, published = paper.experiments(), paper.published()
+    training = int(published["identification"]["training_holds"])
+    run = open_run(directory, configuration(experiments, seed))
+    if run.state != "done":
+        jobs = fits(experiments, training)
+        run_jobs(jobs, directory, seed, policy=POLICY, report=report)
+        _tables_and_pictures(directory, experiments, published, training, seed, report)
+        section_4.write(directory, seed)
+        write_page(directory)
+        run.finish()
+    return _not_converged(directory, fits(experiments, training))
+
+
+def configuration(experiments: Sequence[Experiment], seed: int) -> dict[str, Any]:
+    """Everything that decides the results."""
+    return {
+        "command": "reproduce",
+        "version": __version__,
+        "seed": seed,
+        "policy": describe(POLICY),
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }
+
+
+def fits(experiments: Sequence[Experiment], training: int) -> list[Job]:
+    """Every wire under both likelihoods: trained on its first holds, and on all of them."""
+    jobs = []
+    for suffix, holds in ((f"-first-{training}", training), ("", None)):
+        for e in experiments:
+            shown = e if holds is None else e.train(holds)
+            for likelihood in LIKELIHOODS:
+                provenance = {"version": __version__, "data_sha256": {e.name: e.data_hash}, "train_holds": holds}
+                folder = f"{e.name}/{likelihood}{suffix}"
+                jobs.append(Job(folder, (shown,), likelihood=likelihood, provenance=provenance))
+    return jobs
+
+
+def _tables_and_pictures(
+    directory: Path,
+    experiments: Sequence[Experiment],
+    published: Mapping[str, Any],
+    training: int,
+    seed: int,
+    report: Callable[[str, float, float], None],
+) -> None:
+    table_4 = published["table_4"]
+    with ProcessPoolExecutor(min(len(experiments), _cores()), mp_context=get_context("spawn")) as pool:
+        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, pool))
+    report("tables and pictures", 1, 3)
+    posterior: list[Row] = []
+    creep: list[Row] = []
+    forecasts: list[Row] = []
+    sampling: list[Row] = []
+    drawn = pictures.Gallery(directory)
+    for e in experiments:
+        full: dict[str, Stored] = {}
+        first: dict[str, Stored] = {}
+        seen: dict[str, HeldOut] = {}
+        for likelihood in LIKELIHOODS:
+            full[likelihood] = load(directory / e.name / likelihood)
+            first[likelihood] = load(directory / e.name / f"{likelihood}-first-{training}")
+            prior = _prior_draws(e, likelihood, seed)
+            posterior += verdicts.rows(e.name, likelihood, full[likelihood].draws, prior, table_4[e.name])
+            tension = round(full[likelihood].sample.model.tension_ref_N, 3)
+            creep += verdicts.creep_rows(e.name, likelihood, full[likelihood].draws, table_4[e.name], tension)
+            rng = np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
+            seen[likelihood] = held_out(first[likelihood], e, rng)
+            forecasts.append(_forecast_row(e.name, likelihood, seen[likelihood]))
+            for suffix in ("", f"-first-{training}"):
+                sampling.append(_sampling_row(directory, e.name, likelihood, suffix))
+        mine = [row for row in posterior if row["experiment"] == e.name]
+        _draw(drawn, e, table_4[e.name], full, first, seen, mine, seed)
+    for name, rows in (("posterior", posterior), ("creep", creep), ("held_out", forecasts), ("sampling", sampling)):
+        write_table(directory, name, rows)
+    write_table(directory, "measured", [_measured_row(e) for e in experiments])
+    report("tables and pictures", 2, 3)
+    drawn.finish()
+    report("tables and pictures", 3, 3)
+
+
+def _draw(
+    gallery: pictures.Gallery,
+    experiment: Experiment,
+    published: dict[str, float],
+    full: dict[str, Stored],
+    first: dict[str, Stored],
+    seen: dict[str, HeldOut],
+    rows: list[Row],
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed_of(seed, "pictures", experiment.name))
+    gallery.measured(experiment)
+    gallery.intervals(experiment, rows)
+    gallery.last_hold(experiment, published, first["hold"], rng)
+    gallery.unused_holds(experiment, published, seen)
+    gallery.ridges(experiment, published, full)
+    gallery.prior(experiment, rng)
+
+
+def _prior_draws(experiment: Experiment, likelihood: Likelihood, seed: int) -> dict[str, Array]:
+    prior = build([experiment], likelihood=likelihood).prior
+    draws = prior.rvs(_PRIOR_DRAWS, np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood)))
+    return dict(zip(prior.names, draws.T, strict=True)) | {k: np.full(len(draws), v) for k, v in prior.fixed.items()}
+
+
+def _measured_row(e: Experiment) -> Row:
+    tension = np.concatenate([hold.tension_N for hold in e.recorded_holds])
+    return {
+        "experiment": e.name,
+        "material": e.material,
+        "length_mm": e.length_mm,
+        "holds": len(e.recorded_holds),
+        "unrecorded_holds": len(e.holds) - len(e.recorded_holds),
+        "readings": len(tension),
+        "smallest_tension_N": tension.min(),
+        "largest_tension_N": tension.max(),
+        "median_loss_percent": 100 * float(np.median([1 - h.tension_N[-1] / h.tension_N[0] for h in e.recorded_holds])),
+    }
+
+
+def _forecast_row(name: str, likelihood: str, seen: HeldOut) -> Row:
+    return {
+        "experiment": name,
+        "likelihood": likelihood,
+        "readings": len(seen.measured_N),
+        "rms_N": seen.rms_N,
+        "coverage_90": seen.coverage,
+        "median_band_width_N": float(np.median(seen.band_N[2] - seen.band_N[0])),
+    }
+
+
+def _sampling_row(directory: Path, name: str, likelihood: str, suffix: str) -> Row:
+    summary = json.loads((directory / name / f"{likelihood}{suffix}" / "summary.json").read_text(encoding="utf-8"))
+    evaluations, ess = summary["likelihood_evaluations"], summary["smallest_ess"]
+    return {
+        "experiment": name,
+        "likelihood": likelihood,
+        "trained_on": suffix.removeprefix("-").replace("-", " ") or "all holds",
+        "converged": summary["converged"],
+        "autocorrelation_steps": summary["autocorrelation_steps"],
+        "smallest_ess": ess,
+        "largest_nested_r_hat": summary["largest_nested_r_hat"],
+        "likelihood_evaluations": evaluations,
+        "effective_draws_per_evaluation": ess / evaluations,
+        "effective_draws_per_kept_evaluation": ess / summary["kept_evaluations"],
+        "modes_found": summary["modes_found"],
+    }
+
+
+def write_table(directory: Path, name: str, rows: Sequence[Row]) -> None:
+    """The same rows as CSV and JSON."""
+    header = list(rows[0])
+    write_csv(directory / f"{name}.csv", header, ([row[key] for key in header] for row in rows))
+    write_json(directory / f"{name}.json", list(rows))
+
+
+def _not_converged(directory: Path, jobs: Sequence[Job]) -> list[str]:
+    lines = []
+    for job in jobs:
+        summary = json.loads((directory / job.folder / "summary.json").read_text(encoding="utf-8"))
+        if not summary["converged"]:
+            lines.append(f"{job.folder}: {summary['convergence']}")
+    return lines
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

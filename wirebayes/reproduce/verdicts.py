@@ -1,0 +1,107 @@
+"""What the readings say of each published value: inside the posterior's interval, outside, or not theirs to say.
+
+A parameter counts as determined by the readings when its 90 % interval, on a logarithmic scale, has less than a third
+of the width it had before the test. The share by which it shrank is its *contraction*.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes.problem import MATERIAL
+from wirebayes.bayes.result import CREEP_TIMES_S, derived, unit_of
+
+Array = NDArray[Any]
+Verdict = Literal["inside", "outside", "not determined"]
+LEAST_CONTRACTION = 2.0 / 3.0
+PRODUCT = "k1*B"  # the only combination that one hold alone determines
+
+
+def interval(values: Array) -> tuple[float, float, float]:
+    """5 %, 50 % and 95 % quantile."""
+    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    return float(low), float(middle), float(high)
+
+
+def contraction(posterior: Array, prior: Array) -> float:
+    """Share by which the width of the 90 % interval of a positive quantity shrank, on a logarithmic scale."""
+    before, after = interval(prior), interval(posterior)
+    return 1.0 - float(np.log(after[2] / after[0]) / np.log(before[2] / before[0]))
+
+
+def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict:
+    """The word for a published value."""
+    if shrunk < LEAST_CONTRACTION:
+        return "not determined"
+    return "inside" if low <= published <= high else "outside"
+
+
+def rows(
+    experiment: str,
+    likelihood: str,
+    draws: Mapping[str, Array],
+    prior: Mapping[str, Array],
+    published: Mapping[str, float],
+) -> list[dict[str, Any]]:
+    """One row a parameter: posterior and prior interval, contraction, published value and verdict.
+
+    Parameters
+    ----------
+    experiment, likelihood : str
+    draws, prior : mapping of name to (n,) array
+        Of the posterior and of the prior.
+    published : mapping of name to float
+    """
+    out = []
+    for name in (*MATERIAL, PRODUCT):
+        after, before = (_quantity(name, values) for values in (draws, prior))
+        value = float(_quantity(name, published))
+        low, middle, high = interval(after)
+        shrunk = contraction(after, before)
+        out.append(
+            {
+                "experiment": experiment,
+                "likelihood": likelihood,
+                "parameter": name,
+                "unit": "N mm N^-U" if name == PRODUCT else unit_of(name),
+                "published": value,
+                "q05": low,
+                "q50": middle,
+                "q95": high,
+                "prior_q05": interval(before)[0],
+                "prior_q95": interval(before)[2],
+                "contraction": shrunk,
+                "verdict": verdict(value, low, high, shrunk),
+            }
+        )
+    return out
+
+
+def creep_rows(
+    experiment: str, likelihood: str, draws: Mapping[str, Array], published: Mapping[str, float], tension_N: float
+) -> list[dict[str, Any]]:
+    """Creep elongation at a tension after 2 min, 1 h and 1 day: published parameters beside the posterior."""
+    ours = derived(draws, tension_N)
+    theirs = derived({name: np.asarray(value) for name, value in published.items()}, tension_N)
+    out = []
+    for key, time_s in CREEP_TIMES_S.items():
+        low, middle, high = interval(ours[key])
+        out.append(
+            {
+                "experiment": experiment,
+                "likelihood": likelihood,
+                "tension_N": tension_N,
+                "time_s": time_s,
+                "published_mm": float(theirs[key]),
+                "q05_mm": low,
+                "q50_mm": middle,
+                "q95_mm": high,
+            }
+        )
+    return out
+
+
+def _quantity(name: str, values: Mapping[str, Any]) -> Any:
+    return values["k1"] * values["B"] if name == PRODUCT else values[name]
