@@ -22,6 +22,7 @@ from .delta import Geometry, delta_curves
 from .fitting import fit, held_out_mask, last_third, rmse
 from .rig import Array, Mask, Rig
 
+FLEXIBLE_GAIN = 7.8  # in 2 log likelihood: exceeded by 4 % of 96 clean cases of another seed
 SETTING_GRID_MM = np.geomspace(0.001, 0.06, 8)
 
 
@@ -210,7 +211,7 @@ def gaussian_process(rig: Rig, keep: Mask) -> list[Array]:
 
 
 def flexible(linear: Linear, here: Rig, keep: Mask) -> tuple[bool, Array | None]:
-    """Whether a Gaussian process lowers BIC by its three numbers, and its covariance (R, R) at the best of a grid."""
+    """Whether a Gaussian process explains more than it would on clean data, and its covariance (R, R) at the best."""
     scores = np.sum(linear.residuals**2, axis=1) + linear.penalty
     base = float(scores.min())
     best, chosen = base, None
@@ -225,8 +226,8 @@ def flexible(linear: Linear, here: Rig, keep: Mask) -> tuple[bool, Array | None]
             for amplitude in np.geomspace(0.1, 1000, 13):
                 spread = 1 + amplitude * value
                 score = float(np.sum(weight / spread) + np.log(spread).sum() + linear.penalty[place])
-                if score + 3 * np.log(keep.sum()) < best:
-                    best, chosen = score + 3 * np.log(keep.sum()), amplitude * kernel
+                if score + FLEXIBLE_GAIN < best:
+                    best, chosen = score + FLEXIBLE_GAIN, amplitude * kernel
     return chosen is not None, chosen
 
 
