@@ -2,22 +2,37 @@ import json
 
 import numpy as np
 import pytest
-import xarray
 
+from wirebayes.bayes.problem import Sample
+from wirebayes.bayes.result import Stored
 from wirebayes.cli import main
+from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.staircase import Model
+
+PROTOCOL = Protocol(
+    length_mm=1000.0,
+    displacement_mm=np.array([1.0, 13.0]),
+    time_s=np.tile([0.0, 120.0], (2, 1)),
+    mask=np.ones((2, 2), bool),
+    duration_s=np.full(2, 120.0),
+    number=np.arange(1, 3),
+)
 
 
 @pytest.fixture
-def fitted(tmp_path):
+def fitted(tmp_path, monkeypatch):
+    """A folder whose posterior is made up: the commands see what a fit would have stored."""
     rng = np.random.default_rng(3)
     means = {"k1": 803, "B": 0.31, "U": 1.0, "k2": 0.03, "N": 0.64, "preload": -0.1, "sensor_sd": 0.01}
-    columns = {k: (("chain", "draw"), m * np.exp(0.03 * rng.standard_normal((2, 40)))) for k, m in means.items()}
-    attrs = {"length_mm": 1000.0, "elastic_law": "hooke", "history": "saturating", "effects": [],
-             "tension_range_N": [0.85, 7.65], "time_range_s": [0.0, 120.0]}  # fmt: skip
+    stored = Stored(
+        {k: m * np.exp(0.03 * rng.standard_normal(80)) for k, m in means.items()},
+        Sample("made-up", "made up", PROTOCOL, np.array([[0.85, 0.8], [7.65, 7.3]])[..., None], 0.01, Model()),
+        "chain",
+    )
+    monkeypatch.setattr("wirebayes.bayes.result.load", lambda folder, experiment=None: stored)
     folder = tmp_path / "fit"
     folder.mkdir()
-    data = xarray.Dataset(columns, attrs=attrs)
-    data.to_netcdf(folder / "posterior.nc", group="posterior", engine="h5netcdf")
+    (folder / "posterior.nc").write_bytes(b"made up")
     return folder
 
 

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wirebayes.cli.options import Output, Seed
+from wirebayes.cli.options import ExperimentName, Output, Seed
 
 if TYPE_CHECKING:
+    from wirebayes.bayes.result import Stored
     from wirebayes.robot.draws import WireDraws
 
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
@@ -23,13 +24,14 @@ def pose(
     rotation: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Rotation vector in radians.")] = None,
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")] = "0,10,30,60,120,300,600,1800,3600",
     draws: Draws = 1000,
+    experiment: ExperimentName = None,
     seed: Seed = 0,
 ) -> None:
     """Kinematics with creeping wires, drift and pose error with bands."""
     from wirebayes.robot import schema
 
     machine = schema.read(robot)
-    line = read_wires(wires, draws)
+    line = read_wires(wires, draws, experiment)
     where = machine.home_m if position is None else _numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else _numbers("--rotation", rotation, 3)
     moments = _times(times)
@@ -40,7 +42,7 @@ def pose(
     from wirebayes.robot.rotation import matrix
 
     asked = Question(where, matrix(turn), moments, seed=seed)
-    run = open_run(output, _configuration("pose", robot, wires, draws, seed, position, rotation, times))
+    run = open_run(output, _configuration("pose", robot, wires, draws, seed, experiment, position, rotation, times))
     if run.state == "done":
         return
     content, courses = answer(machine, line, asked)
@@ -51,48 +53,34 @@ def pose(
         typer.echo(f"warning: {warning}", err=True)
 
 
-def read_wires(folder: Path, count: int) -> "WireDraws":
-    """Draws of a fitted line, evenly thinned; an `InputError` names what the folder lacks."""
-    import numpy as np
-    import xarray
+def read_wires(folder: Path, count: int, experiment: str | None = None) -> "WireDraws":
+    """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
+    from wirebayes.bayes.result import load
 
-    from wirebayes.effects import named
-    from wirebayes.errors import InputError
+    return wire_draws(load(folder, experiment), count)
+
+
+def wire_draws(stored: "Stored", count: int) -> "WireDraws":
+    """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
+    import numpy as np
+
     from wirebayes.robot.draws import CORE, PLACES, WireDraws
 
-    file = folder / "posterior.nc"
-    if not file.is_file():
-        raise InputError(f"{folder}: no posterior.nc in it; expected a folder written by fit or discover")
-    try:
-        data = xarray.open_dataset(file, group="posterior", engine="h5netcdf").load()
-    except (OSError, KeyError, ValueError) as error:
-        raise InputError(f"{file}: cannot be read as a posterior ({type(error).__name__})") from None
-    missing = [name for name in CORE if name not in data]
-    if missing:
-        raise InputError(f"{file}: posterior: missing {', '.join(missing)}; expected {', '.join(CORE)}")
-    if "length_mm" not in data.attrs:
-        raise InputError(f"{file}: posterior: attribute length_mm missing; expected the tested length")
-    effects = tuple(named(str(key)) for key in np.atleast_1d(data.attrs.get("effects", [])) if str(key))
+    sample = stored.sample
+    effects = tuple(sample.model.effects)
     names = [*CORE, *(c for e in effects if e.scope == "material" and e.place in PLACES for c in e.columns())]
-    columns = {name: np.asarray(data[name].transpose("chain", "draw"), float).ravel() for name in names}
-    if not all(np.isfinite(v).all() for v in columns.values()):
-        raise InputError(f"{file}: posterior: not all draws are finite")
-    pick = np.unique(np.linspace(0, len(columns["k1"]) - 1, count).round().astype(int))
-    attrs = data.attrs
+    pick = np.unique(np.linspace(0, len(stored.draws["k1"]) - 1, count).round().astype(int))
+    protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
     return WireDraws(
-        {name: value[pick] for name, value in columns.items()},
-        float(attrs["length_mm"]),
-        attrs.get("elastic_law", "hooke"),
-        attrs.get("history", "saturating"),
+        {name: stored.draws[name][pick] for name in names},
+        protocol.length_mm,
+        sample.model.law,
+        sample.model.history,
         effects,
-        _pair(attrs.get("tension_range_N")),
-        _pair(attrs.get("time_range_s")),
-        float(attrs.get("tension_ref_N", 1.0)),
+        (float(readings.min()), float(readings.max())),
+        (0.0, float(protocol.duration_s.max())),
+        sample.model.tension_ref_N,
     )
-
-
-def _pair(value: Any) -> tuple[float, float] | None:
-    return None if value is None else (float(value[0]), float(value[1]))
 
 
 def _numbers(option: str, text: str, count: int | None = None) -> Any:

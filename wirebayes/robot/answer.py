@@ -183,11 +183,11 @@ def _claim(courses: dict[float, drift.Course], x: Floats, asked: Question) -> di
 
 
 def _errors(robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Pose error under two controllers told the posterior mean, and how long each stays within tolerance."""
+    """Pose error under two controllers told the posterior, and how long each stays within tolerance."""
     out = []
     for spread in SPREADS:
         wires = draws.for_robot(robot, line, spread, rng)
-        told = control.known(draws.for_robot(robot, line))
+        told = draws.for_robot(robot, line)
         for name, build in (("hooke_only", control.hooke_only), ("creep_aware", control.creep_aware)):
             schedule = build(robot, told, asked.position_m, asked.rotation)
             error = control.error(robot, wires, schedule, asked.position_m, asked.rotation, asked.times_s)

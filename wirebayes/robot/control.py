@@ -17,25 +17,31 @@ Schedule = Callable[[float], Floats]
 
 
 def known(wires: Wires) -> Wires:
-    """One wire with the mean of every parameter: what a controller is told of an uncertain wire."""
-    return replace(wires, theta={k: v.mean(axis=-1, keepdims=True) for k, v in wires.theta.items()})
+    """One wire without creep, the mean of every other parameter: what statics is told of uncertain wires."""
+    plain = without_creep(wires)
+    return replace(plain, theta={k: v.mean(axis=-1, keepdims=True) for k, v in plain.theta.items()})
 
 
 def hooke_only(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
-    """Commands of a controller that knows the stiffness and nothing of creep; `told` holds one draw."""
+    """Commands of a controller that knows the mean stiffness and nothing of creep."""
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    joint = inverse.commands(robot, without_creep(told), position_m[None], rotation[None], tau).joint_m
+    joint = inverse.commands(robot, known(told), position_m[None], rotation[None], tau).joint_m
     return lambda time_s: joint
 
 
 def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
-    """Commands that take off, at every time, the creep foreseen under the tensions wanted there."""
+    """Commands that take off, at every time, the creep expected under the tensions wanted there.
+
+    The expectation is over the draws of `told`: parameters of creep are too entangled for their means to mean a wire.
+    """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    ahead = HoldCreep(told, fresh(robot.legs, 1), tau.T, "start")
+    draws = max(v.shape[-1] for v in told.theta.values())
+    ahead = HoldCreep(told, fresh(robot.legs, draws), np.repeat(tau.T, draws, 1), "start")
+    plain = known(told)
 
     def joint(time_s: float) -> Floats:
-        strain = ahead.advance(time_s, tau.T).strain(told)
-        return inverse.commands(robot, told, position_m[None], rotation[None], tau, strain).joint_m
+        strain = ahead.advance(time_s, tau.T).strain(told).mean(1, keepdims=True)
+        return inverse.commands(robot, plain, position_m[None], rotation[None], tau, strain).joint_m
 
     return joint
 

@@ -94,7 +94,7 @@ def hold(
     tension, status = np.empty((n, len(times), robot.legs)), np.empty((n, len(times)), np.int64)
     now = 0.0
     for k, time in enumerate(times):
-        for step in _between(now, float(time), float(times[-1]), longest_step):
+        for step in steps_between(now, float(time), float(times[-1]), longest_step):
             state = creep.advance(step, here.tension_N.T)
             here = settle(step, here.position_m, here.rotation)
         now = float(time)
@@ -103,7 +103,7 @@ def hold(
     return Course(times, position, rotation, tension, status, state)
 
 
-def _between(start: float, stop: float, last: float, longest: float) -> Floats:
+def steps_between(start: float, stop: float, last: float, longest: float) -> Floats:
     """Times after `start` up to `stop`, geometrically spaced no wider than `longest`."""
     if stop <= start:
         return np.empty(0)

@@ -74,6 +74,7 @@ def commands(
     rotation: Floats,
     tension_N: Floats,
     creep: Floats | float = 0.0,
+    error_m: Floats | float = 0.0,
 ) -> Commands:
     """Zero-tension lengths and joint values that give tensions at poses, eqs (1), (3) or (6).
 
@@ -87,6 +88,8 @@ def commands(
     tension_N : (p, w) array
     creep : (w, n) array
         Creep strain that the wires are known or thought to carry.
+    error_m : (w, n) array
+        What the zero-tension lengths before creep are known or thought to be beyond what the joint values say.
 
     Returns
     -------
@@ -98,10 +101,10 @@ def commands(
     tau = tension_N.T
     free = statics.stretched(robot, shape, robot.beyond_m[:, None])
     drum = zero_tension_length(wires, free, tau)
-    fixed = robot.wire_m[:, None] * grown
+    fixed = (robot.wire_m[:, None] + error_m) * grown
     moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
     zero = np.where(linear, fixed, drum)
-    joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), drum / grown)
+    joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), drum / grown - error_m)
     offset = robot.beyond_m[:, None] + np.where(linear, moved, 0.0)
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
     zero, joint, offset, tau = np.broadcast_arrays(zero, joint, offset, tau)

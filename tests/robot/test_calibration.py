@@ -1,0 +1,153 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.robot import draws, forward, inverse, observability, rotation, schema
+from wirebayes.robot.calibration import calibrate, corrected
+from wirebayes.robot.calibration_start import start
+from wirebayes.robot.session import Prior, Session, predict
+
+
+def _line(n=300, seed=1):
+    rng = np.random.default_rng(seed)
+    return draws.WireDraws(
+        {"k1": 803 * np.exp(0.01 * rng.normal(size=n)), "B": 0.31 * np.exp(0.1 * rng.normal(size=n)),
+         "U": rng.normal(1, 0.05, n), "k2": 0.03 * np.exp(0.05 * rng.normal(size=n)), "N": rng.normal(0.64, 0.02, n)},
+        1000.0,
+    )  # fmt: skip
+
+
+def _session(robot, line, poses, rng, tilt_sd=None):
+    mean = draws.for_robot(robot, line.centre())
+    x = np.vstack([robot.home_m, rng.uniform(robot.lower_m, robot.upper_m, (4 * poses, 3))])
+    R = rotation.matrix(0.1 * rng.normal(size=x.shape) * (robot.degrees == 6))
+    tau = inverse.tensions(robot, x, R)
+    good = np.flatnonzero(np.isfinite(tau).all(1))[: poses + 1]
+    told = inverse.commands(robot, mean, x[good], R[good], tau[good])
+    duration, read = np.full(poses + 1, 30.0), np.ones(poses + 1, bool)
+    duration[0], read[0] = 600.0, False
+    return Session(x[good], R[good], told.joint_m, duration, read, 0.02, tilt_sd)
+
+
+def test_sensitivity_is_the_derivative_of_the_equilibrium():
+    robot = schema.read("linear-7")
+    rng = np.random.default_rng(0)
+    session = _session(robot, _line(), 4, rng)
+    wires = draws.for_robot(robot, _line().centre())
+    zero, offset = inverse.lengths(robot, session.joint_m)
+    at = forward.solve(robot, wires, zero, offset, session.position_m, session.rotation)
+    motion, change = observability.sensitivity(robot, wires, at.position_m, at.rotation, zero, offset)
+    h = 1e-6
+    for i in range(robot.legs):
+        step = h * np.eye(robot.legs)[i]
+        up = forward.solve(robot, wires, zero + step, offset, at.position_m, at.rotation)
+        down = forward.solve(robot, wires, zero - step, offset, at.position_m, at.rotation)
+        pull = (up.tension_N - down.tension_N) / (2 * h)
+        np.testing.assert_allclose(change[:, :, i], pull, atol=1e-4 * np.abs(change).max())
+        shift = (up.position_m - down.position_m) / (2 * h)
+        np.testing.assert_allclose(motion[:, :3, i], shift, atol=1e-5 * np.abs(motion[:, :3]).max())
+
+
+def test_exact_readings_bring_back_the_lengths():
+    robot = schema.read("segesta-8")
+    rng = np.random.default_rng(2)
+    line = _line()
+    session = replace(_session(robot, line, 5, rng), tension_sd_N=1e-4)
+    prior = Prior(line, 5e-3, spread=1e-6)
+    mean, _ = prior.moments(robot.legs)
+    truth = mean[None].copy()
+    truth[:, : robot.legs] = 5e-3 * rng.normal(size=(1, robot.legs))
+    real = predict(robot, prior, session, truth)
+    known = calibrate(robot, prior, session, real.readings)
+    assert known.converged.all()
+    np.testing.assert_allclose(known.length_m, real.length_m, atol=5e-6)
+    np.testing.assert_allclose(known.position_m, real.position_m[:, -1], atol=5e-6)
+
+
+def test_the_first_guess_is_near_whatever_goes_slack():
+    robot = schema.read("cogiro-desk")
+    rng = np.random.default_rng(3)
+    line = _line()
+    session = _session(robot, line, 10, rng)
+    prior = Prior(line, 14e-3, spread=1e-6)
+    mean, _ = prior.moments(robot.legs)
+    truth = np.tile(mean, (4, 1))
+    truth[:, : robot.legs] = 14e-3 * rng.normal(size=(4, robot.legs))
+    real = predict(robot, prior, session, truth)
+    assert (real.readings == 0).any()
+    guess = start(robot, prior, session, real.readings)
+    assert np.abs(guess - truth[:, : robot.legs]).mean() < 0.1 * np.abs(truth[:, : robot.legs]).mean()
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+def test_intervals_cover_and_hooke_alone_does_not():
+    robot = schema.read("segesta-8")
+    rng = np.random.default_rng(4)
+    line = _line()
+    session = _session(robot, line, 6, rng)
+    prior = Prior(line, 5e-3, spread=0.05)
+    mean, cov = prior.moments(robot.legs)
+    truth = rng.multivariate_normal(mean, cov, 40)
+    real = predict(robot, prior, session, truth)
+    readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0)
+    covered, error = {}, {}
+    for creeps in (True, False):
+        known = calibrate(robot, replace(prior, creeps=creeps), session, readings)
+        low, high = known.interval(0.9)
+        covered[creeps] = ((low <= real.length_m) & (real.length_m <= high)).mean()
+        error[creeps] = np.abs(known.length_m - real.length_m).mean()
+        if creeps:
+            assert known.converged.all()
+            x = robot.home_m + 0.05
+            joint = corrected(robot, prior, known, x, np.eye(3))
+            wires, reference = prior.wires(robot, truth)
+            bare, offset = inverse.lengths(robot, joint)
+            there = forward.solve(robot, wires, (bare + reference) * (1 + real.creep), offset, x, np.eye(3))
+            assert np.median(np.linalg.norm(there.position_m - x, axis=1)) < 5e-4
+    # 320 intervals, the 8 of a robot correlated: twenty repeats of this test scatter by 0.02
+    assert 0.83 < covered[True] < 0.97
+    assert covered[False] < 0.5
+    assert error[False] > 2 * error[True]
+
+
+def test_an_inclinometer_helps():
+    robot = schema.read("linear-7")
+    line = _line()
+    prior = Prior(line, 5e-3)
+    sd = []
+    for tilt in (None, 1e-4):
+        session = _session(robot, line, 5, np.random.default_rng(6), tilt)
+        mean, _ = prior.moments(robot.legs)
+        real = predict(robot, prior, session, mean[None])
+        known = calibrate(robot, prior, session, real.readings)
+        sd.append(known.length_sd_m.mean())
+    assert sd[1] < 0.95 * sd[0]
+
+
+def test_observability_names_what_cannot_be_seen():
+    rng = np.random.default_rng(0)
+    hidden = np.array([1.0, -1.0, 0.0, 0.0]) / np.sqrt(2)
+    change = rng.normal(size=(3, 4, 4)) @ (np.eye(4) - np.outer(hidden, hidden)) * 1e3
+    seen = observability.observe(change, 0.01, 5e-3)
+    assert seen.rank == 3
+    assert abs(seen.weakest @ hidden) == pytest.approx(1.0)
+    assert "3 of 4" in seen.sentence
+    assert "wire 1" in seen.sentence
+    assert "wire 2" in seen.sentence
+    assert "wire 3" not in seen.sentence
+
+
+def test_chosen_poses_say_more_than_the_first_ones():
+    robot = schema.read("cogiro-desk")
+    rng = np.random.default_rng(9)
+    wires = draws.for_robot(robot, _line().centre())
+    x = rng.uniform(robot.lower_m, robot.upper_m, (60, 3))
+    R = rotation.matrix(0.1 * rng.normal(size=x.shape))
+    tau = inverse.tensions(robot, x, R)
+    told = inverse.commands(robot, wires, x, R, tau)
+    change = observability.sensitivity(robot, wires, x, R, told.zero_m, told.offset_m)[1]
+    pick = observability.choose_poses(change, 6, 0.02, 5e-3)
+    chosen, first = (observability.observe(change[i], 0.02, 5e-3).sd_m.mean() for i in (pick, list(range(6))))
+    assert chosen < 0.8 * first
