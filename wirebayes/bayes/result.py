@@ -167,6 +167,15 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         return Stored(draws, sample, about["likelihood"])
 
 
+def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
+    """What was believed before the fit: draws of the prior of one experiment's parameters, each (n,)."""
+    with xr.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
+        prior, names = tree["prior"].to_dataset(), json.loads(tree["posterior"].attrs["experiments"])
+        if "experiment" in prior.dims:
+            prior = prior.isel(experiment=names.index(experiment or names[0]))
+        return {str(name): values.values.reshape(-1) for name, values in prior.data_vars.items()}
+
+
 def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator) -> Any:
     problem, (m, draws, _) = fit.problem, fit.theta.shape
     together = sample is None

@@ -38,10 +38,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class Pictures:
-    """Pictures side by side where there is room."""
+    """Pictures side by side where there is room, more of them where they are `small`."""
 
     pictures: Sequence[Picture]
-    caption: str = ""
+    small: bool = False
     kind: str = "pictures"
 
 

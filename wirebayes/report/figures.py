@@ -120,6 +120,8 @@ def marginals(
     """One histogram a parameter, the prior behind it: (name, figure)."""
     out = []
     for name, values in draws.items():
+        if np.ptp(values) == 0:
+            continue  # fixed by the user's prior
         figure, axes = panel(named(name, effects), "density", size=(3.4, 2.4))
         low, high = np.quantile(values, [0.0005, 0.9995])
         positive = values.min() > 0 and np.quantile(values, 0.95) > 4 * np.quantile(values, 0.05)
@@ -134,6 +136,8 @@ def marginals(
                 axes.stairs(heights / (len(sample) * width), edges, fill=True, color=colour, alpha=0.75, label=label)
         if positive:
             logarithmic(axes)
+        else:
+            axes.locator_params(axis="x", nbins=5)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         if prior:

@@ -29,10 +29,11 @@ def intervals(rows: Sequence[Mapping[str, Any]], title: str) -> Figure:
         one = row["published"]
         if row["likelihood"] == "hold":
             before = [row["prior_q05"] / one, row["prior_q95"] / one]
-            axes.plot(before, [y, y], lw=13, color="#dfe2e5", solid_capstyle="butt", zorder=1)
+            axes.plot(before, [y, y], lw=13, color="#e0e3e6", solid_capstyle="butt", zorder=1)
         shift = 0.14 if row["likelihood"] == "chain" else -0.14
         colour = COLOURS[row["likelihood"]]
-        axes.plot([row["q05"] / one, row["q95"] / one], [y + shift] * 2, lw=3.2, color=colour, solid_capstyle="butt", zorder=3)
+        after = [row["q05"] / one, row["q95"] / one]
+        axes.plot(after, [y + shift] * 2, lw=3.2, color=colour, solid_capstyle="butt", zorder=3)
         axes.plot([row["q50"] / one], [y + shift], "o", ms=5, color=colour, zorder=3)
     axes.axvline(1, color=INK, lw=1, zorder=2)
     axes.plot([], [], color=QUIET, lw=8, label="before the test (prior)")

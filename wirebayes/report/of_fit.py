@@ -1,0 +1,157 @@
+"""The page of ``wirebayes fit``: each fit's readings, what they determine and what they do not."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes.result import CREEP_TIMES_S, Stored, experiments_in, load, prior_draws, unit_of
+from wirebayes.discrepancy.predictive import Question, predict
+from wirebayes.report import figures
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    drawn,
+    number,
+    span,
+    unit_text,
+)
+from wirebayes.report.page import read_json
+from wirebayes.report.paper_summary import listed
+from wirebayes.reproduce.verdicts import LEAST_CONTRACTION, contraction
+
+Array = NDArray[Any]
+_DRAWS = 1000
+_SPOKEN = {"creep_2min_mm": "2 min", "creep_1h_mm": "1 h", "creep_1day_mm": "1 day"}
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """One section for each experiment of each fit in the folder."""
+    sections = []
+    for file in sorted(folder.glob("*/summary.json")):
+        summary = read_json(file)
+        if configuration.get("own_effects"):
+            sections.append(_told(summary))
+            continue
+        names = experiments_in(file.parent / "posterior.nc")
+        for name in names:
+            sections.append(section(load(file.parent, name), prior_draws(file.parent, name), summary))
+    titles = listed([s.title for s in sections])
+    lead = f"Posterior of {titles}: what the readings say of each parameter, beside what was believed before."
+    return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _told(summary: dict[str, Any]) -> Section:
+    """A fit with effects of the user's own, from its summary alone: a page runs nobody's code."""
+    lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
+    words = Text("Fitted with effects from a file of the user's own, so this is told from summary.json alone.")
+    table = Table(["parameter", "median", "90 % interval"], lines)
+    return Section(summary["experiment"], [words, table, _derived(summary["derived"]), Text(_sampled(summary))])
+
+
+def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) -> Section:
+    """Readings, verdict, intervals and residuals of one experiment."""
+    sample, draws = stored.sample, stored.draws
+    sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
+    shrunk = {name: shrinkage(draws[name], prior[name]) for name in sampled}
+    blocks: list[Block] = [Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects)])]
+    if not summary["converged"]:
+        blocks.insert(0, Text("Not converged: do not believe these intervals.", strong=True))
+    alt = f"Measured minus predicted tension of {sample.name}, hold after hold, inside the 90 % band."
+    measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
+    pictures = [Picture(drawn(measured), f"Tension of {sample.name} against displacement.")]
+    pictures.append(Picture(drawn(_residuals(stored)), alt, "Readings against replicates of the same holds."))
+    blocks.append(Pictures(pictures))
+    blocks.append(_parameters(draws, shrunk, sample.model.effects))
+    named = figures.marginals(draws, prior, sample.model.effects)
+    told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
+    blocks.append(Pictures(told, small=True))
+    blocks.append(_derived(summary["derived"]))
+    blocks.append(Text(_sampled(summary)))
+    return Section(sample.name, blocks)
+
+
+def _sampled(summary: dict[str, Any]) -> str:
+    state = "Converged" if summary["converged"] else "Not converged"
+    return (
+        f"{state} {summary['convergence'].removeprefix('not converged ')}. Likelihood {summary['likelihood']}, history "
+        f"{summary['history']}, law {summary['elastic_law']}, effects {listed(summary['effects'])}; "
+        f"{number(summary['likelihood_evaluations'])} likelihood evaluations."
+    )
+
+
+def shrinkage(posterior: Array, prior: Array) -> float:
+    """Share by which the 90 % interval shrank: on a logarithmic scale for what is positive."""
+    if min(posterior.min(), prior.min()) > 0:
+        return contraction(posterior, prior)
+    (low, high), (before, after) = (np.quantile(values, [0.05, 0.95]) for values in (posterior, prior))
+    return 1.0 - float((high - low) / (after - before))
+
+
+def _measured(stored: Stored) -> Points:
+    protocol, tension = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
+    holds = int(protocol.recorded.sum())
+    unrecorded = len(protocol.recorded) - holds
+    points = [
+        f"{stored.sample.material}, {protocol.length_mm:g} mm.",
+        f"{holds} holds{f' and {unrecorded} not recorded' if unrecorded else ''}, {len(tension)} readings.",
+        f"Tensions from {tension.min():.2f} to {tension.max():.2f} N.",
+        f"The longest hold lasted {protocol.duration_s.max():g} s.",
+    ]
+    return Points("What was measured", points)
+
+
+def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...]) -> list[Points]:
+    known: list[str] = []
+    loose: list[str] = []
+    for name, share in shrunk.items():
+        unit = unit_text(unit_of(name, effects))
+        told = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
+        (known if share >= LEAST_CONTRACTION else loose).append(told)
+    nothing = ["Nothing to speak of."]
+    return [Points("What is known well (90 % intervals)", known or nothing), Points("What is not", loose or nothing)]
+
+
+def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...]) -> Table:
+    lines = []
+    for name, values in draws.items():
+        low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+        share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
+        lines.append([name, unit_text(unit_of(name, effects)) or "–", number(middle), span(low, high), share])
+    caption = (
+        "The interval's width before the test is that of the prior; well known means shrunk by at least "
+        f"{100 * LEAST_CONTRACTION:.0f} %."
+    )
+    return Table(["parameter", "unit", "median", "90 % interval", "shrunk by"], lines, caption)
+
+
+def _derived(derived: dict[str, Any]) -> Table:
+    told = {key: derived[key] for key in CREEP_TIMES_S}
+    lines = [[_SPOKEN[key], number(s["q50"]), span(s["q05"], s["q95"])] for key, s in told.items()]
+    caption = f"Creep of a fresh sample at a constant {derived['tension_N']:g} N; extrapolated beyond the longest hold."
+    return Table(["after", "creep, mm", "90 % interval"], lines, caption)
+
+
+def _residuals(stored: Stored) -> Any:
+    protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
+    alone = stored.likelihood == "hold"
+    first = readings[:, 0] if alone else np.full(len(readings), np.nan)
+    question = Question(protocol, 0 if alone else len(readings), protocol.recorded, first)
+    rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), _DRAWS)).astype(int)
+    replicates = predict(stored.problem, stored.theta[rows], stored.sample, question, np.random.default_rng(0))
+    wanted = protocol.mask.copy()
+    if alone:
+        wanted[:, 0] = False
+    band = np.quantile(replicates[wanted], [0.05, 0.5, 0.95], axis=1)
+    number_of = np.broadcast_to(protocol.number[:, None], wanted.shape)[wanted]
+    kind = stored.likelihood
+    title = f"{stored.sample.name}, {figures.WORDS[kind]}"
+    return figures.residuals(number_of, protocol.time_s[wanted], readings[wanted], band, title, figures.COLOURS[kind])
