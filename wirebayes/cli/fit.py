@@ -72,7 +72,7 @@ def fit(
     jobs = []
     for folder, members in groups.items():
         for e in effects:
-            _check_possible(e, members, file)
+            _check_possible(e, members, file, known)
         exponent = stats.norm(1.0, 1.0) if together is not None else 1.0
         build(members, effects, law=elastic_law, history=history, likelihood=likelihood, length_exponent=exponent)  # checks priors
         provenance = shared | {"data_sha256": {e.name: e.data_hash for e in members}}
@@ -95,12 +95,14 @@ def fit(
             print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
 
 
-def _check_possible(effect, members, file) -> None:  # type: ignore[no-untyped-def]
+def _check_possible(effect, members, file, known) -> None:  # type: ignore[no-untyped-def]
     """An effect that these holds cannot show at all is an error of the user's, not a prior-shaped posterior."""
     from wirebayes.errors import InputError
     from wirebayes.wire.effect import EventEffect
 
     protocols = [e.protocol() for e in members]
+    if effect.name not in known:
+        return  # the flexible discrepancy shows anywhere
     variants = [v.key for v in type(effect).variants(protocols)]
     if effect.key in variants:
         return

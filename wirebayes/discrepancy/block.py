@@ -90,7 +90,7 @@ class Pinned:
         def density(points: Array, rows: Array) -> Array:
             return self.target(self._insert(points, amplitude[rows])) - self.log_flat
 
-        return climb(density, start, iterations=40, tolerance=1e-3)
+        return climb(density, start, iterations=40, tolerance=1e-2)
 
     def _insert(self, z: Array, amplitude: Array) -> Array:
         return np.insert(z, self.column, amplitude / self.target.coordinates.scale[self.column], axis=1)

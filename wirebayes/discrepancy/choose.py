@@ -12,12 +12,11 @@ from wirebayes.discrepancy.block import Block
 from wirebayes.discrepancy.expansion import Probe, Scan
 from wirebayes.discrepancy.naming import Refit, probabilities, refit, smallest_set
 from wirebayes.discrepancy.screen import Candidate, flexible_log_bayes, log_bayes
-from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
 UNKNOWN_WEIGHT = 1.0  # prior odds of *something unknown* to one named effect
-_MARGIN, _SHARE = 6.0, 0.4  # linear screening errs, and errs more for a large effect
-_MOST, _MOST_A_NAME = 20, 4
+_MARGIN, _SHARE = 5.0, 0.35  # linear screening errs, and errs more for a large effect
+_MOST, _MOST_A_NAME = 16, 3
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def choose(blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequenc
     forms: dict[tuple[str, str, tuple[int, ...], bool], int] = {}
     for i, c in enumerate(candidates):
         effect = trials[c.probe].effect
-        form = (c.name, _variant(effect), c.blocks, c.shared)
+        form = (c.name, effect.key, c.blocks, c.shared)
         if form not in forms or linear[i][0] > linear[forms[form]][0]:
             forms[form] = i
     ranked = sorted(forms.items(), key=lambda item: -linear[item[1]][0])
@@ -92,10 +91,6 @@ def choose(blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequenc
             winners[name] = max(own.values(), key=lambda r: sum(x.log_bayes for x in r))
     shares = probabilities({n: v for n, v in evidence.items() if n in winners}, unknown, UNKNOWN_WEIGHT)
     return Choice(evidence, unknown, winners, shares)
-
-
-def _variant(effect: Effect) -> str:
-    return f"{effect.key}/{getattr(effect, 'test', '')}"
 
 
 def _average(values: dict[tuple[str, tuple[int, ...], bool], float], blocks: int) -> float:

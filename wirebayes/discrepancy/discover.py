@@ -18,6 +18,7 @@ from wirebayes.discrepancy.choose import Choice
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
 from wirebayes.discrepancy.screen import Candidate, GlobalTest
 from wirebayes.effects import CATALOGUE
+from wirebayes.effects.unknown import Discrepancy
 from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment
 from wirebayes.wire.effect import Effect, EventEffect
@@ -153,9 +154,22 @@ def investigate(
         checks = _held_out(block, final[i], verdict, choice, i, rng)
         for e, check in zip(block.experiments, checks, strict=True):
             effects[e.name] = final[i].effects
-            out[e.name] = common | {"held_out": check, "gross_errors": [g for g in struck if g["experiment"] == e.name]}
+            sample = block.target.problem.samples[block.names.index(e.name)]
+            line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
+            residual = (sample.readings - line.tension)[sample.protocol.mask]
+            out[e.name] = common | {"held_out": check, "residual_rms_N": float(np.sqrt((residual**2).mean())), "gross_errors": [g for g in struck if g["experiment"] == e.name]}
     report("held-out holds", len(plain), len(plain))
     return Findings({"version": 1, "experiments": out}, effects, tuple(e for b in plain for e in b.experiments))
+
+
+def final_effects(findings: Findings, experiment: Experiment) -> tuple[Effect, ...]:
+    """The effects of an experiment's final model; the flexible discrepancy where what is missing has no name."""
+    report = findings.report["experiments"][experiment.name]
+    if report["verdict"] == "unknown":
+        durations = [h.duration_s for h in experiment.recorded_holds]
+        return (Discrepancy(len(experiment.holds), float(report["residual_rms_N"]), float(np.median(durations)) or 1.0),)
+    # An event stays with its experiment, an amplitude needs holds that can show it.
+    return tuple(e for e in findings.effects[experiment.name] if getattr(e, "test", "") in ("", experiment.name))
 
 
 @dataclass(frozen=True)

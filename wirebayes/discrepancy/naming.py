@@ -17,7 +17,7 @@ from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
 LARGEST = 40.0
-_DELTAS = np.array([1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0])
+_DELTAS = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
         best = int(np.argmax(value))
         left = grid[best - 1] if best else (main.neutral if one_sided else 2 * grid[0] - grid[1])
         right = grid[best + 1] if best + 1 < len(grid) else grid[best]
-        finer = np.linspace(left, right, 9)[1:-1]
+        finer = np.linspace(left, right, 8)[1:-1]
         more, more_ends = curve(finer, [e[best] for e in ends])
         order = np.argsort(np.concatenate([grid, finer]), kind="stable")
         grid, value = np.concatenate([grid, finer])[order], np.concatenate([value, more])[order]

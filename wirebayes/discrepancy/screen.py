@@ -54,7 +54,7 @@ def candidate_probes(blocks: Sequence[Block], kinds: Mapping[str, type[Effect]])
             if kind.name in accepted and not issubclass(kind, EventEffect):
                 continue
             for effect in _variants(kind, block, several):
-                where.setdefault(_key(effect), (effect, []))[1].append(at)
+                where.setdefault(effect.key, (effect, []))[1].append(at)
         for effect, on in where.values():
             for probe in probes(effect):
                 number = len(trials)
@@ -77,10 +77,6 @@ def _variants(kind: type[Effect], block: Block, several: bool) -> list[Effect]:
     found = [(e.name, v) for e in block.experiments for v in kind.variants([e.protocol()])]
     out = [replace(v, test=name) if several else v for name, v in found]  # type: ignore[type-var]
     return [v for v in out if v.key not in taken]
-
-
-def _key(effect: Effect) -> str:
-    return f"{effect.key}/{getattr(effect, 'test', '')}"
 
 
 def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:

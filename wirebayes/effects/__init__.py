@@ -4,7 +4,7 @@ import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
 
-from wirebayes.effects import creep, elastic, event, instrument
+from wirebayes.effects import creep, elastic, event, instrument, unknown
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Effect, EventEffect
 
@@ -70,7 +70,7 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
 
 
 def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
-    """The effect of a name, ``grip_slip@7`` for one that belongs to a hold.
+    """The effect of a key: a name, ``grip_slip@7`` (or ``grip_slip@EXPERIMENT:7``) for one that belongs to a hold.
 
     Raises
     ------
@@ -78,13 +78,16 @@ def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
         If there is no such effect, or the hold is missing or superfluous.
     """
     name, _, variant = key.partition("@")
+    if name == unknown.Discrepancy.name:
+        return unknown.parsed(variant)
     if name not in known:
         raise InputError(f"effect {key}: no such effect; known are {', '.join(sorted(known))}")
     kind = known[name]
     if issubclass(kind, EventEffect):
-        if not variant.isdigit():
-            raise InputError(f"effect {key}: this effect happens at one hold, name it as in {name}@7")
-        return kind(hold=int(variant))
+        test, _, hold = variant.rpartition(":")
+        if not hold.isdigit():
+            raise InputError(f"effect {key}: this effect happens at one hold, name it as in {name}@7 or {name}@EXPERIMENT:7")
+        return kind(hold=int(hold), test=test)
     if issubclass(kind, elastic.LengthDependence):
         if variant not in ("k1", "B", "U", "N"):
             raise InputError(f"effect {key}: name the parameter as in {name}@k1 (one of k1, B, U, N)")

@@ -41,8 +41,12 @@ class Toe(Effect):
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         width = own["c"]
         safe = np.where(width > 0, width, 1.0)
-        taut = np.where(value.real > 0, value, 0.0)
-        return np.where(width > 0, value - width * -np.expm1(-taut / safe), value)
+        straight = np.where(width > 0, -np.expm1(-np.maximum(value.real, 0.0) / safe), 0.0)
+        shortened = value.real - width * straight
+        if not np.iscomplexobj(value):
+            return shortened
+        # The derivative written out: a complex exponential costs ten real ones.
+        return shortened + 1j * value.imag * np.where(width > 0, straight, 1.0)
 
 
 class FixtureCompliance(Effect):

@@ -150,7 +150,7 @@ class EventEffect(Effect):
 
     @property
     def key(self) -> str:
-        return f"{self.name}@{self.hold}"
+        return f"{self.name}@{self.test}:{self.hold}" if self.test else f"{self.name}@{self.hold}"
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:

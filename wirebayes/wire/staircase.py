@@ -183,11 +183,12 @@ class _Walk:
         """`hold` with its derivatives by setting error and carried creep."""
         past = list(self.past)
         y_s, out_s, _ = self.hold(j, stretched + 1j * _STEP, creep, beside)
-        self.past = list(past)
-        y_c, out_c, _ = self.hold(j, stretched, creep + 1j * _STEP, beside)
         self.past = past
-        y, out, after = self.hold(j, stretched, creep, beside)
-        return y, y_s.imag / _STEP, y_c.imag / _STEP, out, out_s.imag / _STEP, out_c.imag / _STEP, after
+        y_c, out_c, after = self.hold(j, stretched, creep + 1j * _STEP, beside)
+        start_s, amount, k2 = self.past[-1]
+        self.past[-1] = (start_s, amount.real, k2.real)
+        after = {key: value.real for key, value in after.items()}
+        return y_c.real, y_s.imag / _STEP, y_c.imag / _STEP, out_c.real, out_s.imag / _STEP, out_c.imag / _STEP, after
 
     def closed_form(self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]) -> Any:
         """The same without effects: eqs (4)-(6) differentiated by hand."""

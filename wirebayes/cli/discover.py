@@ -1,0 +1,92 @@
+"""``wirebayes discover``: what the plain model is missing, added to it where it has a name."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wirebayes.cli.fit import OwnEffects
+from wirebayes.cli.options import (
+    ElasticLawOption,
+    ExperimentFile,
+    ExperimentName,
+    HistoryOption,
+    Output,
+    Seed,
+    TrainHolds,
+)
+
+if TYPE_CHECKING:
+    from wirebayes.discrepancy.discover import Findings
+
+
+def discover(
+    file: ExperimentFile,
+    output: Output,
+    seed: Seed = 0,
+    experiment: ExperimentName = None,
+    train_holds: TrainHolds = None,
+    elastic_law: ElasticLawOption = "hooke",
+    history: HistoryOption = "saturating",
+    without: Annotated[
+        list[str] | None, typer.Option("--without", metavar="EFFECT", help="Leave an effect out of the catalogue; may be repeated.")
+    ] = None,
+    own_effects: OwnEffects = None,
+) -> None:
+    """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
+    from wirebayes import __version__
+    from wirebayes.bayes.jobs import run
+    from wirebayes.cli.progress import progress
+    from wirebayes.discrepancy.discover import Settings, catalogue_without, investigate
+    from wirebayes.effects import catalogue
+    from wirebayes.experiment import read_experiments, select
+    from wirebayes.output import open_run, write_json
+
+    experiments = select(read_experiments(file), experiment)
+    if train_holds is not None:
+        experiments = [e.train(train_holds) for e in experiments]
+    kinds = catalogue_without(without or (), catalogue(own_effects))
+    configuration = {
+        "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
+        "without": sorted(without or ()), "own_effects": own_effects.read_text() if own_effects else None,
+        "train_holds": train_holds, "priors": {e.name: e.priors for e in experiments},
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }  # fmt: skip
+    opened = open_run(output, configuration)
+    if opened.state == "done":
+        return
+    with progress() as report:
+        findings = investigate(experiments, Settings(elastic_law, history, kinds), seed, report)
+        jobs = _jobs(findings, elastic_law, history, own_effects)
+        run(jobs, output, seed, report=report)
+    _pictures(findings, output)
+    write_json(output / "discovery.json", findings.report)
+    opened.finish()
+    for job in jobs:
+        summary = json.loads((output / job.folder / "summary.json").read_text())
+        if not summary["converged"]:
+            print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
+
+
+def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type: ignore[no-untyped-def]
+    """Plain and final fit of every experiment."""
+    from wirebayes.bayes.jobs import Job
+    from wirebayes.discrepancy.discover import final_effects
+
+    out = []
+    for e in findings.experiments:
+        provenance = {"data_sha256": e.data_hash}
+        for model, effects in (("plain", ()), ("final", final_effects(findings, e))):
+            keys = tuple(f.key for f in effects)
+            out.append(Job(f"{e.name}/{model}", (e,), keys, own_effects, law, history, "chain", 1.0, provenance))
+    return out
+
+
+def _pictures(findings: "Findings", output: Path) -> None:
+    """Before and after, hold by hold."""
+    from wirebayes.report.discover import before_and_after
+
+    for e in findings.experiments:
+        before_and_after(output / e.name, findings.report["experiments"][e.name], output / f"{e.name}.png")

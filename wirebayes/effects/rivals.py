@@ -1,0 +1,105 @@
+"""Rivals of eq (5): other time laws, and eq (2) without any. Not missing effects, so not in the catalogue.
+
+A time law returns the share of the creep reached by a time, whatever eq (5) said. Where it has no plateau, the creep
+of eq (4) is what is reached after a day.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+
+Own = dict[str, NDArray[Any]]
+DAY_S = 86400.0
+
+
+class AtOnce(Effect):
+    """Eq (2) without time: the strain is an elastic part s and a creep part B (k1 s)^U / L0."""
+
+    name = "at_once"
+    place = "strain"
+    scope = "material"
+    amplitudes = ()
+    sentence = "The creep of eq (2) has happened before the first reading."
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        stretched = value.real > 0
+        whole = np.where(stretched, value, 1.0)
+        exponent = hold.theta["U"]
+        creep = hold.theta["B"] / hold.length_mm * hold.theta["k1"] ** exponent
+        # In log s the equation is convex and rising, so Newton's steps from above cannot miss.
+        log_s = np.log(whole)
+        for _ in range(_NEWTON_STEPS):
+            elastic, crept = np.exp(log_s), creep * np.exp(exponent * log_s)
+            step = (elastic + crept - whole) / (elastic + exponent * crept)
+            log_s = log_s - step
+            if np.max(np.abs(step)) < 1e-13:
+                break
+        return np.where(stretched, np.exp(log_s), value)
+
+
+_NEWTON_STEPS = 60
+
+
+class NotInTime(Effect):
+    """No creep by eq (5) at all; beside `AtOnce`."""
+
+    name = "not_in_time"
+    place = "fraction"
+    scope = "material"
+    amplitudes = ()
+    sentence = "Nothing changes while a position is held."
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return 0.0 * value
+
+
+class Logarithmic(Effect):
+    """log(1 + t / t0), one at a day."""
+
+    name = "logarithmic"
+    place = "fraction"
+    scope = "material"
+    amplitudes = (Amplitude("t0", "s", np.nan, stats.lognorm(1.5, scale=10.0), is_shape=True),)
+    sentence = "The creep goes on with the logarithm of time."
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        share = np.log1p(hold.time_s / own["t0"]) / np.log1p(DAY_S / own["t0"])
+        return np.asarray(share + 0.0 * value)
+
+
+class PowerLaw(Effect):
+    """(t / day)^n."""
+
+    name = "power_law"
+    place = "fraction"
+    scope = "material"
+    amplitudes = (Amplitude("n", "-", np.nan, stats.lognorm(0.7, scale=0.25), is_shape=True),)
+    sentence = "The creep goes on with a power of time."
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return np.asarray((hold.time_s / DAY_S) ** own["n"] + 0.0 * value)
+
+
+class TwoModes(Effect):
+    """Two exponentials, the second slower by a factor."""
+
+    name = "two_modes"
+    place = "fraction"
+    scope = "material"
+    amplitudes = (
+        Amplitude("slow_share", "-", np.nan, stats.uniform(0.0, 1.0)),
+        Amplitude("slower", "-", np.nan, stats.lognorm(1.0, scale=10.0), is_shape=True),
+    )
+    sentence = "The creep has two exponential modes."
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        rate = hold.theta["k2"] * hold.time_s
+        share = (1.0 - own["slow_share"]) * -np.expm1(-rate) + own["slow_share"] * -np.expm1(-rate / own["slower"])
+        return np.asarray(share + 0.0 * value)
+
+
+RIVALS: dict[str, type[Effect]] = {rival.name: rival for rival in (AtOnce, NotInTime, Logarithmic, PowerLaw, TwoModes)}

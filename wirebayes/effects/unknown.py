@@ -1,0 +1,67 @@
+"""What is added when something is missing that has no name: a discrepancy that knows less the farther it is asked.
+
+Two random walks over the order of holds, one for the level and one for the course within the hold, bent at a few
+knots. Beyond the training holds the walks go on, so the bands widen there instead of promising what was not seen.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.errors import InputError
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+
+KNOTS = 4  # in the training holds, and as many behind them
+
+
+@dataclass(frozen=True)
+class Discrepancy(Effect):
+    """Random walks added to the reading.
+
+    Attributes
+    ----------
+    holds : int
+        Training holds, unrecorded ones included: what the knots divide.
+    size_N : float
+        Standard deviation that a walk has reached after the training holds.
+    hold_s : float
+        Typical duration of a hold, which scales the time within it.
+    """
+
+    holds: int
+    size_N: float
+    hold_s: float
+    name = "discrepancy"
+    place = "reading"
+    scope = "environment"
+    sentence = "Something is missing that has no name here; its size was learned from the readings."
+    shows = "smooth over holds and time"
+
+    @property
+    def key(self) -> str:
+        return f"{self.name}@{self.holds}:{self.size_N!r}:{self.hold_s!r}"
+
+    @property
+    def amplitudes(self) -> tuple[Amplitude, ...]:  # type: ignore[override]
+        step = stats.norm(0.0, self.size_N / KNOTS**0.5)
+        return tuple(Amplitude(f"{walk}{k}", "N", 0.0, step) for walk in ("level", "course") for k in range(2 * KNOTS))
+
+    def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
+        place = hold.index / max(self.holds - 1, 1) * KNOTS
+        course = np.log1p(10.0 * hold.time_s / self.hold_s) / np.log(11.0) - 0.5
+        for k in range(2 * KNOTS):
+            done = min(max(place - k, 0.0), 1.0)
+            value = value + done * (own[f"level{k}"] + own[f"course{k}"] * course)
+        return value
+
+
+def parsed(variant: str) -> Discrepancy:
+    """The discrepancy of a key's part behind the ``@``."""
+    try:
+        holds, size, duration = variant.split(":")
+        return Discrepancy(int(holds), float(size), float(duration))
+    except ValueError:
+        raise InputError(f"effect discrepancy@{variant}: expected discrepancy@HOLDS:SIZE_N:HOLD_S") from None

@@ -1,0 +1,70 @@
+"""Before and after: the readings against the plain and the final model, hold by hold."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from wirebayes.bayes import noise, result
+from wirebayes.wire.staircase import linearise
+
+Array = NDArray[Any]
+_MEASURED, _BAND, _HELD = "#1b1b1b", "#4c78a8", "#f2e6d0"
+
+
+def before_and_after(folder: Path, verdict: dict[str, Any], target: Path) -> None:
+    """Draw measured minus predicted tension for a folder's ``plain`` and ``final`` posteriors.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``plain`` and ``final``.
+    verdict : dict
+        The experiment's part of ``discovery.json``.
+    target : Path
+        The picture to write.
+    """
+    figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
+    added = " + ".join(verdict["accepted"]) or {"unknown": "something unknown"}.get(verdict["verdict"], "nothing")
+    titles = {"plain": "plain model", "final": f"with {added}"}
+    for axis, model in zip(axes, titles, strict=True):
+        _residuals(axis, folder / model, verdict["held_out"]["holds"])
+        axis.set_title(f"{folder.name}: {titles[model]}", loc="left", fontsize=10)
+        axis.set_ylabel("measured − predicted (N)")
+    axes[1].set_xlabel("hold number; within each hold, time runs to the right")
+    axes[0].legend(loc="best", fontsize=8, frameon=False)
+    figure.savefig(target, dpi=130)
+    plt.close(figure)
+
+
+def _residuals(axis: Axes, folder: Path, held: list[int]) -> None:
+    stored = result.load(folder)
+    sample = stored.sample
+    rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
+    own = {name: values[rows] for name, values in stored.draws.items()}
+    line = linearise(sample.protocol, own, sample.model)
+    variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+    width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
+    drawn = line.tension + np.random.default_rng(1).normal(size=line.tension.shape) * width
+    middle = line.tension.mean(axis=2)
+    low, high = np.quantile(drawn, [0.05, 0.95], axis=2)
+    shown = np.flatnonzero(sample.protocol.recorded)
+    for k, j in enumerate(shown):
+        keep = sample.protocol.mask[j]
+        time = sample.protocol.time_s[j][keep]
+        x = k + 0.1 + 0.8 * time / max(float(sample.protocol.duration_s[j]), 1e-9)
+        number = int(sample.protocol.number[j])
+        if number in held:
+            axis.axvspan(k, k + 1, color=_HELD, zorder=0, label="held out for the gap" if number == held[0] else None)
+        first = k == 0
+        axis.fill_between(x, (low[j] - middle[j])[keep], (high[j] - middle[j])[keep], color=_BAND, alpha=0.3, lw=0, label="90 % band" if first else None)
+        axis.plot(x, (sample.readings[j, :, 0] - middle[j])[keep], "o-", color=_MEASURED, ms=3, lw=0.8, label="measured" if first else None)
+    axis.axhline(0.0, color="0.5", lw=0.6)
+    axis.set_xticks(np.arange(len(shown)) + 0.5, [str(int(sample.protocol.number[j])) for j in shown])
+    axis.set_xlim(0, len(shown))
