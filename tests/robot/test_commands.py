@@ -95,3 +95,71 @@ def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
     (tmp_path / "posterior.nc").write_text("not netcdf")
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
     assert "posterior.nc" in capsys.readouterr().err
+
+
+@pytest.fixture
+def session_csv(tmp_path):
+    """A session on linear-7 whose true reference errors are known, written as the command reads it."""
+    from wirebayes.robot import draws, inverse, rotation, schema, session_file
+    from wirebayes.robot.session import Prior, Session, predict
+
+    robot = schema.read("linear-7")
+    line = draws.WireDraws({k: np.full(3, v) for k, v in
+                            {"k1": 803.0, "B": 0.31, "U": 1.0, "k2": 0.03, "N": 0.64}.items()}, 1000.0)  # fmt: skip
+    x = robot.home_m + np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.05], [-0.1, -0.1, -0.05], [0.05, -0.15, 0.1]])
+    R = rotation.matrix(np.zeros((len(x), 3)))
+    tau = inverse.tensions(robot, x, R)
+    told = inverse.commands(robot, draws.for_robot(robot, line.centre()), x, R, tau)
+    read = np.arange(len(x)) > 0
+    session = Session(x, R, told.joint_m, np.full(len(x), 30.0), read, 0.02)
+    prior = Prior(line, 5e-3, 1e-6)
+    truth = prior.moments(robot.legs)[0][None].copy()
+    truth[0, : robot.legs] = 1e-3 * np.array([3, -2, 1, 4, -5, 0, 2])
+    real = predict(robot, prior, session, truth)
+    tension = iter(real.readings.reshape(-1, robot.legs) * 0.02)
+    rows = [session_file.columns(robot, False)]
+    for k in range(len(x)):
+        cells = [str(v) for v in (k + 1, *x[k], 0, 0, 0, 30.0, *told.joint_m[k])]
+        rows.append([*cells, *([str(v) for v in next(tension)] if read[k] else [""] * robot.legs)])
+    file = tmp_path / "session.csv"
+    file.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    return file, real.length_m[0]
+
+
+def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
+    file, truth = session_csv
+    out = tmp_path / "out"
+    assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 0
+    said = json.loads((out / "calibrate.json").read_text())
+    found = said["with_creep_model"]
+    assert found["converged"]
+    assert found["misfit"] < 1
+    low, high = np.array(found["length_m"]["q05"]), np.array(found["length_m"]["q95"])
+    assert np.mean((low <= truth) & (truth <= high)) > 0.8
+    assert np.abs(np.array(found["length_m"]["mean"]) - truth).mean() < 1.5e-3
+    assert said["observability"]["of"] == 7
+    assert len(said["next_positions_m"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("hold,", "holds,", "line 1"),
+        (",30.0,", ",-30.0,", "line 2, column duration_s"),
+        (",30.0,", ",nan,", "line 2, column duration_s"),
+        (",30.0,", ",", "line 2"),
+        (",,,,,,,\n", ",1.0,,,,,,\n", "line 2"),
+    ],
+)
+def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, said):
+    file, _ = session_csv
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    out = tmp_path / "out"
+    assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 2
+    line = capsys.readouterr().err.strip()
+    assert "session.csv" in line
+    assert said in line
+    assert "\n" not in line
+    assert not out.exists()

@@ -53,6 +53,45 @@ def pose(
         typer.echo(f"warning: {warning}", err=True)
 
 
+def calibrate(
+    robot: RobotFile,
+    readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Poses, joints and tensions, in order.")],
+    wires: Wires,
+    output: Output,
+    tension_sd: Annotated[float, typer.Option("--tension-sd", metavar="N", help="Error of a tension, newtons.")] = 0.02,
+    tilt_sd: Annotated[float, typer.Option("--tilt-sd", metavar="RAD", help="Error of the normal.")] = 1e-3,
+    reference_sd: Annotated[
+        float, typer.Option("--reference-sd", metavar="MM", help="How wrong the reference lengths may be.")
+    ] = 5.0,
+    spread: Annotated[float, typer.Option("--specimen-spread", help="Relative, from wire to wire of one line.")] = 0.05,
+    draws: Draws = 1000,
+    experiment: ExperimentName = None,
+    seed: Seed = 0,
+) -> None:
+    """Current zero-tension length of every wire from joint values and tensions, no external sensor needed."""
+    from wirebayes.errors import InputError
+    from wirebayes.output import open_run, write_json
+    from wirebayes.robot import schema, session_file
+    from wirebayes.robot.calibration_answer import answer
+    from wirebayes.robot.session import Prior
+
+    for name, value in (("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd)):
+        if not 0 < value < float("inf"):
+            raise InputError(f"{name}: found {value:g}; expected a finite number above 0")
+    if not 0 <= spread < 1:
+        raise InputError(f"--specimen-spread: found {spread:g}; expected a number from 0 to 1")
+    machine = schema.read(robot)
+    session, values = session_file.read(readings, machine, tension_sd, tilt_sd)
+    line = read_wires(wires, draws, experiment)
+    options = (experiment, tension_sd, tilt_sd, reference_sd, spread, _content(readings))
+    run = open_run(output, _configuration("calibrate", robot, wires, draws, seed, *options))
+    if run.state == "done":
+        return
+    prior = Prior(line, 1e-3 * reference_sd, spread)
+    write_json(run.directory / "calibrate.json", answer(machine, prior, session, values, seed))
+    run.finish()
+
+
 def read_wires(folder: Path, count: int, experiment: str | None = None) -> "WireDraws":
     """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
     from wirebayes.bayes.result import load
@@ -110,19 +149,20 @@ def _times(text: str) -> Any:
 
 def _configuration(command: str, robot: str, wires: Path, draws: int, seed: int, *rest: Any) -> dict[str, Any]:
     """Everything that decides the results; files by their content, not by where they lie."""
-    from hashlib import sha256
-
     from wirebayes import __version__
-
-    def content(path: Path) -> str:
-        return sha256(path.read_bytes()).hexdigest() if path.is_file() else str(path)
 
     return {
         "command": command,
         "version": __version__,
-        "robot": content(Path(robot)),
-        "wires": content(wires / "posterior.nc"),
+        "robot": _content(Path(robot)),
+        "wires": _content(wires / "posterior.nc"),
         "draws": draws,
         "seed": seed,
         "options": list(rest),
     }
+
+
+def _content(path: Path) -> str:
+    from hashlib import sha256
+
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else str(path)
