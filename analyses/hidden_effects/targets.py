@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .score import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ratio
+from .rates import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ratio
 
 Target = dict[str, Any]
 

@@ -3,17 +3,8 @@
 import pytest
 from scipy.stats import binom
 
-from analyses.hidden_effects.score import (
-    closed,
-    closed_of_oracle,
-    confusion,
-    lower_bound,
-    pooled,
-    rate,
-    rmse_ratio,
-    score,
-    upper_bound,
-)
+from analyses.hidden_effects.rates import closed, closed_of_oracle, lower_bound, pooled, rate, rmse_ratio, upper_bound
+from analyses.hidden_effects.score import confusion, score
 
 HOLDS = {"sample-1": [9, 10]}
 
