@@ -33,7 +33,10 @@ _PRIOR_DRAWS = 20_000
 
 
 def reproduce(
-    directory: Path, seed: int = 0, report: Callable[[str, float, float], None] = lambda name, done, total: None
+    directory: Path,
+    seed: int = 0,
+    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    policy: Policy = POLICY,
 ) -> list[str]:
     """Everything the paper shows, on its own tables, with posteriors.
 
@@ -45,6 +48,8 @@ def reproduce(
     seed : int
     report : callable
         ``report(name, done, total)``, for a progress bar.
+    policy : Policy
+        When a fit is believed.
 
     Returns
     -------
@@ -58,10 +63,10 @@ def reproduce(
     """
     experiments, published = paper.experiments(), paper.published()
     training = int(published["identification"]["training_holds"])
-    run = open_run(directory, configuration(experiments, seed))
+    run = open_run(directory, configuration(experiments, seed, policy))
     if run.state != "done":
         jobs = fits(experiments, training)
-        run_jobs(jobs, directory, seed, policy=POLICY, report=report)
+        run_jobs(jobs, directory, seed, policy=policy, report=report)
         _tables_and_pictures(directory, experiments, published, training, seed, report)
         section_4.write(directory, seed)
         write_page(directory)
@@ -69,13 +74,13 @@ def reproduce(
     return _not_converged(directory, fits(experiments, training))
 
 
-def configuration(experiments: Sequence[Experiment], seed: int) -> dict[str, Any]:
+def configuration(experiments: Sequence[Experiment], seed: int, policy: Policy) -> dict[str, Any]:
     """Everything that decides the results."""
     return {
         "command": "reproduce",
         "version": __version__,
         "seed": seed,
-        "policy": describe(POLICY),
+        "policy": describe(policy),
         "data_sha256": {e.name: e.data_hash for e in experiments},
     }
 
