@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from wirebayes.robot import forward, rotation, schema
+from wirebayes.robot.certificate import certify
+from wirebayes.robot.enclosure import enclose
+from wirebayes.robot.wires import Wires
+
+from . import cases
+
+pytest.importorskip("flint")
+
+
+def _case(name, law, make=cases.commanded, seed=0):
+    robot = schema.read(name)
+    c = make(robot, law, 2, np.random.default_rng(seed))
+    found = cases.solved(robot, c)
+    return robot, c.wires.theta["k1"][0, 0], c.zero_m[0], c.offset_m[0], found.position_m[0], found.rotation[0]
+
+
+@pytest.mark.parametrize("name", schema.shipped())
+@pytest.mark.parametrize("law", ["hooke", "modified"])
+def test_every_shipped_robot_can_be_certified(name, law):
+    robot, k1, zero, offset, x, R = _case(name, law)
+    known = np.full(robot.legs, k1)
+    proof = certify(robot, law, (known, known), (zero, zero), offset, x, R)
+    assert proof.proved
+    assert proof.radius_m.max() < 1e-11
+    assert proof.unique_m > 1e-5
+
+
+@pytest.mark.parametrize("name", ["cogiro-desk", "linear-7", "hangprinter-4"])
+def test_every_sampled_pose_lies_in_the_guaranteed_enclosure(name):
+    robot, k1, zero, offset, x, R = _case(name, "hooke")
+    rng = np.random.default_rng(1)
+    w = robot.legs
+    low, high = np.full(w, k1 * 0.9997), np.full(w, k1 * 1.0003)
+    half = 2e-5
+    proof = certify(robot, "hooke", (low, high), (zero - half, zero + half), offset, x, R)
+    assert proof.proved
+    n = 400
+    corners = rng.random((2, n, w)) < 0.5
+    inside = rng.random((2, n, w))
+    share = np.where(np.arange(n)[:, None] < n // 2, corners, inside)
+    wires = Wires("hooke", "saturating", {"k1": (low + (high - low) * share[0]).T}, np.full((w, 1), 1000.0))
+    found = forward.solve(robot, wires, zero + half * (2 * share[1] - 1), offset, x, R)
+    assert found.found.all()
+    reach = np.abs(found.position_m - x).max(0)
+    assert (reach <= proof.radius_m[:3]).all()
+    assert (proof.radius_m[:3] < 4 * reach).all()  # an enclosure, not a room
+    if robot.degrees == 6:
+        turn = rotation.vector(found.rotation @ R.T)
+        cayley = 2 * np.tan(0.5 * np.linalg.norm(turn, axis=1, keepdims=True)) * turn / np.linalg.norm(
+            turn, axis=1, keepdims=True)  # fmt: skip
+        assert (robot.size_m * np.abs(cayley).max(0) <= proof.radius_m[3:]).all()
+
+
+def test_a_wrong_pose_is_not_certified():
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    known = np.full(robot.legs, k1)
+    proof = certify(robot, "hooke", (known, known), (zero, zero), offset, x - [0.0, 0.0, 0.002], R)
+    # the enclosure must hold the true pose, or nothing may be said
+    assert not proof.proved or np.all(np.abs(x - proof.centre_m) <= proof.radius_m[:3])
+
+
+def test_a_platform_free_to_move_is_not_certified():
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    known = np.full(robot.legs, k1)
+    assert not certify(robot, "hooke", (known, known), (zero + 1, zero + 1), offset, x, R).proved
+
+
+def test_bounds_too_wide_are_not_certified():
+    robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke")
+    known = np.full(robot.legs, k1)
+    assert not certify(robot, "hooke", (0.5 * known, 2 * known), (zero - 0.05, zero + 0.05), offset, x, R).proved
+
+
+def test_wires_on_the_edge_of_slackness_are_handled():
+    robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke", cases.disturbed, seed=2)
+    known = np.full(robot.legs, k1)
+    proof = certify(robot, "hooke", (known, known), (zero, zero), offset, x, R)
+    assert proof.proved
+
+
+@pytest.mark.parametrize("name", ["linear-7", "hangprinter-4"])
+def test_lengths_that_change_together_are_enclosed_piece_by_piece(name):
+    robot, k1, zero, offset, x, R = _case(name, "hooke")
+    longer = zero * (1 + 3e-4 * np.linspace(0.8, 1.2, robot.legs))
+    box = enclose(robot, "hooke", k1, zero, longer, offset, x, R)
+    assert box.proved
+    assert box.proofs > 1
+    share = np.linspace(0, 1, 101)[:, None]
+    wires = Wires("hooke", "saturating", {"k1": np.full((1, 1), k1)}, np.full((robot.legs, 1), 1000.0))
+    found = forward.solve(robot, wires, zero + share * (longer - zero), offset, x, R).position_m
+    assert (box.low_m <= found.min(0)).all()
+    assert (found.max(0) <= box.high_m).all()
+    assert (box.high_m - box.low_m).max() < 2 * np.ptp(found, axis=0).max()
+    assert not enclose(robot, "hooke", k1, zero, longer, offset, x, R, most=1).proved
