@@ -1,4 +1,4 @@
-"""Simulation-based calibration: draw a truth from the prior, simulate, fit, and ask where the truth lies in the posterior.
+"""Simulation-based calibration: draw a truth from the prior, simulate, fit, and see where the truth lies.
 
 If prior, simulator, likelihood and sampler belong together, the share of posterior draws below the truth is uniform for
 every quantity of parameters and readings. The band here holds the empirical distributions of all quantities at once.
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from wirebayes.bayes.coordinates import Coordinates
 from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import Fit, fit, seed_of
 from wirebayes.bayes.problem import Problem, with_readings
@@ -42,7 +43,7 @@ class Ranked:
 def one(
     problem: Problem,
     seed: int,
-    policy: Policy = Policy(),
+    policy: Policy | None = None,
     *,
     fitted: Callable[[Problem], Problem] = lambda problem: problem,
 ) -> Ranked:
@@ -65,7 +66,7 @@ def one(
     truth = problem.prior.rvs(1, rng)
     simulated = with_readings(problem, [readings(problem, truth, sample, rng) for sample in problem.samples])
     target = fitted(simulated)
-    done = fit(target, seed_of(seed, "fit"), policy=policy)
+    done = fit(target, seed_of(seed, "fit"), policy=policy or Policy())
     draws = _last_of_every_walker(done)
     columns = np.column_stack([draws, target.log_likelihood(draws)])
     value = np.append(truth[0], target.log_likelihood(truth))
@@ -79,8 +80,6 @@ def one(
 
 def _last_of_every_walker(done: Fit) -> Array:
     """(n, d) draws that are as good as independent: walkers only meet through the differential-evolution move."""
-    from wirebayes.bayes.coordinates import Coordinates
-
     z = done.chains.z[:, -1]
     return Coordinates(done.problem).to_natural(z.reshape(-1, z.shape[-1]))
 

@@ -3,8 +3,9 @@
 Positive parameters become logarithms, others count in standard deviations of their prior; then, one after the other,
 
 - log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
-- log B becomes the log tension lost in one typical hold at a typical tension,
-  ``log B + U log τ + log(1 - exp(-k2 T^N)) + log(k1 / L0)``.
+- log B becomes the log tension lost in a hold, root mean square over the holds of the test, if the first readings are
+  taken for the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
+  creep is linear in B, so G needs no B and one pass along the holds.
 
 The map is triangular and its last two steps have unit Jacobian.
 """
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.problem import MATERIAL, Problem
+from wirebayes.bayes.problem import MATERIAL, Problem, Sample
 
 Array = NDArray[Any]
 
@@ -26,9 +27,25 @@ class _Ridge:
 
     where: dict[str, int]
     fixed: dict[str, float]
-    log_tension: float
+    log_tension: Array
+    times_s: Array
+    which_time: NDArray[np.int64]
+    kept: float
     hold_s: float
     log_length: float
+
+    def log_creep(self, U: Array, k2: Array, N: Array) -> Array:
+        """log G: root mean square of the elongation gained in a hold, for B = 1."""
+        reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
+        mean = float(self.log_tension.mean())
+        drive = np.exp(U * (self.log_tension - mean)[:, None])
+        carried, square = 0.0 * reached[0], 0.0 * drive[0]
+        for j, time in enumerate(self.which_time):
+            gained = (drive[j] - self.kept * carried) * reached[time]
+            carried = carried + gained
+            square = square + gained * gained
+        # the floor keeps the logarithm finite
+        return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
 
 class Coordinates:
@@ -47,10 +64,7 @@ class Coordinates:
             fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
             if len(where) + len(fixed) < len(MATERIAL):
                 continue  # a user's prior that allows negative values: leave this material's columns as they are
-            length = sample.model.length_ref_mm or sample.protocol.length_mm
-            self.ridges.append(
-                _Ridge(where, fixed, float(np.log(sample.model.tension_ref_N)), sample.typical_hold_s, float(np.log(length)))
-            )
+            self.ridges.append(_ridge(where, fixed, sample, problem.likelihood))
 
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
@@ -89,10 +103,21 @@ class Coordinates:
     def _shifts(self, theta: Array, ridge: _Ridge) -> tuple[Array, Array]:
         k1, U, k2, N = (self._get(theta, ridge, name) for name in ("k1", "U", "k2", "N"))
         with np.errstate(all="ignore"):
-            # log(1 - exp(-x)) of a tiny x is log x; the floor keeps it finite.
-            reached = np.log(np.maximum(-np.expm1(-k2 * ridge.hold_s**N), 1e-300))
-        creep = U * ridge.log_tension + reached + np.log(k1) - ridge.log_length
+            creep = ridge.log_creep(U, k2, N) + np.log(k1) - ridge.log_length
         return creep, self._hazard(theta, ridge)
+
+
+def _ridge(where: dict[str, int], fixed: dict[str, float], sample: Sample, likelihood: str) -> _Ridge:
+    recorded = np.flatnonzero(sample.protocol.recorded)
+    first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
+    # a slack wire drives no creep; a small share of the largest tension stands in for it
+    tension = np.maximum(first, 0.02 * first.max()) if first.max() > 0 else np.ones_like(first)
+    hold_s = sample.typical_hold_s
+    duration = sample.protocol.duration_s
+    times, which = np.unique(np.where(duration > 0, duration, hold_s), return_inverse=True)
+    kept = 1.0 if sample.model.history == "saturating" and likelihood == "chain" else 0.0
+    length = sample.model.length_ref_mm or sample.protocol.length_mm
+    return _Ridge(where, fixed, np.log(tension), times, which, kept, hold_s, float(np.log(length)))
 
 
 def _spread(distribution: Any) -> float:

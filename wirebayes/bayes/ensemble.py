@@ -2,8 +2,8 @@
 
 Policy. The modes found from many starts give the first proposal. Burn-in runs in rounds; after each the proposal
 mixture is fitted anew to the walkers of all ensembles, and the walkers whose log density lies hopelessly below the
-others' (stuck in a far mode of no weight) are set back to draws of the proposal, which is allowed only here. Then the
-proposal is frozen and draws are kept, block by block, until for every parameter
+others' (stuck in a far mode of no weight) are set back to draws of the proposal, which is allowed only here. Rounds
+grow longer while the proposal leaves out a tail that walkers have found. Then the proposal is frozen and draws are kept, block by block, until for every parameter
 
 - the effective sample size from the autocorrelation time is at least `Policy.ess`, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`,
@@ -44,7 +44,11 @@ class Policy:
     rounds, round_steps : int
         Burn-in: rounds of steps between two fits of the proposal, at least this many rounds.
     most_rounds : int
-        More rounds are run while fewer than `acceptance` of the independent proposals are taken.
+        More rounds, each longer, are run while too few moves are taken or the proposal leaves out a tail; this many
+        at most.
+    tail : float
+        A proposal leaves out a tail when the log of posterior over proposal, at its 99.9 % quantile over the walkers,
+        lies this far above its median: walkers that reach such places stay there for very long.
     acceptance : float
         Below this share after burn-in, the learned move gives way to differential evolution alone.
     block, most_steps : int
@@ -57,7 +61,8 @@ class Policy:
     r_hat: float = 1.01
     rounds: int = 3
     round_steps: int = 16
-    most_rounds: int = 12
+    most_rounds: int = 6
+    tail: float = 4.0
     acceptance: float = 0.05
     block: int = 40
     most_steps: int = 4000
@@ -235,16 +240,21 @@ def _advance(target: Target, state: _State, policy: Policy, i: int, steps: int, 
 
 
 def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
-    tails, acceptance = [], []
+    tails, acceptance, weights = [], [], []
     moves = _moves(state)
+    steps = policy.round_steps * 2 ** int(np.clip(state.round - policy.rounds + 1, 0, 2))
     for i in range(policy.ensembles):
-        sampler, _ = _advance(target, state, policy, i, policy.round_steps, moves)
-        tails.append(sampler.get_chain(discard=policy.round_steps // 2))
+        sampler, _ = _advance(target, state, policy, i, steps, moves)
+        tail = sampler.get_chain(discard=steps // 2)
+        density = state.proposal.log_density(tail.reshape(-1, tail.shape[-1]))
+        weights.append(sampler.get_log_prob(discard=steps // 2).ravel() - density)
+        tails.append(tail)
         acceptance.append(sampler.acceptance_fraction.mean())
     state.round += 1
     _free_stuck_walkers(target, state)
-    enough = float(np.mean(acceptance)) > _GOOD_ACCEPTANCE or state.round >= policy.most_rounds
-    if state.round >= policy.rounds and enough:
+    middle, high = np.quantile(np.concatenate(weights), [0.5, 0.999])
+    good = float(np.mean(acceptance)) > _GOOD_ACCEPTANCE and high - middle < policy.tail
+    if state.round >= policy.rounds and (good or state.round >= policy.most_rounds):
         state.frozen = True
         state.learned = float(np.mean(acceptance)) > policy.acceptance
         state.kept_z = [[] for _ in range(policy.ensembles)]

@@ -13,7 +13,7 @@ from wirebayes.bayes.ensemble import Policy, sample
 from wirebayes.bayes.optimum import Optimum
 
 Array = NDArray[Any]
-_SHORT = Policy(ensembles=2, walkers=128, rounds=3, round_steps=16, most_rounds=5, block=24, most_steps=24)
+_SHORT = Policy(ensembles=2, walkers=128, rounds=3, round_steps=16, most_rounds=5, tail=np.inf, block=24, most_steps=24)
 
 
 def draws(target: Target, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:

@@ -1,0 +1,125 @@
+"""Run the studies, resume, judge, draw: ``python -m analyses.calibration --output DIR``."""
+
+import argparse
+import json
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analyses.calibration.study import BROKEN, STUDIES, Study
+from wirebayes.bayes.calibration import band, verdict
+from wirebayes.output import write_json
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, default=Path("out/calibration"))
+    parser.add_argument("--data-sets", type=int, default=300)
+    parser.add_argument("--broken", type=int, default=100, help="data sets fitted with the setting error dropped")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--only", help="one study, such as paper-chain, without a verdict over all")
+    asked = parser.parse_args()
+    asked.output.mkdir(parents=True, exist_ok=True)
+    wanted = [(study, asked.data_sets) for study in STUDIES] + [(BROKEN, asked.broken)]
+    if asked.only:
+        wanted = [(study, count) for study, count in wanted if study.name == asked.only]
+    lines = {study.name: run(study, count, asked.output, asked.seed, asked.workers) for study, count in wanted}
+    if asked.only:
+        return 0
+    result = judged(lines, asked.seed)
+    write_json(asked.output / "calibration.json", result)
+    draw({name: shares(rows) for name, rows in lines.items()}, result, asked.output / "calibration.png")
+    print(summary(result))
+    return 0 if result["inside"] and result["broken_outside"] and result["share_not_converged"] <= 0.01 else 1
+
+
+def run(study: Study, count: int, folder: Path, seed: int, workers: int) -> list[dict[str, Any]]:
+    """The data sets of a study in order; those on file are not run again. One line of JSON each, written when done."""
+    path = folder / f"{study.name}-seed{seed}.jsonl"
+    done: dict[int, dict[str, Any]] = {}
+    if path.exists():
+        # a line that a kill cut short has no line feed and is run again
+        complete = [line for line in path.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
+        path.write_text("".join(complete), encoding="utf-8")
+        done = {row["index"]: row for row in map(json.loads, complete)}
+    missing = [i for i in range(count) if i not in done]
+    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(max(1, workers)) as pool:
+        for future in [pool.submit(study.data_set, seed, i) for i in missing]:
+            row = future.result()
+            done[row["index"]] = row
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            if sys.stderr.isatty():
+                print(f"\r{study.name}: {len(done)}/{count}", end="", file=sys.stderr)
+    return [done[i] for i in range(count)]
+
+
+def shares(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    return {name: np.array([row["share_below"][name] for row in rows]) for name in rows[0]["share_below"]}
+
+
+def judged(lines: dict[str, list[dict[str, Any]]], seed: int) -> dict[str, Any]:
+    """One band over all quantities of all studies; the broken likelihood by itself against a band of its own."""
+    sound = {name: rows for name, rows in lines.items() if name != BROKEN.name}
+    everything = {f"{name}: {q}": v for name, rows in sound.items() for q, v in shares(rows).items()}
+    result = verdict(everything)
+    broken = verdict(shares(lines[BROKEN.name]))
+    stopped = {name: [row["index"] for row in rows if not row["converged"]] for name, rows in lines.items()}
+    count = sum(len(rows) for rows in sound.values())
+    return {
+        "seed": seed,
+        "data_sets": {name: len(rows) for name, rows in lines.items()},
+        **result,
+        "not_converged": stopped,
+        "share_not_converged": sum(len(stopped[name]) for name in sound) / count,
+        "broken_outside": not broken["inside"],
+        "broken": broken,
+    }
+
+
+def summary(result: dict[str, Any]) -> str:
+    caught = ", ".join(result["broken"]["outside"])
+    worst = sorted(result["extremeness"].items(), key=lambda item: item[1])[:5]
+    lines = [
+        f"data sets: {result['data_sets']}",
+        f"{result['quantities']} quantities, joint {result['joint']:.0%} band: "
+        + ("all inside" if result["inside"] else f"outside: {', '.join(result['outside'])}"),
+        f"threshold {result['threshold']}; the five most extreme: " + ", ".join(f"{k} {v:.2g}" for k, v in worst),
+        f"not converged: {result['share_not_converged']:.2%} {result['not_converged']}",
+        "setting error dropped: " + (f"caught by {caught}" if result["broken_outside"] else "NOT caught"),
+    ]
+    return "\n".join(lines)
+
+
+def draw(lines: dict[str, dict[str, Any]], result: dict[str, Any], path: Path) -> None:
+    """Empirical distribution minus uniform, a panel a study, with the joint band."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, len(lines), figsize=(3.4 * len(lines), 3.4), sharey=True, layout="constrained")
+    for axis, (name, quantities) in zip(np.atleast_1d(axes), lines.items(), strict=True):
+        n = len(next(iter(quantities.values())))
+        levels = result["threshold"] if str(n) in result["threshold"] else result["broken"]["threshold"]
+        points, lower, upper = band(n, levels[str(n)])
+        axis.fill_between(points, lower - points, upper - points, color="0.85", label="99 % band, joint")
+        for quantity, values in quantities.items():
+            counted = np.searchsorted(np.sort(values), points, side="right") / n
+            axis.plot(points, counted - points, lw=1, label=quantity)
+        axis.axhline(0, color="0.4", lw=0.5)
+        axis.set_title(f"{name}, {n} data sets", fontsize=9)
+        axis.set_xlabel("share of the posterior below the truth")
+    np.atleast_1d(axes)[0].set_ylabel("empirical minus uniform distribution")
+    np.atleast_1d(axes)[0].legend(fontsize=6, ncols=2)
+    figure.savefig(path, dpi=130, metadata={"Software": None})
+    plt.close(figure)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

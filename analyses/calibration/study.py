@@ -1,0 +1,80 @@
+"""The studies: two protocols, two likelihoods, and a likelihood that is broken on purpose."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wirebayes.bayes.calibration import one
+from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.fit import seed_of
+from wirebayes.bayes.problem import Problem, build, with_readings
+from wirebayes.bayes.replicate import readings
+from wirebayes.simulate import PAPER_TIMES_S, Bench
+
+POLICY = Policy(walkers=128, ess=400.0)
+BENCHES = {
+    "paper": Bench("paper", displacements_mm=tuple(range(1, 13)), times_s=PAPER_TIMES_S),
+    "unloading": Bench(
+        "unloading",
+        displacements_mm=(1, 2, 4, 6, 8, 10, 7, 4, 2, 5, 9),
+        times_s=(0.0, 10.0, 30.0, 100.0, 300.0, 600.0),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Study:
+    """One protocol, one likelihood; `broken` drops the setting error from the fit, not from the simulation."""
+
+    protocol: str
+    likelihood: str
+    broken: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.protocol}-{self.likelihood}" + ("-broken" if self.broken else "")
+
+    def data_set(self, seed: int, index: int, policy: Policy = POLICY) -> dict[str, Any]:
+        """Simulate and fit the data set of a number; the same whatever else is run."""
+        own = seed_of(seed, "calibration", self.protocol, self.likelihood, str(index))
+        problem = build([BENCHES[self.protocol].experiment()], likelihood=self.likelihood)
+        if self.likelihood == "hold":
+            problem = _with_first_readings(problem, self.protocol, own)
+        ranked = one(problem, own, policy, fitted=_without_setting_error if self.broken else _as_it_is)
+        chains = ranked.fit.chains
+        return {
+            "study": self.name, "index": index, "share_below": ranked.share_below, "truth": ranked.truth,
+            "converged": chains.converged, "why": chains.why, "steps": int(chains.z.shape[1]),
+            "acceptance": chains.acceptance, "learned": chains.learned, "modes": chains.modes, "stuck": chains.stuck,
+        }  # fmt: skip
+
+
+STUDIES = [Study(protocol, likelihood) for likelihood in ("chain", "hold") for protocol in BENCHES]
+BROKEN = Study("paper", "chain", broken=True)
+
+
+class _NoSettingError(Problem):
+    """A likelihood that believes every position is exact."""
+
+    def parameters(self, theta: Any, sample: Any) -> Any:
+        return super().parameters(theta, sample) | {"setting_sd": np.zeros(len(theta))}
+
+
+def _without_setting_error(problem: Problem) -> Problem:
+    return _NoSettingError(problem.samples, problem.prior, problem.likelihood)
+
+
+def _as_it_is(problem: Problem) -> Problem:
+    return problem
+
+
+def _with_first_readings(problem: Problem, protocol: str, seed: int) -> Problem:
+    """First readings from a wire of its own, drawn anew until every hold pulls: they are given, so they may not know
+    the truth that is to be found from the later ones."""
+    chain = build([BENCHES[protocol].experiment()])
+    rng = np.random.default_rng(seed_of(seed, "first readings"))
+    while True:
+        made = [readings(chain, chain.prior.rvs(1, rng), sample, rng) for sample in chain.samples]
+        if all((y[:, 0] > 0).all() for y in made):
+            return with_readings(problem, made)
