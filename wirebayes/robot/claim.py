@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from wirebayes.robot import drift, inverse
 from wirebayes.robot import rotation as turning
+from wirebayes.robot.creep import HoldCreep, fresh
 from wirebayes.robot.description import Robot
 from wirebayes.robot.wires import Wires
 
@@ -53,7 +54,9 @@ def grid(robot: Robot, points: tuple[int, int, int]) -> Floats:
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
 
-def over_workspace(robot: Robot, wires: Wires, position_m: Floats, time_s: float = TIME_S) -> WorkspaceDrift:
+def over_workspace(
+    robot: Robot, wires: Wires, position_m: Floats, time_s: float = TIME_S, loaded_s: float = 0.0
+) -> WorkspaceDrift:
     """Drift of a vertical platform after a time, at every position and draw in one batch.
 
     Parameters
@@ -63,6 +66,8 @@ def over_workspace(robot: Robot, wires: Wires, position_m: Floats, time_s: float
         ``n`` draws.
     position_m : (p, 3) array
     time_s : float
+    loaded_s : float
+        How long the wires carried the same tensions before they were commanded, exactly, to the pose; 0: new wires.
 
     Returns
     -------
@@ -80,8 +85,11 @@ def over_workspace(robot: Robot, wires: Wires, position_m: Floats, time_s: float
     many = replace(wires, theta={k: np.tile(np.broadcast_to(v, (len(v), n)), p) for k, v in wires.theta.items()})
     where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
     R = np.broadcast_to(np.eye(3), (n * p, 3, 3))
-    told = inverse.commands(robot, many, where, R, pull)
-    course = drift.hold(robot, many, told.joint_m, np.array([time_s]), where, R)
+    state = fresh(robot.legs, n * p)
+    if loaded_s > 0:
+        state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
+    told = inverse.commands(robot, many, where, R, pull, state.strain(many))
+    course = drift.hold(robot, many, told.joint_m, np.array([time_s]), where, R, state)
     shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
     tilt = turning.tilt(course.rotation[:, 0])
     return WorkspaceDrift(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot import drift, inverse
-from wirebayes.robot.creep import HoldCreep, fresh
+from wirebayes.robot.creep import CreepState, HoldCreep, fresh
 from wirebayes.robot.description import Robot
 from wirebayes.robot.drift import without_creep
 from wirebayes.robot.wires import Wires
@@ -104,16 +104,42 @@ def longest_interval(
     return float(errors.times_s[first - 1]) if first else 0.0
 
 
-def since_calibration(course: drift.Course, tolerated_from_s: float) -> PoseError:
-    """Error after the pose was calibrated away at one of the course's times: what drifts from there on.
+def after_calibration(
+    robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats, times_s: Floats
+) -> tuple[PoseError, PoseError]:
+    """Error that grows from a perfect calibration on, after a load history: held still, and with creep foreseen.
 
     Parameters
     ----------
-    course : Course
-    tolerated_from_s : float
-        Time of the calibration; must be one of the course's times.
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    carried : CreepState
+        Creep of the load history; the command at the calibration restarts the wires' clocks.
+    position_m, rotation : (3,), (3, 3) arrays
+    times_s : (t,) array
+        Since the calibration.
+
+    Returns
+    -------
+    still, foreseen : PoseError
+        `foreseen`: the controller takes off the creep expected over the draws, given the same history.
     """
-    k = int(np.flatnonzero(course.times_s == tolerated_from_s)[0])
-    shift, angle = drift.moved(course, course.position_m[:, k], course.rotation[:, k])
-    times = course.times_s[k:] - tolerated_from_s
-    return PoseError(times, np.linalg.norm(shift[:, k:], axis=-1), angle[:, k:], course.found)
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    draws = max(v.shape[-1] for v in wires.theta.values())
+    load = np.repeat(tau.T, draws, 1)
+    before = carried.strain(wires)
+    joint = inverse.commands(robot, wires, position_m[None], rotation[None], tau, before).joint_m
+    ahead = HoldCreep(wires, carried, load, "start")
+
+    def expected(time_s: float) -> Floats:
+        # every robot starts exact; what is foreseen is the mean growth since then
+        growth = (ahead.advance(time_s, load).strain(wires) - before).mean(1, keepdims=True)
+        return inverse.commands(robot, wires, position_m[None], rotation[None], tau, before + growth).joint_m
+
+    out = []
+    for schedule in (lambda time_s: joint, expected):
+        course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried)
+        shift, angle = drift.moved(course, position_m, rotation)
+        out.append(PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found))
+    return out[0], out[1]

@@ -1,0 +1,118 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.robot import claim, control, draws, inverse, schema
+from wirebayes.robot.creep import HoldCreep, fresh
+from wirebayes.robot.shares import shares
+
+CORE = {"k1": 800.0, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
+
+
+def _line(n=50, sd=0.05, seed=0):
+    rng = np.random.default_rng(seed)
+    return draws.WireDraws({k: v * np.exp(sd * rng.standard_normal(n)) for k, v in CORE.items()}, 1000.0)
+
+
+@pytest.mark.parametrize("name", ["cogiro-desk", "linear-7", "hangprinter-4"])
+def test_a_controller_that_knows_everything_holds_the_pose(name):
+    robot = schema.read(name)
+    wires = draws.for_robot(robot, _line(1, 0.0))
+    x, R = robot.home_m, np.eye(3)
+    times = np.array([0.0, 60.0, 3600.0])
+    aware = control.error(robot, wires, control.creep_aware(robot, wires, x, R), x, R, times)
+    blind = control.error(robot, wires, control.hooke_only(robot, wires, x, R), x, R, times)
+    assert aware.found.all()
+    assert aware.distance_m.max() < 1e-9
+    assert blind.distance_m[0, 0] < 1e-9
+    assert blind.distance_m[0, 2] > 1e-3
+
+
+def test_foreseeing_creep_helps_uncertain_wires():
+    robot = schema.read("cogiro-desk")
+    wires = draws.for_robot(robot, _line(100), 0.05, np.random.default_rng(0))
+    x, R = robot.home_m, np.eye(3)
+    state = fresh(robot.legs, 100)
+    still, ahead = control.after_calibration(robot, wires, state, x, R, np.array([0.0, 60.0, 600.0]))
+    assert still.distance_m[:, 0].max() < 1e-9
+    assert np.median(ahead.distance_m[:, 2]) < 0.4 * np.median(still.distance_m[:, 2])
+    assert control.longest_interval(ahead, 1e-3) >= control.longest_interval(still, 1e-3)
+
+
+def test_loaded_wires_drift_less_after_a_calibration():
+    robot = schema.read("linear-7")
+    wires = draws.for_robot(robot, _line(20))
+    x, R = robot.home_m, np.eye(3)
+    tau = np.repeat(inverse.tensions(robot, x[None], R[None]).T, 20, 1)
+    loaded = HoldCreep(wires, fresh(robot.legs, 20), tau).advance(3600.0, tau)
+    times = np.array([0.0, 60.0])
+    new, _ = control.after_calibration(robot, wires, fresh(robot.legs, 20), x, R, times)
+    old, _ = control.after_calibration(robot, wires, loaded, x, R, times)
+    assert old.distance_m[:, 0].max() < 1e-9
+    assert np.median(old.distance_m[:, 1]) < 0.5 * np.median(new.distance_m[:, 1])
+
+
+def test_longest_interval_reads_the_probability():
+    distance = np.tile(np.array([0.0, 1.0, 2.0, 3.0]), (100, 1))
+    distance[:10, 2] = 9.0  # a tenth is out at the third time
+    errors = control.PoseError(np.array([0.0, 10.0, 20.0, 30.0]), distance, 0 * distance, np.ones(100, bool))
+    assert control.longest_interval(errors, 5.0) == 10.0
+    assert control.longest_interval(errors, 5.0, probability=0.85) == np.inf
+    assert control.longest_interval(errors, 0.5) == 0.0
+    lost = replace(errors, found=np.arange(100) > 9)
+    assert control.longest_interval(lost, 50.0) == 0.0
+
+
+def test_the_workspace_agrees_with_single_poses():
+    robot = schema.read("linear-6")
+    wires = draws.for_robot(robot, _line(5))
+    where = claim.grid(robot, (2, 1, 2))
+    assert len(where) == 4
+    all_at_once = claim.over_workspace(robot, wires, where)
+    for p in range(4):
+        one = claim.over_workspace(robot, wires, where[p : p + 1])
+        np.testing.assert_allclose(all_at_once.distance_m[p], one.distance_m[0], rtol=1e-9)
+    assert all_at_once.feasible == 1.0
+    loaded = claim.over_workspace(robot, wires, where, loaded_s=3600.0)
+    assert (loaded.distance_m < all_at_once.distance_m).all()
+
+
+def test_poses_out_of_reach_are_left_out_of_the_workspace():
+    robot = schema.read("linear-6")
+    wires = draws.for_robot(robot, _line(2))
+    out = claim.over_workspace(robot, wires, np.array([[0.0, 0.0, 0.6], [5.0, 0.0, 0.6]]))
+    assert out.feasible == 0.5
+    assert len(out.position_m) == 1
+    assert len(claim.over_workspace(robot, wires, np.array([[5.0, 0.0, 0.6]])).position_m) == 0
+
+
+def test_a_smaller_and_lighter_robot_is_the_same_robot():
+    robot = schema.read("linear-6")
+    half = claim.scaled(robot, 0.5, 0.6)
+    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    small = inverse.tensions(half, half.home_m[None], np.eye(3)[None])
+    np.testing.assert_allclose(small, 0.5 * tau, rtol=1e-9)
+
+
+def test_shares_find_who_makes_the_variance():
+    rng = np.random.default_rng(0)
+    a, b, c = rng.normal(size=(3, 4000))
+    found = shares({"a": a, "b": b, "c": c}, 3 * a + 1 * b)
+    assert found["a"] == pytest.approx(0.9, abs=0.03)
+    assert found["b"] == pytest.approx(0.1, abs=0.03)
+    assert found["c"] == pytest.approx(0.0, abs=0.01)
+    assert sum(found.values()) == pytest.approx(1.0)
+
+
+def test_shares_split_what_two_parameters_share():
+    rng = np.random.default_rng(1)
+    a = rng.normal(size=5000)
+    twin = a + 1e-3 * rng.normal(size=5000)
+    found = shares({"a": a, "twin": twin}, a)
+    assert found["a"] == pytest.approx(0.5, abs=0.02)
+    assert found["twin"] == pytest.approx(0.5, abs=0.02)
+
+
+def test_shares_of_a_certain_output_are_none():
+    assert shares({"a": np.arange(5.0)}, np.ones(5)) == {"a": 0.0, "unexplained": 0.0}
