@@ -49,6 +49,8 @@ class Policy:
     tail : float
         A proposal leaves out a tail when the log of posterior over proposal, at its 99.9 % quantile over the walkers,
         lies this far above its median: walkers that reach such places stay there for very long.
+    components : int
+        The most components of the proposal.
     acceptance : float
         Below this share after burn-in, the learned move gives way to differential evolution alone.
     block, most_steps : int
@@ -64,6 +66,7 @@ class Policy:
     most_rounds: int = 6
     tail: float = 4.0
     acceptance: float = 0.05
+    components: int = 4
     block: int = 40
     most_steps: int = 4000
 
@@ -261,7 +264,7 @@ def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
         state.kept_log_density = [[] for _ in range(policy.ensembles)]
     points = np.concatenate([t.reshape(-1, t.shape[-1]) for t in tails])
     try:
-        fitted = mixtures.fit(points, state.generator)
+        fitted = mixtures.fit(points, state.generator, most=policy.components)
         # What the start knew stays in reach: small modes, and tails that the burn-in has not walked.
         safety = mixtures.blend(state.safety, mixtures.wider(fitted, 2.0), 0.5)
         state.proposal = mixtures.blend(fitted, safety, 0.15)

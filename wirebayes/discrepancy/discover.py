@@ -296,20 +296,15 @@ def _outlook(
 ) -> dict[str, Any]:  # fmt: skip
     """What could have been seen, what cannot be, and what to measure next."""
     threshold = test.threshold(ALPHA)
-    seen: dict[str, dict[str, Any]] = {}
-    best_probe: dict[str, Probe] = {}
+    best_probe: dict[str, int] = {}
+    strength = np.median(null.norm, axis=0)
     for c in candidates:
-        if i not in c.blocks:
-            continue
-        probe = trials[c.probe]
-        amplitude = power.amplitude_80(null, probe, c.probe, threshold)
-        main = probe.effect.amplitudes[0]
-        known = seen.get(c.name)
-        if amplitude is not None and (known is None or known["amplitude_80"] is None or amplitude < known["amplitude_80"]):
-            seen[c.name] = {"amplitude_80": amplitude, "unit": main.unit}
-            best_probe[c.name] = probe
-        elif known is None:
-            seen[c.name] = {"amplitude_80": None, "unit": main.unit}
+        if i in c.blocks and (c.name not in best_probe or strength[c.probe] > strength[best_probe[c.name]]):
+            best_probe[c.name] = c.probe
+    seen = {
+        name: {"amplitude_80": power.amplitude_80(null, trials[k], k, threshold), "unit": trials[k].effect.amplitudes[0].unit}
+        for name, k in best_probe.items()
+    }
     possible = [c.name for c in candidates if i in c.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
     pair, weakest = None, None
@@ -318,15 +313,16 @@ def _outlook(
         group = [n for n in rivals if n == rivals[0] or alike.get((rivals[0], n), 0.0) > power.ALIKE]
         rivals = [n for n in rivals if n in choice.set or n in group]
         if len(rivals) > 1:
-            pair = (best_probe[rivals[0]], best_probe[rivals[1]])
+            pair = (trials[best_probe[rivals[0]]], trials[best_probe[rivals[1]]])
         elif rivals:
-            weakest = best_probe[rivals[0]]
+            weakest = trials[best_probe[rivals[0]]]
     if pair is None and weakest is None and best_probe:
         # Relative to what a person expects before the test, which effect was hidden best?
         def hiddenness(name: str) -> float:
-            return float(seen[name]["amplitude_80"] / best_probe[name].effect.amplitudes[0].prior.std())
+            amplitude = seen[name]["amplitude_80"]
+            return float("inf") if amplitude is None else amplitude / trials[best_probe[name]].effect.amplitudes[0].prior.std()
 
-        weakest = best_probe[max(best_probe, key=hiddenness)]
+        weakest = trials[best_probe[max(best_probe, key=hiddenness)]]
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
 
 

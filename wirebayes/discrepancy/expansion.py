@@ -143,12 +143,18 @@ class Pieces:
     least: Array
     one_sided: Array
 
-    def log_bayes(self, added: Array, which: int) -> Array:
-        """(n,) of probe `which` had its amplitude `added` (n,) been in the data besides."""
-        c = np.where(np.isfinite(self.square[..., which]), self.square[..., which], 0.0)
-        rss = self.rss + 2.0 * added * self.along[..., which] + added**2 * c
-        b = self.along[..., which] + added * c
-        b = np.where(self.one_sided[which], np.maximum(b, 0.0), b)
+    def of(self, probe: int, rows: int) -> "Pieces":
+        """One probe's pieces at the first rows."""
+        one = slice(probe, probe + 1)
+        return Pieces(self.shared[:, :rows], self.rss[:, :rows], self.along[:, :rows, one], self.square[:, :rows, one],
+                      self.degrees, self.least[:rows], self.one_sided[one])  # fmt: skip
+
+    def log_bayes(self, added: float) -> Array:
+        """(n,) of the only probe, had its amplitude `added` been in the data besides."""
+        c = np.where(np.isfinite(self.square[..., 0]), self.square[..., 0], 0.0)
+        rss = self.rss + 2.0 * added * self.along[..., 0] + added**2 * c
+        b = self.along[..., 0] + added * c
+        b = np.where(self.one_sided[0], np.maximum(b, 0.0), b)
         left = rss - b**2 / np.where(c > 0, c, np.inf)
         half = -0.5 * self.degrees
         with_it = self.shared + half * np.log(np.maximum(left, self.least))
@@ -166,16 +172,28 @@ def joined(scans: Sequence[Scan]) -> Scan:
     return Scan(*(np.concatenate([getattr(s, k) for s in scans]) for k in ("effects", "flexible", "amplitude", "norm")), pieces)
 
 
+def forms(target: Target, z: Array, trials: Sequence[Probe]) -> list[Array]:
+    """Per sample the (H, R, m) signatures of the probes per unit amplitude, N, at the parameters ``z`` (1, d)."""
+    problem, theta = target.problem, target.coordinates.to_natural(z)
+    out = []
+    for at, sample in enumerate(problem.samples):
+        own = problem.parameters(theta, sample)
+        each = [signature(problem, own, sample.model, at, probe)[..., 0] / probe.step for probe in trials]
+        out.append(np.stack(each, axis=-1) if each else np.zeros((*sample.protocol.time_s.shape, 0)))
+    return out
+
+
 def expand(
     target: Target,
     z: Array,
     trials: Sequence[Probe],
     readings: Sequence[Array] | None = None,
     columns: Callable[[Problem, int, Array, Array], Array] | None = None,
+    shapes: Sequence[Array] | None = None,
 ) -> Expansion:
     """Linearise a block at the rows of `z` (n, d), for its readings or for replicates (H, R, n) row by row.
 
-    `columns` adds further signatures behind the probes': given the problem, the sample's number, the tension
+    An effect's form hardly differs between refits: `shapes`, from `forms`, serve all rows. `columns` adds further signatures behind the probes': given the problem, the sample's number, the tension
     (H, R, n) and its derivatives (H, R, n, p), it returns (H, R, n, more), N.
     """
     problem = target.problem
@@ -206,11 +224,12 @@ def expand(
         moved = moved.reshape(*moved.shape[:2], len(moving) + 1, n)
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
         parts["a"].append(np.stack([rows(slopes[..., i]) for i in range(len(moving))], axis=-1))
-        added = [rows(signature(problem, own, sample.model, at, probe) / probe.step) for probe in trials]
+        shape = (shapes or forms(target, z[:1], trials))[at][mask]
+        added = [shape[None] / sd[:, None, None]]
         if columns is not None:
             more = columns(problem, at, mean, slopes)
-            added += [rows(more[..., i]) for i in range(more.shape[-1])]
-        parts["s"].append(np.stack(added, axis=-1) if added else np.zeros((n, int(mask.sum()), 0)))
+            added.append(np.stack([rows(more[..., i]) for i in range(more.shape[-1])], axis=-1))
+        parts["s"].append(np.concatenate(added, axis=-1))
         functions = flexible.basis(protocol, 1.0)[mask]
         parts["f"].append(functions[None] / sd[:, None, None])
         jac = noise.jacobian(line)[mask]

@@ -21,7 +21,7 @@ from wirebayes.bayes.problem import Problem
 
 Array = NDArray[np.float64]
 LARGEST_K = 0.7  # above it, importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling)
-REFIT = Policy(walkers=128, ess=1000.0)
+REFIT = Policy(walkers=128, ess=1000.0, most_steps=400)
 _DRAWS = 4000
 _statistics: Any = array_stats
 

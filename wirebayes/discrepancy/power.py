@@ -18,6 +18,7 @@ from wirebayes.wire.protocol import Protocol
 
 Array = NDArray[Any]
 ALIKE = 0.95
+_POWER_ROWS = 300  # simulations behind an 80 % amplitude
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
@@ -27,13 +28,16 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
         return None
     occam = 0.5 * np.log(2 * np.pi) - np.log(LARGEST * (1 if probe.one_sided else 2))
     low, high = 0.0, LARGEST / norm
-    n = null.effects.shape[0]
-    if np.mean(null.pieces.log_bayes(np.full(n, high), i) + occam > threshold) < 0.8:
+    pieces = null.pieces.of(i, _POWER_ROWS)
+
+    def seen(amplitude: float) -> bool:
+        return bool(np.mean(pieces.log_bayes(amplitude) + occam > threshold) >= 0.8)
+
+    if not seen(high):
         return None
-    for _ in range(20):
+    for _ in range(12):
         middle = 0.5 * (low + high)
-        seen = np.mean(null.pieces.log_bayes(np.full(n, middle), i) + occam > threshold)
-        low, high = (middle, high) if seen < 0.8 else (low, middle)
+        low, high = (low, middle) if seen(middle) else (middle, high)
     return high
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wirebayes.bayes.optimum import climb, rowwise
 from wirebayes.bayes.replicate import readings as replicate
 from wirebayes.discrepancy.block import Block
-from wirebayes.discrepancy.expansion import Probe, Scan, expand, joined, probes, scan
+from wirebayes.discrepancy.expansion import Probe, Scan, expand, forms, joined, probes, scan
 from wirebayes.discrepancy.naming import LARGEST
 from wirebayes.wire.effect import Effect, EventEffect
 
@@ -113,10 +113,11 @@ def replicated(block: Block, trials: Sequence[Probe], n: int, rng: np.random.Gen
     problem = block.target.problem
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
     found = climb(rowwise(block.target, y), z, iterations=25, tolerance=1e-2)
+    shapes = forms(block.target, block.modes.z[:1], trials)
     parts = []
     for begin in range(0, n, _ROWS):
         rows = slice(begin, begin + _ROWS)
-        parts.append(scan(expand(block.target, found.z[rows], trials, [v[..., rows] for v in y], columns)))
+        parts.append(scan(expand(block.target, found.z[rows], trials, [v[..., rows] for v in y], columns, shapes)))
     return joined(parts)
 
 

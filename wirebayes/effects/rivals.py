@@ -29,19 +29,17 @@ class AtOnce(Effect):
         stretched = value.real > 0
         whole = np.where(stretched, value, 1.0)
         exponent = hold.theta["U"]
-        creep = hold.theta["B"] / hold.length_mm * hold.theta["k1"] ** exponent
-        # In log s the equation is convex and rising, so Newton's steps from above cannot miss.
-        log_s = np.log(whole)
+        log_creep = np.log(hold.theta["B"] / hold.length_mm) + exponent * np.log(hold.theta["k1"])
+        # In log s the equation is convex and rising: Newton's steps from above cannot miss.
+        alone = (np.log(whole) - log_creep) / exponent
+        log_s = np.where(alone.real < np.log(whole).real, alone, np.log(whole))
         for _ in range(_NEWTON_STEPS):
-            elastic, crept = np.exp(log_s), creep * np.exp(exponent * log_s)
-            step = (elastic + crept - whole) / (elastic + exponent * crept)
-            log_s = log_s - step
-            if np.max(np.abs(step)) < 1e-13:
-                break
+            elastic, crept = np.exp(log_s), np.exp(log_creep + exponent * log_s)
+            log_s = log_s - (elastic + crept - whole) / (elastic + exponent * crept)
         return np.where(stretched, np.exp(log_s), value)
 
 
-_NEWTON_STEPS = 60
+_NEWTON_STEPS = 7
 
 
 class NotInTime(Effect):

@@ -14,7 +14,7 @@ from scipy import stats
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
-KNOTS = 4  # in the training holds, and as many behind them
+KNOTS = 3  # in the training holds, and as many behind them
 
 
 @dataclass(frozen=True)
