@@ -1,0 +1,82 @@
+"""Random protocols and parameters, and the saturating chain in a few lines of plain Python as independent truth."""
+
+import math
+
+import numpy as np
+from hypothesis import strategies as st
+
+from wirebayes.wire.protocol import Protocol
+
+
+def protocol(displacements, times, *, length=1000.0, unrecorded=(), warming=None) -> Protocol:
+    """Holds with reading times of their own (ragged), those in `unrecorded` without readings."""
+    width = max(len(t) for i, t in enumerate(times) if i not in unrecorded)
+    time, mask = np.zeros((len(times), width)), np.zeros((len(times), width), bool)
+    for i, t in enumerate(times):
+        if i not in unrecorded:
+            time[i, : len(t)], mask[i, : len(t)] = t, True
+    number = np.array([-1 if i in unrecorded else i + 1 for i in range(len(times))])
+    duration = np.array([t[-1] for t in times], float)
+    return Protocol(length, np.array(displacements, float), time, mask, duration, number, warming)
+
+
+def columns(**values):
+    """Parameters as arrays of one row, each (1,)."""
+    return {name: np.array([float(value)]) for name, value in values.items()}
+
+
+PLAIN = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4}
+
+
+def by_hand(p, theta, *, law="hooke", history="saturating", setting=None):
+    """Eqs (1)-(6) hold after hold; a list of lists of tensions, nothing for an unrecorded hold."""
+    carried, out = 0.0, []
+    for j, displacement in enumerate(p.displacement_mm):
+        stretched = p.length_mm + theta["preload"] + displacement + (0.0 if setting is None else setting[j])
+
+        def tension(creep, stretched=stretched):
+            zero = p.length_mm + creep
+            strain = stretched / zero - 1.0 if law == "hooke" else 1.0 - zero / stretched
+            return max(theta["k1"] * strain, 0.0)
+
+        first = tension(carried)
+        goal = theta["B"] * first ** theta["U"] if first > 0 else 0.0
+        amount = goal - carried if history == "saturating" else goal
+        start = carried
+
+        def creep(t, start=start, amount=amount):
+            return start + amount * (1.0 - math.exp(-theta["k2"] * t ** theta["N"]))
+
+        times = p.time_s[j][p.mask[j]]
+        out.append([tension(creep(t)) for t in times])
+        carried = creep(p.duration_s[j])
+    return out
+
+
+@st.composite
+def protocols(draw, most_holds=6):
+    """Any lengths, steps up and down (slack included), ragged times, late first readings, unrecorded holds."""
+    holds = draw(st.integers(1, most_holds))
+    displacements = draw(st.lists(st.floats(-2.0, 12.0), min_size=holds, max_size=holds))
+    gaps = st.lists(st.floats(1.0, 300.0), min_size=1, max_size=5)
+    times = []
+    for _ in range(holds):
+        steps = draw(gaps)
+        late = draw(st.sampled_from([0.0, 0.0, 5.0]))
+        times.append([late + t for t in np.concatenate([[0.0], np.cumsum(steps)])])
+    unrecorded = draw(st.sets(st.integers(0, holds - 2), max_size=1)) if holds > 1 else set()
+    return protocol(displacements, times, length=draw(st.floats(300.0, 3000.0)), unrecorded=unrecorded)
+
+
+def parameters():
+    """Plain parameters over the range of thin lines."""
+    return st.fixed_dictionaries(
+        {
+            "k1": st.floats(100.0, 20000.0),
+            "B": st.floats(0.001, 1.0),
+            "U": st.floats(0.1, 1.6),
+            "k2": st.floats(0.003, 0.3),
+            "N": st.floats(0.3, 1.5),
+            "preload": st.floats(-1.0, 2.0),
+        }
+    )
