@@ -163,3 +163,38 @@ def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, ca
     assert said in line
     assert "\n" not in line
     assert not out.exists()
+
+
+def test_export_speaks_the_firmwares_units(fitted, tmp_path):
+    out = tmp_path / "out"
+    assert main(["export", "hangprinter-4", "--wires", str(fitted), "--output", str(out)]) == 0
+    code = (out / "reprapfirmware.g").read_text()
+    assert "M669 K6 A0.00:-1610.98:-131.53 B1314.22:1268.14:-121.28" in code
+    assert "U2:2:2:4" in code
+    spring = next(line for line in code.splitlines() if line.startswith("M666 S"))
+    value = float(spring.split(" ")[1][1:])
+    low, high = (float(word) for word in spring.split("interval ")[1].split(" to "))
+    assert low < value < high
+    assert 780 < value < 830  # k1 itself, in newtons
+    config = (out / "klipper.cfg").read_text()
+    assert "anchor_y: -1610.98" in config
+    assert f"winch_spring_constant: {value:.0f} " in config
+    rows = (out / "creep-table.csv").read_text().splitlines()
+    assert rows[0].startswith("tension_N,time_s,mean_mm_per_m")
+    assert len(rows) == 17
+    first = dict(zip(rows[0].split(","), map(float, rows[1].split(",")), strict=True))
+    # eq (5) at 1 N after a minute, made-up wire of 1 m
+    assert first["mean_mm_per_m"] == pytest.approx(0.31 * (1 - np.exp(-0.03 * 60**0.64)), rel=0.05)
+    assert first["q05_mm_per_m"] < first["q50_mm_per_m"] < first["q95_mm_per_m"]
+
+
+def test_the_exported_model_settles_at_home_in_mujoco(fitted, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    out = tmp_path / "out"
+    assert main(["export", "linear-7", "--wires", str(fitted), "--output", str(out)]) == 0
+    assert not (out / "klipper.cfg").exists()
+    model = mujoco.MjModel.from_xml_path(str(out / "robot.xml"))
+    data = mujoco.MjData(model)
+    data.qpos[:3] = [0.0, 0.0, 0.6]
+    mujoco.mj_forward(model, data)
+    assert np.abs(data.qacc).max() < 1e-6

@@ -92,6 +92,49 @@ def calibrate(
     run.finish()
 
 
+def export(
+    robot: RobotFile,
+    wires: Wires,
+    output: Output,
+    tensions: Annotated[str, typer.Option(metavar="N,N,…", help="Tensions of the creep table.")] = "1,2,4,8",
+    times: Annotated[str, typer.Option(metavar="T,T,…", help="Times of the creep table, s.")] = "60,600,3600,86400",
+    draws: Draws = 1000,
+    experiment: ExperimentName = None,
+    seed: Seed = 0,
+) -> None:
+    """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
+    import numpy as np
+
+    from wirebayes.errors import InputError
+    from wirebayes.output import open_run, write_csv, write_text
+    from wirebayes.robot import export as files
+    from wirebayes.robot import inverse, schema
+    from wirebayes.robot.draws import for_robot
+    from wirebayes.robot.mujoco_model import mjcf
+    from wirebayes.robot.rotation import matrix
+
+    machine = schema.read(robot)
+    loads, moments = _numbers("--tensions", tensions), _times(times)
+    if loads.min() <= 0:
+        raise InputError(f"--tensions: found {tensions!r}; expected numbers above 0")
+    line = read_wires(wires, draws, experiment)
+    run = open_run(output, _configuration("export", robot, wires, draws, seed, experiment, tensions, times))
+    if run.state == "done":
+        return
+    write_csv(run.directory / "creep-table.csv", files.TABLE, files.creep_table(machine, line, loads, moments))
+    if files.is_hangprinter(machine):
+        write_text(run.directory / "reprapfirmware.g", files.reprapfirmware(machine, line))
+        write_text(run.directory / "klipper.cfg", files.klipper(machine, line))
+    else:
+        typer.echo("no firmware settings: they exist for four or five drums with a position-only platform", err=True)
+    x, R = machine.home_m[None], matrix(machine.home_rotation_rad)[None]
+    told = inverse.commands(machine, for_robot(machine, line.centre()), x, R, inverse.tensions(machine, x, R))
+    if told.feasible.all() and line.law == "hooke":
+        k1 = np.broadcast_to(for_robot(machine, line.centre()).theta["k1"][:, 0], machine.legs)
+        write_text(run.directory / "robot.xml", mjcf(machine, k1, told.zero_m[0], told.offset_m[0]))
+    run.finish()
+
+
 def read_wires(folder: Path, count: int, experiment: str | None = None) -> "WireDraws":
     """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
     from wirebayes.bayes.result import load
