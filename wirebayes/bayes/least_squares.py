@@ -20,7 +20,7 @@ from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import Model, simulate
 
 Array = NDArray[Any]
-_FAR = 1e-3  # the search stays between these quantiles of the prior: along a ridge it would never end
+_FAR = 1e-6  # the search stays between these quantiles of the prior: along a ridge it would never end
 _LEAST_STIFFNESS = 10.0  # times the largest tension: a thin line does not stretch by a tenth
 _DRAWS, _STARTS = 2000, 6
 _STEP = 1e-5

@@ -69,6 +69,13 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
             rows, "hold", "", "hooke", "Hold by hold, law (1): the reading under which Table 4 reproduces the tables."
         ),
     ]
+    loose = [unbroken(r) for r in of_table_4(rows, "refitted") if r["at_edge_of_search"]]
+    if loose:
+        words = (
+            f"On {listed(loose)} the refit runs along a ridge to the edge of the search: its k1 and B mean nothing by "
+            "themselves."
+        )
+        blocks.append(Text(words))
     better = [
         unbroken(p)
         for p, r in zip(of_table_4(rows, "published"), of_table_4(rows, "refitted"), strict=True)

@@ -1,0 +1,279 @@
+"""The page: self-contained, well formed, said of every command's folder, honest about what went wrong."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from wirebayes import paper
+from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.jobs import Job, run
+from wirebayes.cli import main
+from wirebayes.report.blocks import Page, Picture, Pictures, Section, Table, Text, drawn, number, span, svg, unit_text
+from wirebayes.report.page import render, write
+
+_VOID = {"meta", "img", "link", "br", "hr", "input"}
+_FAST = Policy(walkers=32, ess=200.0, rounds=2, round_steps=8, block=20, most_steps=40, r_hat=1.5)
+
+
+class Reader(HTMLParser):
+    """Checks nesting and collects what a reader sees."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.images: list[dict[str, str | None]] = []
+        self.anchors: list[str] = []
+        self.targets: list[str] = []
+        self.words = ""
+        self.hidden = False
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if tag not in _VOID:
+            self.open.append(tag)
+        if tag == "img":
+            self.images.append(values)
+        if tag == "a":
+            self.anchors.append(values["href"])
+        if "id" in values:
+            self.targets.append("#" + values["id"])
+        assert tag not in ("script", "link", "iframe"), f"a page needs no {tag}"
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.words += data
+
+
+def read(path: Path) -> Reader:
+    """A page that must stand alone."""
+    text = path.read_text(encoding="utf-8")
+    page = Reader(text)
+    assert not re.search(r"(src|href)=\"(?!data:|#)", text), "something outside the page is needed"
+    assert "@import" not in text and "url(" not in text
+    assert all(image["src"].startswith("data:image/") and image["alt"] for image in page.images)
+    assert set(page.anchors) <= set(page.targets)
+    return page
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (699.152, 4, "699.2"),
+        (699.152, 3, "699"),
+        (0.02138, 3, "0.0214"),
+        (7049.85, 4, "7\u202f050"),
+        (99.96, 3, "100"),
+        (0.9996, 3, "1.00"),
+        (-0.5, 2, "−0.50"),
+        (1.5e-7, 3, "1.50·10⁻⁷"),
+        (2.5e7, 2, "2.5·10⁷"),
+        (268112, 3, "268\u202f112"),
+        (0.0, 3, "0"),
+        (float("nan"), 3, "–"),
+        (None, 3, "–"),
+    ],
+)
+def test_numbers_for_people(value, digits, text):
+    assert number(value, digits) == text
+
+
+def test_intervals_and_units_for_people():
+    assert span(1.0, 2.0, 2) == "1.0 … 2.0"
+    assert unit_text("mm N^-U") == "mm N⁻ᵁ"
+    assert unit_text("1") == ""
+
+
+def test_a_page_is_well_formed_and_escapes_what_it_is_told(tmp_path):
+    figure = Figure(figsize=(2, 2))
+    figure.subplots().plot([0, 1], [0, 1])
+    nasty = "<b>&\"'"
+    table = Table([nasty, "x"], [[nasty, nasty]], nasty, {nasty: "good"})
+    picture = Pictures([Picture(drawn(figure), nasty, nasty)])
+    page = Page(
+        nasty, nasty, [Section(nasty, [Text(nasty), table, picture]), Section("folded", [Text("in")], True)], nasty
+    )
+    (tmp_path / "page.html").write_text(render(page), encoding="utf-8")
+    found = read(tmp_path / "page.html")
+    assert found.words.count(nasty) >= 9
+    assert found.images[0]["alt"] == nasty
+
+
+def test_a_picture_has_the_same_bytes_every_time():
+    def one() -> bytes:
+        figure = Figure(figsize=(2, 2))
+        axes = figure.subplots()
+        axes.plot([0, 1], [0, 1], clip_on=True)
+        axes.scatter([0.5], [0.5], rasterized=True)
+        return svg(figure)
+
+    assert one() == one()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "no configuration.json"),
+        ("{", "no valid JSON"),
+        ("[]", "found None"),
+        ('{"command": "cook"}', "found 'cook'"),
+        ('{"command": "pose"}', "pose.json: no such file"),
+    ],
+)
+def test_a_folder_that_is_not_ours_is_one_plain_line(content, said, tmp_path, capsys):
+    if content is not None:
+        (tmp_path / "configuration.json").write_text(content)
+    assert main(["report", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "report.html").exists()
+
+
+def folder_of(directory: Path, command: str, **files: object) -> Path:
+    """A folder as a command leaves it."""
+    directory.mkdir(exist_ok=True)
+    (directory / "configuration.json").write_text(json.dumps({"command": command, "seed": 3}))
+    for name, content in files.items():
+        (directory / f"{name}.json").write_text(json.dumps(content))
+    return directory
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory) -> Path:
+    """Two short fits, hold by hold and as a chain."""
+    directory = folder_of(tmp_path_factory.mktemp("fit") / "out", "fit")
+    kite = next(e for e in paper.experiments() if e.name == "kite-1.5m")
+    for likelihood in ("chain", "hold"):
+        run([Job(likelihood, (kite,), likelihood=likelihood)], directory, 0, policy=_FAST)
+    return directory
+
+
+def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
+    page = read(write(fitted))
+    assert "8 holds and 1 not recorded, 40 readings." in page.words
+    assert "Tensions from 1.21 to 15.92 N." in page.words
+    assert len(page.images) == 2 * 2 + 8 + 6
+    sections = re.split("What is known well", page.words)[1:]
+    known = [re.split("What is not", section)[0] for section in sections]
+    loose = [re.split("What is not", section)[1].split("parameter")[0] for section in sections]
+    assert any("k1:" in text for text in known) and any("k1:" in text for text in loose)
+
+
+def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
+    summary = json.loads((fitted / "chain" / "summary.json").read_text())
+    copy = folder_of(tmp_path / "out", "fit")
+    (copy / "chain").mkdir()
+    (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
+    for converged in (True, False):
+        (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"converged": converged}))
+        assert ("do not believe these intervals" in read(write(copy)).words) is not converged
+
+
+def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp_path):
+    copy = folder_of(tmp_path / "out", "fit")
+    (copy / "configuration.json").write_text(json.dumps({"command": "fit", "own_effects": "raise SystemExit(7)"}))
+    (copy / "chain").mkdir()
+    (copy / "chain" / "summary.json").write_bytes((fitted / "chain" / "summary.json").read_bytes())
+    assert "from summary.json alone" in read(write(copy)).words
+
+
+DISCOVERY = {
+    "verdict": "named",
+    "effects": ["strain_stiffening"],
+    "best": "strain_stiffening",
+    "set": ["strain_stiffening"],
+    "group": ["strain_stiffening", "sensor_nonlinearity"],
+    "accepted": ["strain_stiffening"],
+    "amplitudes": {"strain_stiffening": {"mean": 12.0, "q05": 9.0, "q95": 15.0, "unit": "-", "hold": None}},
+    "probabilities": {"unknown": 0.01, "strain_stiffening": 0.97},
+    "p_global": 0.001,
+    "shared_with": [],
+    "where": [{"covariate": "displacement", "hold": None, "p": 0.001, "sentence": "Residuals bend with displacement."}],
+    "held_out": {
+        "holds": [9, 10],
+        "plain": {"rmse_N": 0.1, "elpd": 1.0},
+        "final": {"rmse_N": 0.03, "elpd": 9.0, "elpd_difference_se": 2.0},
+        "gap_closed": 0.9,
+    },
+    "power": {"toe": {"amplitude_80": 1.2, "unit": "-"}},
+    "not_identifiable": ["gain of the force sensor"],
+    "next_measurement": "Unload in steps of 2 mm.",
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "What is missing: strain stiffening."),
+        ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "Nothing is missing"),
+        ({"verdict": "unknown", "effects": []}, "that no effect of the catalogue explains"),
+        ({"verdict": "ambiguous", "set": ["toe", "memory"]}, "cannot tell toe and memory apart"),
+    ],
+)
+def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, said, tmp_path):
+    content = {"version": 1, "experiments": {"wire-a": DISCOVERY | changes, "wire-b": DISCOVERY}}
+    page = read(write(folder_of(tmp_path / "out", "discover", discovery=content)))
+    assert said in page.words
+    assert "Unload in steps of 2 mm." in page.words
+    assert "On the unused holds 9 and 10 the rms error goes from 0.10 to 0.030 N." in page.words
+    assert "90 %" in page.words
+
+
+def test_a_gap_below_the_floor_is_a_dash(tmp_path):
+    content = DISCOVERY | {"held_out": DISCOVERY["held_out"] | {"gap_closed": None}, "p_global": None}
+    page = read(write(folder_of(tmp_path / "out", "discover", discovery={"experiments": {"wire-a": content}})))
+    assert "90 %" not in page.words
+
+
+def test_the_page_of_a_pose_that_cannot_be_held_says_so(tmp_path):
+    pose = {
+        "robot": "table",
+        "mass_kg": 2.0,
+        "feasible": False,
+        "pose": {"position_m": [0.0, 0.1, 0.25], "rotation_vector_rad": [0.0, 0.0, 0.0]},
+        "warnings": ["wire 3 is slack"],
+    }
+    page = read(write(folder_of(tmp_path / "out", "pose", pose=pose)))
+    assert "No tensions within the stated bounds hold the platform" in page.words
+    assert "Wire 3 is slack." in page.words
+
+
+def test_the_page_of_a_comparison_lists_models_and_failures(tmp_path):
+    good = {"name": "plain", "failed": None, "weight": 0.75, "difference": {"elpd": 0.0, "se": 0.0}}
+    bad = {"name": "toe", "failed": "no finite start", "meaning": ""}
+    models = [good | {"meaning": "the base"}, bad]
+    content = {"experiments": {"wire-a": {"base": "plain", "models": models}}}
+    page = read(write(folder_of(tmp_path / "out", "compare", comparison=content)))
+    assert "no finite start" in page.words
+    assert "0.75" in page.words and "the base" in page.words
+
+
+def test_an_unfinished_reproduction_shows_what_there_is(tmp_path):
+    row = {
+        "experiment": "wire-a", "material": "Line", "length_mm": 1000.0,
+        "holds": 3, "unrecorded_holds": 0, "readings": 15,
+        "smallest_tension_N": 1.0, "largest_tension_N": 2.0, "median_loss_percent": 5.0,
+    }  # fmt: skip
+    page = read(write(folder_of(tmp_path / "out", "reproduce", measured=[row])))
+    assert "wire-a" in page.words and "Table 4, again" not in page.words
+
+
+def test_bars_of_intervals_stand_where_the_numbers_are():
+    """Read back from the drawn figure: a wrong column would shift a bar."""
+    from wirebayes.report.paper_figures import intervals
+
+    row = {"parameter": "k1", "published": 2.0, "q05": 4.0, "q50": 5.0, "q95": 6.0, "prior_q05": 1.0, "prior_q95": 20.0}
+    axes = intervals([row | {"likelihood": kind} for kind in ("chain", "hold")], "wire").axes[0]
+    bars = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) == 2 and line.get_linewidth() > 3]
+    assert [list(np.asarray(bar)) for bar in bars] == [[2.0, 3.0], [0.5, 10.0], [2.0, 3.0]]
