@@ -55,12 +55,19 @@ class Coordinates:
         names = problem.names
         self.problem = problem
         self.log_columns = np.array([name in problem.prior.logarithmic for name in names])
-        self.scale = np.array([1.0 if log else _spread(problem.prior.distributions[n]) for n, log in zip(names, self.log_columns, strict=True)])
+        self.scale = np.array(
+            [
+                1.0 if log else _spread(problem.prior.distributions[n])
+                for n, log in zip(names, self.log_columns, strict=True)
+            ]
+        )
         self.ridges = []
         for mark in dict.fromkeys(_mark(problem, s.material) for s in problem.samples):
             sample = next(s for s in problem.samples if _mark(problem, s.material) == mark)
             columns = {name: f"{name}{mark}" for name in MATERIAL}
-            where = {name: names.index(c) for name, c in columns.items() if c in names and self.log_columns[names.index(c)]}
+            where = {
+                name: names.index(c) for name, c in columns.items() if c in names and self.log_columns[names.index(c)]
+            }
             fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
             if len(where) + len(fixed) < len(MATERIAL):
                 continue  # a user's prior that allows negative values: leave this material's columns as they are

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes import ensemble
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.ensemble import Chains, Policy
+from wirebayes.bayes.ensemble import DEFAULT, Chains, Policy
 from wirebayes.bayes.problem import Problem
 
 Array = NDArray[Any]
@@ -49,7 +49,7 @@ def fit(
     problem: Problem,
     seed: int = 0,
     *,
-    policy: Policy = Policy(),
+    policy: Policy = DEFAULT,
     checkpoint: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Fit:

@@ -8,7 +8,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.ensemble import DEFAULT, Policy
 from wirebayes.bayes.fit import fit, seed_of
 from wirebayes.bayes.problem import Likelihood, build
 from wirebayes.effects import catalogue, named
@@ -50,7 +50,7 @@ def run(
     directory: Path,
     seed: int,
     *,
-    policy: Policy = Policy(),
+    policy: Policy = DEFAULT,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
 ) -> None:
     """Do all fits whose folder has no ``summary.json`` yet; the results do not depend on how many cores there are.
@@ -71,7 +71,9 @@ def run(
             report("fits", done, len(todo))
 
 
-def one(job: Job, directory: Path, seed: int, policy: Policy, progress: Callable[[float], None] = lambda share: None) -> None:
+def one(
+    job: Job, directory: Path, seed: int, policy: Policy, progress: Callable[[float], None] = lambda share: None
+) -> None:
     """Do one fit and store it."""
     from wirebayes.bayes.result import save  # xarray takes a second to load; not every user of jobs stores
 

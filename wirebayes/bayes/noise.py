@@ -109,17 +109,17 @@ def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance:
     """
     holds, width, n = line.tension.shape
     jac = np.moveaxis(jacobian(line), -1, 0) * mask[None, :, :, None]
-    residual = np.moveaxis(np.where(mask[..., None], readings - line.tension, 0.0), -1, 0)
+    residual: Array = np.moveaxis(np.where(mask[..., None], readings - line.tension, 0.0), -1, 0)
     # Woodbury: V^-1 = (I - K (I + Kᵀ K)^-1 Kᵀ) / variance with K = setting J / sd of a reading.
     scaled = jac.reshape(n, holds * width, holds) * (setting_sd / np.sqrt(variance))[:, None, None]
-    usable = np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(residual).all(axis=(1, 2))
+    usable = np.asarray(np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(residual).all(axis=(1, 2)))
     scaled, residual = np.where(usable[:, None, None], scaled, 0.0), np.where(usable[:, None, None], residual, 0.0)
     inner = np.linalg.inv(np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
     r = residual.reshape(n, holds * width)
     along = np.einsum("nbj,nb->nj", scaled, r)
     pulled = (r - np.einsum("nai,ni->na", scaled, np.einsum("nij,nj->ni", inner, along))) / variance[:, None]
     out = np.zeros((holds, n))
-    for j in np.flatnonzero(mask.any(axis=1)):
+    for j in np.flatnonzero(np.any(mask, axis=1)):
         rows = j * width + np.flatnonzero(mask[j])
         k = scaled[:, rows]
         block = (np.eye(len(rows)) - k @ inner @ np.swapaxes(k, 1, 2)) / variance[:, None, None]
@@ -156,8 +156,10 @@ def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array
     return out
 
 
-def hold_courses(protocol: Protocol, theta: Theta, model: Model, first: Array) -> list[tuple[Array, Array, Array] | None]:
-    """Each hold's course from its first reading alone: tension (R, n), its slope by stretched length, and validity (n,).
+def hold_courses(
+    protocol: Protocol, theta: Theta, model: Model, first: Array
+) -> list[tuple[Array, Array, Array] | None]:
+    """Each hold's course from its first reading alone: tension (R, n), slope by stretched length, validity (n,).
 
     `first` is (H, n) or (H, 1); None stands for a hold that has no reading.
     """
@@ -181,7 +183,9 @@ def hold_courses(protocol: Protocol, theta: Theta, model: Model, first: Array) -
             tension, slope, *_ = step(j, stretched, fresh, {})
             # A slack guess has no slope: go out until it pulls.
             pulls = slope[0] > 0
-            move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), target / walk.k1 * protocol.length_mm)
+            move = np.where(
+                pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), target / walk.k1 * protocol.length_mm
+            )
             stretched = stretched + move
             if np.max(np.abs(move)) < 1e-12 * protocol.length_mm:
                 break

@@ -125,12 +125,16 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     m = len(upper[0])
     both, neither = f[:, 2 * d : 2 * d + m], f[:, 2 * d + m :]
     i, j = upper
-    mixed = (both + neither - plus[:, i] - plus[:, j] - minus[:, i] - minus[:, j] + 2.0 * value[:, None]) / (2.0 * h[:, i] * h[:, j])
+    mixed = (both + neither - plus[:, i] - plus[:, j] - minus[:, i] - minus[:, j] + 2.0 * value[:, None]) / (
+        2.0 * h[:, i] * h[:, j]
+    )
     hessian[:, i, j] = hessian[:, j, i] = mixed
     return gradient, hessian
 
 
-def modes(target: Target, rng: np.random.Generator, *, draws: int = 2000, starts: int = 24, extra: Array | None = None) -> Optimum:
+def modes(
+    target: Target, rng: np.random.Generator, *, draws: int = 2000, starts: int = 24, extra: Array | None = None
+) -> Optimum:
     """The distinct modes of a posterior, best first: the best of many prior draws, each climbed.
 
     `extra` are further starts ``(m, d)`` in sampled coordinates.

@@ -128,7 +128,9 @@ def from_table(key: str, table: Any) -> Any:
         Naming the key, what was found and what was expected.
     """
     if not isinstance(table, Mapping):
-        raise InputError(f"{key}: found {table!r}, expected a table such as {{ distribution = \"normal\", mean = 0.0, sd = 1.0 }}")
+        raise InputError(
+            f'{key}: found {table!r}, expected a table such as {{ distribution = "normal", mean = 0.0, sd = 1.0 }}'
+        )
     if set(table) == {"fixed"}:
         return _number(f"{key}.fixed", table["fixed"])
     form = table.get("distribution")
@@ -137,7 +139,10 @@ def from_table(key: str, table: Any) -> Any:
     wanted, build = _FORMS[form]
     extra, missing = set(table) - {"distribution", *wanted}, set(wanted) - set(table)
     if extra or missing:
-        raise InputError(f"{key}: a {form} distribution takes {', '.join(wanted)}; found {', '.join(sorted(set(table) - {'distribution'})) or 'none'}")
+        raise InputError(
+            f"{key}: a {form} distribution takes {', '.join(wanted)}; "
+            f"found {', '.join(sorted(set(table) - {'distribution'})) or 'none'}"
+        )
     values = {name: _number(f"{key}.{name}", table[name]) for name in wanted}
     for name in ("sd", "sd_log", "median"):
         if values.get(name, 1.0) <= 0:

@@ -100,7 +100,7 @@ class Problem:
         return out
 
     def hold_log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> list[Array]:
-        """Per sample the (H, n) log-likelihood of each hold, given the holds before (chain) or its first reading (hold).
+        """Per sample the (H, n) log-likelihood of each hold, given those before (chain) or its first reading (hold).
 
         `readings` replaces the measured ones, per sample (H, R, n), row by row of `theta` (simulated replicates).
         """
@@ -110,7 +110,9 @@ class Problem:
             y = sample.readings if readings is None else readings[i]
             variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
             if self.likelihood == "hold":
-                out.append(noise.hold_by_hold(sample.protocol, own | {"preload": 0.0 * own["k1"]}, sample.model, y, variance))
+                out.append(
+                    noise.hold_by_hold(sample.protocol, own | {"preload": 0.0 * own["k1"]}, sample.model, y, variance)
+                )
             else:
                 line = linearise(sample.protocol, own, sample.model)
                 out.append(noise.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
@@ -119,7 +121,7 @@ class Problem:
     def log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> Array:
         """(n,) log-likelihood; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
-            total: Array = sum(holds.sum(axis=0) for holds in self.hold_log_likelihood(theta, readings))  # type: ignore[assignment]
+            total: Array = sum(holds.sum(axis=0) for holds in self.hold_log_likelihood(theta, readings))
         return np.where(np.isfinite(total), total, -np.inf)
 
     def leave_one_hold_out(self, theta: Array) -> list[Array]:
@@ -131,13 +133,19 @@ class Problem:
             own = self.parameters(theta, sample)
             variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
             line = linearise(sample.protocol, own, sample.model)
-            out.append(noise.leave_one_hold_out(line, sample.readings, sample.protocol.mask, variance, own["setting_sd"]))
+            out.append(
+                noise.leave_one_hold_out(line, sample.readings, sample.protocol.mask, variance, own["setting_sd"])
+            )
         return out
 
     def linearised(self, theta: Array, sample: Sample) -> tuple[Linearised, Array, Array]:
         """A sample's staircase with reading variance and setting error, each (n,)."""
         own = self.parameters(theta, sample)
-        return linearise(sample.protocol, own, sample.model), noise.reading_variance(own["sensor_sd"], sample.resolution_N), own["setting_sd"]
+        return (
+            linearise(sample.protocol, own, sample.model),
+            noise.reading_variance(own["sensor_sd"], sample.resolution_N),
+            own["setting_sd"],
+        )
 
     @cached_property
     def sample_names(self) -> tuple[str, ...]:
@@ -216,21 +224,29 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
         for name, table in experiment.priors.items():
             key = f"{experiment.source}: prior.{name}"
             wanted = from_table(key, table)
-            hits = [c for c in (f"{name}[{experiment.name}]", f"{name}[{experiment.material}]", name) if c in distributions]
+            hits = [
+                c for c in (f"{name}[{experiment.name}]", f"{name}[{experiment.material}]", name) if c in distributions
+            ]
             if hits:
                 distributions[hits[0]] = wanted
             elif name not in everything and "." not in name:
-                raise InputError(f"{key}: no such parameter; known are {', '.join(sorted(everything))} and effect.parameter")
+                raise InputError(
+                    f"{key}: no such parameter; known are {', '.join(sorted(everything))} and effect.parameter"
+                )
 
 
 def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:
     """The same problem with other readings, per sample (H, R, 1)."""
-    return replace(problem, samples=tuple(replace(s, readings=y) for s, y in zip(problem.samples, readings, strict=True)))
+    return replace(
+        problem, samples=tuple(replace(s, readings=y) for s, y in zip(problem.samples, readings, strict=True))
+    )
 
 
 def with_protocols(problem: Problem, protocols: Sequence[Protocol], readings: Sequence[Array]) -> Problem:
     """The same parameters on other holds, per sample."""
     return replace(
         problem,
-        samples=tuple(replace(s, protocol=p, readings=y) for s, p, y in zip(problem.samples, protocols, readings, strict=True)),
+        samples=tuple(
+            replace(s, protocol=p, readings=y) for s, p, y in zip(problem.samples, protocols, readings, strict=True)
+        ),
     )

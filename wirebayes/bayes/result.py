@@ -32,7 +32,9 @@ CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm":
 _PREDICTIVE_DRAWS = 500
 
 
-def save(fit: Fit, folder: Path, provenance: Mapping[str, Any], *, seed: int = 0, sample: Sample | None = None) -> dict[str, Any]:
+def save(
+    fit: Fit, folder: Path, provenance: Mapping[str, Any], *, seed: int = 0, sample: Sample | None = None
+) -> dict[str, Any]:
     """Write ``posterior.nc`` and ``summary.json`` into an existing folder and return the summary.
 
     Parameters
@@ -203,14 +205,18 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
         variables = {k: v.reshape(m, draws) for k, v in problem.parameters(flat, members[0]).items()}
     per_hold = problem.hold_log_likelihood(flat)
     order = [i for i, s in enumerate(problem.samples) if s in members]
-    likelihood = np.moveaxis(laid([padded(per_hold[i]) for i in order]), -1, 0).reshape(m, draws, *([len(members)] if together else []), holds)
+    likelihood = np.moveaxis(laid([padded(per_hold[i]) for i in order]), -1, 0).reshape(
+        m, draws, *([len(members)] if together else []), holds
+    )
     few = np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int)
     chosen = fit.theta[:, few].reshape(-1, fit.theta.shape[-1])
     predicted = np.moveaxis(laid([padded(replicate(problem, chosen, s, rng), timed=True) for s in members]), -1, 0)
     predicted = predicted.reshape(m, len(few), *predicted.shape[1:])
     prior = problem.prior.rvs(2000, rng)
     prior_variables = (
-        _together_variables(problem, prior[None]) if together else {k: v[None] for k, v in problem.parameters(prior, members[0]).items()}
+        _together_variables(problem, prior[None])
+        if together
+        else {k: v[None] for k, v in problem.parameters(prior, members[0]).items()}
     )
     constant: dict[str, Array] = {
         "displacement_mm": laid([padded(s.protocol.displacement_mm) for s in members]),
@@ -222,10 +228,17 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
     }
     if any(s.protocol.warming_K is not None for s in members):
         constant["warming_K"] = laid(
-            [padded(np.zeros_like(s.protocol.time_s) if s.protocol.warming_K is None else s.protocol.warming_K, timed=True)
-             for s in members]  # fmt: skip
+            [
+                padded(
+                    np.zeros_like(s.protocol.time_s) if s.protocol.warming_K is None else s.protocol.warming_K,
+                    timed=True,
+                )
+                for s in members
+            ]  # fmt: skip
         )
-    observed = laid([padded(np.where(s.protocol.mask, s.readings[..., 0], np.nan), np.nan, timed=True) for s in members])
+    observed = laid(
+        [padded(np.where(s.protocol.mask, s.readings[..., 0], np.nan), np.nan, timed=True) for s in members]
+    )
     first = ["experiment"] if together else []
     hold_time, only_hold = [*first, "hold", "time"], [*first, "hold"]
     dims = {"displacement_mm": only_hold, "duration_s": only_hold, "number": only_hold, "held": only_hold,
@@ -245,7 +258,10 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
         coords=coords,
     )
     tree["log_likelihood"] = xr.DataTree(
-        xr.Dataset({"tension_N": (("chain", "draw", *only_hold), likelihood)}, coords={"chain": range(m), "draw": range(draws)} | coords)
+        xr.Dataset(
+            {"tension_N": (("chain", "draw", *only_hold), likelihood)},
+            coords={"chain": range(m), "draw": range(draws)} | coords,
+        )
     )
     about = {
         "wirebayes_version": __version__,
@@ -271,8 +287,8 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
     }  # fmt: skip
     for group in ("posterior", "prior"):
         tree[group].attrs.clear()
-        for name in tree[group].data_vars:
-            tree[group][name].attrs["units"] = unit_of(str(name), members[0].model.effects)
+        for name, variable in tree[group].data_vars.items():
+            variable.attrs["units"] = unit_of(str(name), members[0].model.effects)
     tree["posterior"].attrs.update(about)
     tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
     return tree
@@ -297,7 +313,7 @@ def unit_of(name: str, effects: tuple[Effect, ...] = ()) -> str:
 
 
 def derived(draws: Mapping[str, Array], tension_N: float) -> dict[str, Array]:
-    """Quantities people compare: creep elongation at a tension after some times, and the median creep time, per draw."""
+    """Quantities people compare: creep at a tension after some times, and the median creep time, per draw."""
     target = creep_target(np.asarray(tension_N), draws["B"], draws["U"])
     out = {key: target * creep_fraction(np.asarray(t), draws["k2"], draws["N"]) for key, t in CREEP_TIMES_S.items()}
     out["final_creep_mm"] = target
@@ -311,7 +327,8 @@ def statistics(values: Array) -> dict[str, float]:
     q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
     with np.errstate(invalid="ignore"):
         return {
-            "mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": float(q05), "q50": float(q50), "q95": float(q95),
+            "mean": float(values.mean()), "sd": float(values.std(ddof=1)),
+            "q05": float(q05), "q50": float(q50), "q95": float(q95),
             "ess_bulk": float(arviz_stats.ess(values, method="bulk")),
             "ess_tail": float(arviz_stats.ess(values, method="tail", prob=(0.05, 0.95))),
             "r_hat": float(arviz_stats.rhat(values)),
@@ -330,7 +347,11 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
     tension = round(first.model.tension_ref_N, 3)
     draws = fit.problem.parameters(fit.flat, first)
     quantities = {
-        key: {k: v for k, v in statistics(value.reshape(fit.theta.shape[:2])).items() if k in ("mean", "sd", "q05", "q50", "q95")}
+        key: {
+            k: v
+            for k, v in statistics(value.reshape(fit.theta.shape[:2])).items()
+            if k in ("mean", "sd", "q05", "q50", "q95")
+        }
         for key, value in derived(draws, tension).items()
     }
     chains = fit.chains

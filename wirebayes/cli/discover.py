@@ -31,7 +31,8 @@ def discover(
     elastic_law: ElasticLawOption = "hooke",
     history: HistoryOption = "saturating",
     without: Annotated[
-        list[str] | None, typer.Option("--without", metavar="EFFECT", help="Leave an effect out of the catalogue; may be repeated.")
+        list[str] | None,
+        typer.Option("--without", metavar="EFFECT", help="Leave an effect out of the catalogue; may be repeated."),
     ] = None,
     own_effects: OwnEffects = None,
 ) -> None:

@@ -33,7 +33,10 @@ def fit(
     history: HistoryOption = "saturating",
     likelihood: LikelihoodOption = "chain",
     effect: Annotated[
-        list[str] | None, typer.Option("--effect", metavar="NAME", help="An effect to add (grip_slip@7 names its hold); may be repeated.")
+        list[str] | None,
+        typer.Option(
+            "--effect", metavar="NAME", help="An effect to add (grip_slip@7 names its hold); may be repeated."
+        ),
     ] = None,
     own_effects: OwnEffects = None,
     together: Annotated[
@@ -74,7 +77,9 @@ def fit(
         for e in effects:
             _check_possible(e, members, file, known)
         exponent = stats.norm(1.0, 1.0) if together is not None else 1.0
-        build(members, effects, law=elastic_law, history=history, likelihood=likelihood, length_exponent=exponent)  # checks priors
+        build(
+            members, effects, law=elastic_law, history=history, likelihood=likelihood, length_exponent=exponent
+        )  # checks priors
         provenance = shared | {"data_sha256": {e.name: e.data_hash for e in members}}
         jobs.append(Job(folder, members, keys, own_effects, elastic_law, history, likelihood, exponent, provenance))
     configuration = {
@@ -107,5 +112,9 @@ def _check_possible(effect, members, file, known) -> None:  # type: ignore[no-un
     if effect.key in variants:
         return
     if isinstance(effect, EventEffect):
-        raise InputError(f"--effect {effect.key}: no recorded hold {effect.hold} in experiment {members[0].name} of {file}")
-    raise InputError(f"--effect {effect.key}: the holds of {', '.join(e.name for e in members)} cannot show it ({effect.shows})")
+        raise InputError(
+            f"--effect {effect.key}: no recorded hold {effect.hold} in experiment {members[0].name} of {file}"
+        )
+    raise InputError(
+        f"--effect {effect.key}: the holds of {', '.join(e.name for e in members)} cannot show it ({effect.shows})"
+    )

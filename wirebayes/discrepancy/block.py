@@ -52,7 +52,11 @@ class Block:
 
 
 def fitted(
-    experiments: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History, rng: np.random.Generator
+    experiments: Sequence[Experiment],
+    effects: Sequence[Effect],
+    law: ElasticLaw,
+    history: History,
+    rng: np.random.Generator,
 ) -> Block:
     """Fit a block from many starts."""
     target = Target(build(experiments, effects, law=law, history=history))
@@ -81,7 +85,9 @@ class Pinned:
         theta = np.empty((min(best, len(self._plain.modes.z)), len(names)))
         natural = self._plain.target.coordinates.to_natural(self._plain.modes.z[: len(theta)])
         for i, name in enumerate(names):
-            theta[:, i] = natural[:, known[name]] if name in known else self.target.problem.prior.distributions[name].median()
+            theta[:, i] = (
+                natural[:, known[name]] if name in known else self.target.problem.prior.distributions[name].median()
+            )
         return self._drop(self.target.coordinates.to_sampled(np.insert(theta, self.column, 0.0, axis=1)))
 
     def climb(self, start: Array, amplitude: Array) -> Optimum:

@@ -133,9 +133,7 @@ def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence
 
 def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Effect]) -> Problem:
     """The candidate's posterior of an experiment."""
-    problem = build(
-        [training], effects, law=candidate.law, history=candidate.history, likelihood=candidate.likelihood
-    )
+    problem = build([training], effects, law=candidate.law, history=candidate.history, likelihood=candidate.likelihood)
     prior = problem.prior
     here = {name: value for name, value in candidate.fixed.items() if name in prior.names}
     free = {name: d for name, d in prior.distributions.items() if name not in here}

@@ -53,7 +53,9 @@ class Choice:
         return {b: r for r in self.winners[name] for b in r.blocks}
 
 
-def choose(blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]) -> Choice:
+def choose(
+    blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]
+) -> Choice:
     """Evidence of every name, refitted where it matters."""
     linear = [tuple(float(v[0]) for v in log_bayes(c, scans)) for c in candidates]
     forms: dict[tuple[str, str, tuple[int, ...], bool], int] = {}
@@ -76,14 +78,21 @@ def choose(blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequenc
         else:
             alone = [Candidate(c.probe, c.name, (b,), True) for b in c.blocks]
             parts = [log_bayes(a, scans) for a in alone]
-            refitted[form] = [refit(blocks, a.blocks, effect, float(p[2][0]), float(p[1][0])) for a, p in zip(alone, parts, strict=True)]
+            refitted[form] = [
+                refit(blocks, a.blocks, effect, float(p[2][0]), float(p[1][0]))
+                for a, p in zip(alone, parts, strict=True)
+            ]
     values: dict[str, dict[tuple[str, tuple[int, ...], bool], float]] = {}
     for form, i in forms.items():
         value = sum(r.log_bayes for r in refitted[form]) if form in refitted else linear[i][0]
         values.setdefault(form[0], {})[form[1:]] = value
     evidence = {name: _average(v, len(blocks)) for name, v in values.items()}
     loose = flexible_log_bayes(scans)[:, 0]
-    unknown = float(loose[-1]) if len(blocks) == 1 else float(logsumexp([loose[-1] + np.log(0.5), *(loose[:-1] - np.log(2.0 * len(blocks)))]))
+    unknown = (
+        float(loose[-1])
+        if len(blocks) == 1
+        else float(logsumexp([loose[-1] + np.log(0.5), *(loose[:-1] - np.log(2.0 * len(blocks)))]))
+    )
     winners = {}
     for name in evidence:
         own = {form: r for form, r in refitted.items() if form[0] == name}

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from wirebayes.bayes.fit import seed_of
 from wirebayes.discrepancy import choose, gap, gross, locate, power, screen
 from wirebayes.discrepancy.block import Block, fitted
-from wirebayes.discrepancy.choose import Choice
+from wirebayes.discrepancy.choose import UNKNOWN_WEIGHT, Choice
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
+from wirebayes.discrepancy.naming import probabilities
 from wirebayes.discrepancy.screen import Candidate, GlobalTest
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
@@ -83,7 +84,9 @@ def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = 
     return {name: kind for name, kind in known.items() if name not in names}
 
 
-def discover(experiments: Sequence[Experiment], *, without: Sequence[str] = (), seed: int = 0, **settings: Any) -> dict[str, Any]:
+def discover(
+    experiments: Sequence[Experiment], *, without: Sequence[str] = (), seed: int = 0, **settings: Any
+) -> dict[str, Any]:
     """The content of ``discovery.json`` for the experiments of one file (see `investigate`)."""
     kinds = catalogue_without(without, settings.pop("kinds", CATALOGUE))
     return investigate(experiments, Settings(kinds=kinds, **settings), seed).report
@@ -132,10 +135,11 @@ def investigate(
         report("simulations", i + 1, len(plain))
     test = screen.global_test(candidates, data, nulls)
     where = [
-        locate.findings(p, len(trials), d, n, ", ".join(b.names)) for p, d, n, b in zip(patterns, data, nulls, plain, strict=True)
+        locate.findings(p, len(trials), d, n, ", ".join(b.names))
+        for p, d, n, b in zip(patterns, data, nulls, plain, strict=True)
     ]
     if test.p > ALPHA:
-        verdict, choice, accepted = "nothing-missing", None, []
+        verdict, choice, accepted = "nothing-missing", None, list[_Accepted]()
         final = plain
     else:
         report("naming", 0, 1)
@@ -157,7 +161,11 @@ def investigate(
             sample = block.target.problem.samples[block.names.index(e.name)]
             line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
             residual = (sample.readings - line.tension)[sample.protocol.mask]
-            out[e.name] = common | {"held_out": check, "residual_rms_N": float(np.sqrt((residual**2).mean())), "gross_errors": [g for g in struck if g["experiment"] == e.name]}
+            out[e.name] = common | {
+                "held_out": check,
+                "residual_rms_N": float(np.sqrt((residual**2).mean())),
+                "gross_errors": [g for g in struck if g["experiment"] == e.name],
+            }
     report("held-out holds", len(plain), len(plain))
     return Findings({"version": 1, "experiments": out}, effects, tuple(e for b in plain for e in b.experiments))
 
@@ -167,7 +175,9 @@ def final_effects(findings: Findings, experiment: Experiment) -> tuple[Effect, .
     report = findings.report["experiments"][experiment.name]
     if report["verdict"] == "unknown":
         durations = [h.duration_s for h in experiment.recorded_holds]
-        return (Discrepancy(len(experiment.holds), float(report["residual_rms_N"]), float(np.median(durations)) or 1.0),)
+        return (
+            Discrepancy(len(experiment.holds), float(report["residual_rms_N"]), float(np.median(durations)) or 1.0),
+        )
     # An event stays with its experiment, an amplitude needs holds that can show it.
     return tuple(e for e in findings.effects[experiment.name] if getattr(e, "test", "") in ("", experiment.name))
 
@@ -223,7 +233,11 @@ def _decide(
         if further.log_bayes[name] < 2.0:
             break
         more, extra = _add(blocks, further, name, settings, rng)
-        gain = sum(float((gap.leave_one_hold_out(m, rng) - gap.leave_one_hold_out(b, rng)).sum()) for i, (m, b) in enumerate(zip(more, blocks, strict=True)) if i in extra.blocks)
+        gain = sum(
+            float((gap.leave_one_hold_out(m, rng) - gap.leave_one_hold_out(b, rng)).sum())
+            for i, (m, b) in enumerate(zip(more, blocks, strict=True))
+            if i in extra.blocks
+        )
         if gain <= KEEP_ELPD:
             break
         blocks, done = more, [*done, extra]
@@ -246,18 +260,28 @@ def _try_pairs(plain: list[Block], choice: Choice, settings: Settings, rng: np.r
         scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
         further = choose.choose(blocks, trials, candidates, scans)
         if further.winners:
-            evidence[name] = float(np.logaddexp(evidence[name], evidence[name] + odds + max(further.log_bayes[n] for n in further.winners)))
-    shares = choose.probabilities({n: evidence[n] for n in choice.winners}, choice.unknown, choose.UNKNOWN_WEIGHT)
+            evidence[name] = float(
+                np.logaddexp(evidence[name], evidence[name] + odds + max(further.log_bayes[n] for n in further.winners))
+            )
+    shares = probabilities({n: evidence[n] for n in choice.winners}, choice.unknown, UNKNOWN_WEIGHT)
     return replace(choice, log_bayes=evidence, shares=shares)
 
 
-def _add(blocks: list[Block], choice: Choice, name: str, settings: Settings, rng: np.random.Generator) -> tuple[list[Block], _Accepted]:
+def _add(
+    blocks: list[Block], choice: Choice, name: str, settings: Settings, rng: np.random.Generator
+) -> tuple[list[Block], _Accepted]:
     """The blocks refitted with a name's best form."""
     out, amplitudes = list(blocks), {}
     for b, r in choice.amplitudes(name).items():
         main = r.effect.amplitudes[0]
         hold = r.effect.hold if isinstance(r.effect, EventEffect) else None
-        amplitudes[b] = {"mean": r.amplitude, "q05": r.amplitude - 1.645 * r.sd, "q95": r.amplitude + 1.645 * r.sd, "unit": main.unit, "hold": hold}
+        amplitudes[b] = {
+            "mean": r.amplitude,
+            "q05": r.amplitude - 1.645 * r.sd,
+            "q95": r.amplitude + 1.645 * r.sd,
+            "unit": main.unit,
+            "hold": hold,
+        }
         out[b] = fitted(blocks[b].experiments, (*blocks[b].effects, r.effect), settings.law, settings.history, rng)
     return out, _Accepted(name, tuple(amplitudes), amplitudes)
 
@@ -291,8 +315,8 @@ def _common(
 
 
 def _outlook(
-    block: Block, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest, settings: Settings,
-    choice: Choice | None, verdict: str, alike: dict[tuple[str, str], float],
+    block: Block, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest,
+    settings: Settings, choice: Choice | None, verdict: str, alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What could have been seen, what cannot be, and what to measure next."""
     threshold = test.threshold(ALPHA)
@@ -302,7 +326,10 @@ def _outlook(
         if i in c.blocks and (c.name not in best_probe or strength[c.probe] > strength[best_probe[c.name]]):
             best_probe[c.name] = c.probe
     seen = {
-        name: {"amplitude_80": power.amplitude_80(null, trials[k], k, threshold), "unit": trials[k].effect.amplitudes[0].unit}
+        name: {
+            "amplitude_80": power.amplitude_80(null, trials[k], k, threshold),
+            "unit": trials[k].effect.amplitudes[0].unit,
+        }
         for name, k in best_probe.items()
     }
     possible = [c.name for c in candidates if i in c.blocks]
@@ -320,18 +347,33 @@ def _outlook(
         # Relative to what a person expects before the test, which effect was hidden best?
         def hiddenness(name: str) -> float:
             amplitude = seen[name]["amplitude_80"]
-            return float("inf") if amplitude is None else amplitude / trials[best_probe[name]].effect.amplitudes[0].prior.std()
+            return (
+                float("inf")
+                if amplitude is None
+                else amplitude / trials[best_probe[name]].effect.amplitudes[0].prior.std()
+            )
 
         weakest = trials[best_probe[max(best_probe, key=hiddenness)]]
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
 
 
-def _held_out(block: Block, final: Block, verdict: str, choice: Choice | None, i: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+def _held_out(
+    block: Block, final: Block, verdict: str, choice: Choice | None, i: int, rng: np.random.Generator
+) -> list[dict[str, Any]]:
     """Plain and final model on the last third of the holds, and by leaving out one hold at a time."""
     train = [gap.last_third(e) for e in block.experiments]
     if not all(train):
         nothing: dict[str, Any] = {"rmse_N": None, "elpd": None}
-        return [{"holds": [], "plain": nothing, "final": nothing | {"elpd_difference_se": None}, "gap_closed": None, "shrinks": False} for _ in block.experiments]
+        return [
+            {
+                "holds": [],
+                "plain": nothing,
+                "final": nothing | {"elpd_difference_se": None},
+                "gap_closed": None,
+                "shrinks": False,
+            }
+            for _ in block.experiments
+        ]
     plain = gap.held_out(block.experiments, train, (), block, rng)
     better = plain if not final.effects else gap.held_out(block.experiments, train, final.effects, block, rng)
     shrinks, loho = False, None

@@ -166,10 +166,21 @@ def joined(scans: Sequence[Scan]) -> Scan:
     """Scans of consecutive rows as one."""
     first = scans[0].pieces
     pieces = Pieces(
-        *(np.concatenate([getattr(s.pieces, k) for s in scans], axis=1) for k in ("shared", "rss", "along", "square")),
-        first.degrees, np.concatenate([s.pieces.least for s in scans]), first.one_sided,
-    )  # fmt: skip
-    return Scan(*(np.concatenate([getattr(s, k) for s in scans]) for k in ("effects", "flexible", "amplitude", "norm")), pieces)
+        shared=np.concatenate([s.pieces.shared for s in scans], axis=1),
+        rss=np.concatenate([s.pieces.rss for s in scans], axis=1),
+        along=np.concatenate([s.pieces.along for s in scans], axis=1),
+        square=np.concatenate([s.pieces.square for s in scans], axis=1),
+        degrees=first.degrees,
+        least=np.concatenate([s.pieces.least for s in scans]),
+        one_sided=first.one_sided,
+    )
+    return Scan(
+        effects=np.concatenate([s.effects for s in scans]),
+        flexible=np.concatenate([s.flexible for s in scans]),
+        amplitude=np.concatenate([s.amplitude for s in scans]),
+        norm=np.concatenate([s.norm for s in scans]),
+        pieces=pieces,
+    )
 
 
 def forms(target: Target, z: Array, trials: Sequence[Probe]) -> list[Array]:
@@ -193,7 +204,8 @@ def expand(
 ) -> Expansion:
     """Linearise a block at the rows of `z` (n, d), for its readings or for replicates (H, R, n) row by row.
 
-    An effect's form hardly differs between refits: `shapes`, from `forms`, serve all rows. `columns` adds further signatures behind the probes': given the problem, the sample's number, the tension
+    An effect's form hardly differs between refits: `shapes`, from `forms`, serve all rows. `columns` adds further
+    signatures behind the probes': given the problem, the sample's number, the tension
     (H, R, n) and its derivatives (H, R, n, p), it returns (H, R, n, more), N.
     """
     problem = target.problem
@@ -244,7 +256,7 @@ def expand(
     return Expansion(
         np.concatenate(parts["r"], axis=1), np.concatenate(parts["a"], axis=1), np.concatenate(parts["s"], axis=1),
         np.array([i < len(trials) and trials[i].one_sided for i in range(parts["s"][0].shape[-1])], bool),
-        _block_diagonal(parts["f"]) if len(parts["f"]) > 1 else parts["f"][0], left, singular, ratio, gradient, precision,
+        _block_diagonal(parts["f"]), left, singular, ratio, gradient, precision,
         np.min(parts["floor"], axis=0),
     )  # fmt: skip
 
@@ -276,6 +288,7 @@ def scan(x: Expansion) -> Scan:
     rr0 = (x.residual**2).sum(axis=1)
     ff0 = np.swapaxes(x.flexible, 1, 2) @ x.flexible
     fr0 = np.einsum("naf,na->nf", x.flexible, x.residual)
+    least = degrees * np.maximum(x.floor, _LEAST_NOISE)
     plain, effects, loose, amplitude, norm = [], [], [], [], []
     kept: dict[str, list[Array]] = {"shared": [], "rss": [], "along": [], "square": []}
     for ratio in RATIOS:
@@ -291,10 +304,13 @@ def scan(x: Expansion) -> Scan:
         rr = rr0 - (levels[..., -1] * weighted[..., -1]).sum(axis=1)
         solved = np.linalg.solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
         sr, sm, sf = solved[..., 0], solved[..., 1 : m + 1], solved[..., m + 1 :]
-        rss = rr - (pr * sr).sum(axis=1) + np.einsum(
-            "np,np->n", x.prior_gradient, np.linalg.solve(x.prior_precision, x.prior_gradient[..., None])[..., 0]
+        rss = (
+            rr
+            - (pr * sr).sum(axis=1)
+            + np.einsum(
+                "np,np->n", x.prior_gradient, np.linalg.solve(x.prior_precision, x.prior_gradient[..., None])[..., 0]
+            )
         )
-        least = degrees * x.floor
         b = mr - np.einsum("npm,np->nm", pm, sr)
         c = mm - (pm * sm).sum(axis=1)
         c = np.where(c > _ABSORBED * square, c, np.inf)
@@ -305,7 +321,9 @@ def scan(x: Expansion) -> Scan:
         plain.append(shared - 0.5 * degrees * np.log(np.maximum(rss, least)))
         effects.append(shared[:, None] - 0.5 * degrees * np.log(np.maximum(rss[:, None] - b**2 / c, least[:, None])))
         amplitude.append(b / c)
-        norm.append(np.sqrt(np.where(np.isfinite(c), c, 0.0) * degrees / np.maximum(rss[:, None] - b**2 / c, least[:, None])))
+        norm.append(
+            np.sqrt(np.where(np.isfinite(c), c, 0.0) * degrees / np.maximum(rss[:, None] - b**2 / c, least[:, None]))
+        )
         ff = ff0 - np.swapaxes(levels[..., functions], 1, 2) @ weighted[..., functions] - np.swapaxes(pf, 1, 2) @ sf
         fr = fr0 - np.einsum("nhf,nh->nf", levels[..., functions], weighted[..., -1]) - np.einsum("npf,np->nf", pf, sr)
         values, vectors = np.linalg.eigh(ff)
@@ -324,12 +342,16 @@ def scan(x: Expansion) -> Scan:
         logsumexp(loose, axis=0) - np.log(len(SIZES)) - reference,
         np.take_along_axis(np.array(amplitude), best[None], axis=0)[0],
         np.take_along_axis(np.array(norm), best[None], axis=0)[0],
-        Pieces(*(np.array(kept[k]) for k in ("shared", "rss", "along", "square")), degrees, degrees * x.floor, x.one_sided),
+        Pieces(
+            np.array(kept["shared"]), np.array(kept["rss"]), np.array(kept["along"]), np.array(kept["square"]),
+            degrees, least, x.one_sided,
+        ),  # fmt: skip
     )
 
 
 def projected(x: Expansion, ratio: float) -> Array:
     """(N, m) signatures of the first row, whitened at a noise ratio, free of what the parameters absorb."""
+
     def whiten(columns: Array) -> Array:
         shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
         return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
@@ -374,4 +396,5 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 
 _STEP = 1e-5
+_LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
 _ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

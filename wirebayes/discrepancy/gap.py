@@ -57,7 +57,11 @@ def last_third(experiment: Experiment) -> int:
 
 
 def held_out(
-    experiments: Sequence[Experiment], train: Sequence[int], effects: Sequence[Effect], block: Block, rng: np.random.Generator
+    experiments: Sequence[Experiment],
+    train: Sequence[int],
+    effects: Sequence[Effect],
+    block: Block,
+    rng: np.random.Generator,
 ) -> list[HeldOut]:
     """Train a block's samples on their first holds with some effects, predict their other holds freely.
 
@@ -72,12 +76,14 @@ def held_out(
         Says which laws.
     rng : numpy Generator
     """
-    trained = fitted([e.train(k) for e, k in zip(experiments, train, strict=True)], effects, block.law, block.history, rng)
+    trained = fitted(
+        [e.train(k) for e, k in zip(experiments, train, strict=True)], effects, block.law, block.history, rng
+    )
     theta = quick.draws(trained.target, trained.modes, rng, 500)
     whole = build(experiments, effects, law=block.law, history=block.history)
     # The training readings' reference tension belongs to the parameters.
     models = [s.model for s in trained.target.problem.samples]
-    out = []
+    out: list[HeldOut] = []
     for sample, model, k in zip(whole.samples, models, train, strict=True):
         own = trained.target.problem.parameters(theta, trained.target.problem.samples[len(out)])
         line = linearise(sample.protocol, own, model)
@@ -95,7 +101,11 @@ def held_out(
             y = sample.readings[j][keep]
             error.append(mean.mean(axis=1) - y[:, 0])
             floor.append((variance + s**2 * q).mean(axis=1))
-            cov = np.einsum("rn,qn->nrq", c * p, c) + np.einsum("rn,qn->nrq", s * q, s) + variance[:, None, None] * np.eye(keep.sum())
+            cov = (
+                np.einsum("rn,qn->nrq", c * p, c)
+                + np.einsum("rn,qn->nrq", s * q, s)
+                + variance[:, None, None] * np.eye(keep.sum())
+            )
             r = (y - mean).T
             _, logdet = np.linalg.slogdet(cov)
             square = np.einsum("nr,nr->n", r, np.linalg.solve(cov, r[..., None])[..., 0])
@@ -112,7 +122,7 @@ def held_out(
 
 
 def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:
-    """1 - (rmse_final² - s²) / (rmse_plain² - s²), s the noise floor of the final model; None when plain is below it."""
+    """1 - (rmse_final² - s²) / (rmse_plain² - s²), s the final model's noise floor; None when plain is below it."""
     excess = plain.squares - final.floor
     return None if excess <= 0 else float(1.0 - (final.squares - final.floor) / excess)
 
@@ -125,7 +135,12 @@ def leave_one_hold_out(block: Block, rng: np.random.Generator) -> Array:
     """
     target: Target = block.target
     theta = quick.draws(target, block.modes, rng, 1500)
-    values = np.concatenate([v[s.protocol.recorded] for v, s in zip(target.problem.leave_one_hold_out(theta), target.problem.samples, strict=True)])
+    values = np.concatenate(
+        [
+            v[s.protocol.recorded]
+            for v, s in zip(target.problem.leave_one_hold_out(theta), target.problem.samples, strict=True)
+        ]
+    )
     values = np.where(np.isfinite(values), values, -1e6)
     log_weight = -values - logsumexp(-values, axis=1, keepdims=True)
     ceiling = -0.5 * np.log(values.shape[1])

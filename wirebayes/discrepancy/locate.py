@@ -45,7 +45,12 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     for name in ("displacement", "elapsed time"):
         if any(c[0] == name for c in covariates):
             listed += [Pattern(name, moves=p) for p in _PARAMETERS if p in moving]
-    holds = [(at, int(n), j) for at, s in enumerate(problem.samples) for j, n in enumerate(s.protocol.number) if s.protocol.recorded[j]]
+    holds = [
+        (at, int(n), j)
+        for at, s in enumerate(problem.samples)
+        for j, n in enumerate(s.protocol.number)
+        if s.protocol.recorded[j]
+    ]
     listed += [Pattern("hold", hold=n) for _, n, _ in holds]
 
     def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
@@ -81,13 +86,24 @@ def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
             out.append((name, [(v - middle) / spread for v in values], degrees))
 
     shape = [s.protocol.time_s.shape for s in samples]
-    add("displacement", [np.broadcast_to(s.protocol.displacement_mm[:, None], h) for s, h in zip(samples, shape, strict=True)], 3)
+    add(
+        "displacement",
+        [np.broadcast_to(s.protocol.displacement_mm[:, None], h) for s, h in zip(samples, shape, strict=True)],
+        3,
+    )
     add("time in hold", [np.log1p(s.protocol.time_s / max(0.1 * s.typical_hold_s, 1e-9)) for s in samples], 3)
     add("elapsed time", [s.protocol.start_s[:, None] + s.protocol.time_s for s in samples], 3)
     add("tension", [s.readings[..., 0] for s in samples], 3)
     directions = [np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0)) for s in samples]
     add("direction", [np.broadcast_to(d[:, None], h) for d, h in zip(directions, shape, strict=True)], 1)
-    add("temperature", [np.zeros(h) if s.protocol.warming_K is None else s.protocol.warming_K for s, h in zip(samples, shape, strict=True)], 2)
+    add(
+        "temperature",
+        [
+            np.zeros(h) if s.protocol.warming_K is None else s.protocol.warming_K
+            for s, h in zip(samples, shape, strict=True)
+        ],
+        2,
+    )
     add("length", [np.full(h, s.protocol.length_mm) for s, h in zip(samples, shape, strict=True)], 1)
     return out
 
@@ -111,7 +127,14 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
         p = float((1 + (chance >= here.max()).sum()) / (1 + len(chance)))
         best = columns[int(np.argmax(here))]
         pattern = listed[best - skip]
-        out.append({"covariate": covariate, "hold": pattern.hold, "p": p, "sentence": _sentence(pattern, float(data.amplitude[0, best]), p, names)})
+        out.append(
+            {
+                "covariate": covariate,
+                "hold": pattern.hold,
+                "p": p,
+                "sentence": _sentence(pattern, float(data.amplitude[0, best]), p, names),
+            }
+        )
     return sorted(out, key=lambda item: item["p"])
 
 
@@ -120,8 +143,13 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
     if p > 0.05:
         return f"{names}: the residuals show no pattern along the {pattern.covariate} ({chance})."
     if pattern.hold is not None:
-        return f"{names}: hold {pattern.hold} lies {abs(amplitude):.3g} N {'above' if amplitude > 0 else 'below'} what the others predict ({chance})."
+        side = "above" if amplitude > 0 else "below"
+        return f"{names}: hold {pattern.hold} lies {abs(amplitude):.3g} N {side} what the others predict ({chance})."
     if pattern.moves is not None:
         way = "rise" if amplitude > 0 else "fall"
-        return f"{names}: {_PARAMETERS[pattern.moves]} wants to {way} with the {pattern.covariate}, by a factor of {np.exp(np.clip(2 * abs(amplitude), 0, 20)):.3g} over two standard deviations of it ({chance})."
+        factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))
+        return (
+            f"{names}: {_PARAMETERS[pattern.moves]} wants to {way} with the {pattern.covariate}, "
+            f"by a factor of {factor:.3g} over two standard deviations of it ({chance})."
+        )
     return f"{names}: the readings depart from the plain model along the {pattern.covariate} ({chance})."

@@ -92,7 +92,9 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
     best = int(np.argmax(value))
     sd = _width(grid, value, best, per_delta)
     span = LARGEST if one_sided else 2.0 * LARGEST
-    return Refit(effect, tuple(which), float(value[best] + 0.5 * np.log(2 * np.pi) - np.log(span)), float(grid[best]), sd)
+    return Refit(
+        effect, tuple(which), float(value[best] + 0.5 * np.log(2 * np.pi) - np.log(span)), float(grid[best]), sd
+    )
 
 
 def _width(grid: Array, value: Array, best: int, fallback: float) -> float:

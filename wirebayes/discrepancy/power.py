@@ -22,7 +22,7 @@ _POWER_ROWS = 300  # simulations behind an 80 % amplitude
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
-    """Amplitude of a probe that passes the global test's threshold in 80 % of simulations; None beyond δ of `LARGEST`."""
+    """Amplitude of a probe that passes the global test in 80 % of simulations; None beyond δ of `LARGEST`."""
     norm = float(np.median(null.norm[:, i]))
     if norm <= 0:
         return None
@@ -41,7 +41,9 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
     return high
 
 
-def similarity(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> dict[tuple[str, str], float]:
+def similarity(
+    expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]
+) -> dict[tuple[str, str], float]:
     """Largest |cos| between the projected signatures of any two effects, over their forms, at a noise ratio a block.
 
     An effect with one amplitude a block may put any size on each, so it is as alike as the best sizes make it.
@@ -112,14 +114,16 @@ def not_identifiable(block: Block, kinds: Sequence[type[Effect]], possible: Sequ
     """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show."""
     trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in _ABSORBABLE]
     x = expand(block.target, block.modes.z[:1], trials)
-    whole = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
+    wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
     left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
     out = [
-        f"{t.effect.name}: {100 * (1 - l / w):.1f} % of it is taken up by the model's own parameters"
-        for t, w, l in zip(trials, whole, left, strict=True)
-        if l < 0.1 * w
+        f"{t.effect.name}: {100 * (1 - rest / whole):.1f} % of it is taken up by the model's own parameters"
+        for t, whole, rest in zip(trials, wholes, left, strict=True)
+        if rest < 0.1 * whole
     ]
-    return out + [f"{kind.name}: this protocol cannot show it ({kind.shows})" for kind in kinds if kind.name not in possible]
+    return out + [
+        f"{kind.name}: this protocol cannot show it ({kind.shows})" for kind in kinds if kind.name not in possible
+    ]
 
 
 @dataclass(frozen=True)
@@ -142,21 +146,30 @@ def _plans(p: Protocol) -> list[_Plan]:
         start = np.concatenate([[0.0], np.cumsum(np.full(h, times[-1]))[:-1]])
         # A slow swing of the room, three degrees up and down again.
         warm = 3.0 * np.sin(2 * np.pi * (start[:, None] + time) / max(start[-1] + times[-1], 1.0)) if warming else None
-        return Protocol(length, displacement, time, np.ones(time.shape, bool), np.full(h, times[-1]), np.arange(1, h + 1), warm)
+        return Protocol(
+            length, displacement, time, np.ones(time.shape, bool), np.full(h, times[-1]), np.arange(1, h + 1), warm
+        )
 
     times = p.time_s[int(np.argmax(p.mask.sum(axis=1)))][: int(p.mask.sum(axis=1).max())]
     span = f"{x.min():g} to {x.max():g} mm"
+    dense = "600 s with 25 readings spaced evenly in the logarithm of time"
+    there_and_back = np.concatenate([x, down])
+    halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
+    back = f"the same displacements back from {x.max():g} to {x.min():g} mm, each held {times[-1]:g} s"
     return [
-        _Plan(f"unload the wire after the last hold: the same displacements back from {x.max():g} to {x.min():g} mm, each held {times[-1]:g} s", holds(np.concatenate([x, down]), times, p.length_mm)),
-        _Plan(f"hold each of the displacements {span} for 600 s with 25 readings spaced evenly in the logarithm of time", holds(x, log_times, p.length_mm)),
-        _Plan(f"load and unload over {span} with holds of 600 s and 25 readings spaced evenly in the logarithm of time", holds(np.concatenate([x, down]), log_times, p.length_mm)),
-        _Plan(f"take twice as many, half as large steps over {span}", holds(np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)])), times, p.length_mm)),
-        _Plan(f"repeat the test at a second length, {2 * p.length_mm:g} mm, with steps scaled alike", holds(2 * x, times, 2 * p.length_mm)),
-    ]  # fmt: skip
+        _Plan(f"unload the wire after the last hold: {back}", holds(there_and_back, times, p.length_mm)),
+        _Plan(f"hold each of the displacements {span} for {dense}", holds(x, log_times, p.length_mm)),
+        _Plan(f"load and unload over {span}, each hold {dense}", holds(there_and_back, log_times, p.length_mm)),
+        _Plan(f"take twice as many, half as large steps over {span}", holds(halved, times, p.length_mm)),
+        _Plan(
+            f"repeat the test at a second length, {2 * p.length_mm:g} mm, with steps scaled alike",
+            holds(2 * x, times, 2 * p.length_mm),
+        ),
+    ]
 
 
 def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
-    """The plan that tells two candidates apart best, or shows the least visible effect best, by projected signatures."""
+    """The plan that tells two candidates apart best, or shows one effect best, by projected signatures."""
     problem = block.target.problem
     first = problem.samples[0]
     trials = list(pair) if pair else [weakest] if weakest else []
@@ -170,7 +183,11 @@ def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Pr
         scored.append((_separation(replace_problem(block.target, other), block, trials), plan.words))
     best, words = max(scored)
     ratio = best / here if here > 0 else np.inf
-    gain = f"{ratio:.1f} times as far apart as now" if np.isfinite(ratio) and ratio < 1e3 else "apart, which they are not now"
+    gain = (
+        f"{ratio:.1f} times as far apart as now"
+        if np.isfinite(ratio) and ratio < 1e3
+        else "apart, which they are not now"
+    )
     if pair:
         return f"To tell {trials[0].effect.name} from {trials[1].effect.name}: {words}. They would lie {gain}."
     return f"To see a smaller {trials[0].effect.name}: {words}. It would stand out {ratio:.1f} times as far as now."

@@ -55,7 +55,9 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever the user's file raises is told in one line
         raise InputError(f"{own}: cannot be run: {type(error).__name__}: {error}") from None
-    found = [v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Effect) and v.__module__ == spec.name]
+    found = [
+        v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Effect) and v.__module__ == spec.name
+    ]
     effects = {}
     for effect in found:
         lacking = [a for a in ("name", "place", "scope", "amplitudes", "sentence") if not hasattr(effect, a)]
@@ -86,7 +88,9 @@ def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
     if issubclass(kind, EventEffect):
         test, _, hold = variant.rpartition(":")
         if not hold.isdigit():
-            raise InputError(f"effect {key}: this effect happens at one hold, name it as in {name}@7 or {name}@EXPERIMENT:7")
+            raise InputError(
+                f"effect {key}: this effect happens at one hold, name it as in {name}@7 or {name}@EXPERIMENT:7"
+            )
         return kind(hold=int(hold), test=test)
     if issubclass(kind, elastic.LengthDependence):
         if variant not in ("k1", "B", "U", "N"):

@@ -63,8 +63,24 @@ def _residuals(axis: Axes, folder: Path, held: list[int]) -> None:
         if number in held:
             axis.axvspan(k, k + 1, color=_HELD, zorder=0, label="held out for the gap" if number == held[0] else None)
         first = k == 0
-        axis.fill_between(x, (low[j] - middle[j])[keep], (high[j] - middle[j])[keep], color=_BAND, alpha=0.3, lw=0, label="90 % band" if first else None)
-        axis.plot(x, (sample.readings[j, :, 0] - middle[j])[keep], "o-", color=_MEASURED, ms=3, lw=0.8, label="measured" if first else None)
+        axis.fill_between(
+            x,
+            (low[j] - middle[j])[keep],
+            (high[j] - middle[j])[keep],
+            color=_BAND,
+            alpha=0.3,
+            lw=0,
+            label="90 % band" if first else None,
+        )
+        axis.plot(
+            x,
+            (sample.readings[j, :, 0] - middle[j])[keep],
+            "o-",
+            color=_MEASURED,
+            ms=3,
+            lw=0.8,
+            label="measured" if first else None,
+        )
     axis.axhline(0.0, color="0.5", lw=0.6)
     axis.set_xticks(np.arange(len(shown)) + 0.5, [str(int(sample.protocol.number[j])) for j in shown])
     axis.set_xlim(0, len(shown))

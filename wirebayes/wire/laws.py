@@ -3,16 +3,17 @@
 Equation numbers are those of the paper the toolkit reproduces (see ``docs``).
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[Any]
 ElasticLaw = Literal["hooke", "modified"]
 History = Literal["saturating", "additive"]
 
 
-def strain(stretched_mm: NDArray, zero_tension_mm: NDArray, law: ElasticLaw = "hooke") -> NDArray:
+def strain(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> Array:
     """Strain whose product with k1 is the tension: eq (1) ``L/L0 - 1``, eq (3) ``1 - L0/L``.
 
     Negative when slack; the caller clips the tension, so that the slope stays available.
@@ -22,7 +23,9 @@ def strain(stretched_mm: NDArray, zero_tension_mm: NDArray, law: ElasticLaw = "h
     return 1.0 - zero_tension_mm / stretched_mm
 
 
-def strain_slopes(stretched_mm: NDArray, zero_tension_mm: NDArray, law: ElasticLaw = "hooke") -> tuple[NDArray, NDArray]:
+def strain_slopes(
+    stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke"
+) -> tuple[Array, Array]:
     """Derivatives of `strain` by stretched and by zero-tension length, 1/mm."""
     if law == "hooke":
         by_stretched = 1.0 / zero_tension_mm
@@ -31,12 +34,12 @@ def strain_slopes(stretched_mm: NDArray, zero_tension_mm: NDArray, law: ElasticL
     return zero_tension_mm * by_stretched * by_stretched, -by_stretched
 
 
-def creep_target(tension_N: NDArray, B: NDArray, U: NDArray) -> NDArray:
+def creep_target(tension_N: Array, B: Array, U: Array) -> Array:
     """Final creep elongation at a tension, eqs (2) and (4), mm; zero when slack."""
     taut = tension_N > 0
     return np.where(taut, B * np.power(np.where(taut, tension_N, 1.0), U), 0.0)
 
 
-def creep_fraction(time_s: NDArray, k2: NDArray, N: NDArray) -> NDArray:
+def creep_fraction(time_s: Array, k2: Array, N: Array) -> Array:
     """Share of the creep reached after a time, eq (5): ``1 - exp(-k2 t^N)``."""
     return -np.expm1(-k2 * np.power(time_s, N))

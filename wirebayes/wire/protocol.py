@@ -42,7 +42,7 @@ class Protocol:
     @property
     def recorded(self) -> NDArray[np.bool_]:
         """(H,) True for holds with readings."""
-        return self.mask.any(axis=1)
+        return np.asarray(self.mask.any(axis=1))
 
     @property
     def start_s(self) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.wire import laws
-from wirebayes.wire.effect import Effect, HoldContext
+from wirebayes.wire.effect import Effect, HoldContext, Place
 from wirebayes.wire.protocol import Protocol
 
 Theta = Mapping[str, NDArray[Any]]
@@ -179,7 +179,9 @@ class _Walk:
         readings = self._pass("reading", self._tension(position, total, hold), hold)
         return readings, grown[self.last[j]], after
 
-    def complex_step(self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]) -> Any:
+    def complex_step(
+        self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
+    ) -> Any:
         """`hold` with its derivatives by setting error and carried creep."""
         past = list(self.past)
         y_s, out_s, _ = self.hold(j, stretched + 1j * _STEP, creep, beside)
@@ -213,7 +215,9 @@ class _Walk:
         out = creep + amount * end
         return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end, beside
 
-    def _amount(self, first: NDArray[Any], carried: NDArray[Any], hold: HoldContext) -> tuple[NDArray[Any], NDArray[Any]]:
+    def _amount(
+        self, first: NDArray[Any], carried: NDArray[Any], hold: HoldContext
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
         hold.initial_tension, hold.carried = first, carried
         target = laws.creep_target(self._pass("drive", first, hold), self.B, self.U)
         amount = self._pass("amount", target - self.kept * carried, hold)
@@ -231,7 +235,7 @@ class _Walk:
             hold.warming_K = whole
         return np.where(strain.real > 0, self.k1 * strain, 0.0)
 
-    def _pass(self, place: str, value: Any, hold: HoldContext) -> Any:
+    def _pass(self, place: Place, value: Any, hold: HoldContext) -> Any:
         for effect in self.at.get(place, ()):
             value = effect.apply(value, self.own[effect.key], hold)
         return value
