@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wirebayes.robot.answer import Question
-from wirebayes.robot.claim import WorkspaceDrift
+from wirebayes.robot.claim import DISTANCE_M, TILT_RAD, WorkspaceDrift
 from wirebayes.robot.description import Robot
 from wirebayes.robot.drift import Course
 
@@ -157,4 +157,35 @@ def workspace_map(result: WorkspaceDrift, quantity: str = "distance") -> Figure:
         axes.set_aspect("equal")
     panels[0].set_ylabel("y, m")
     figure.colorbar(dots, ax=panels, label=label)
+    return figure
+
+
+def claim_bands(rows: list[dict[str, Any]]) -> Figure:
+    """Drift and tilt with 90 % bands for every line and robot, beside the paper's limits.
+
+    Parameters
+    ----------
+    rows : list of dict
+        From `wirebayes.reproduce.section_4.table`.
+    """
+    robots = list(dict.fromkeys(row["robot"] for row in rows))
+    lines = list(dict.fromkeys(row["line"] for row in rows))
+    figure = Figure(figsize=(8.4, 0.9 + 0.34 * len(lines) * len(robots)), layout="constrained")
+    panels: Any = figure.subplots(1, 2, sharey=True)
+    places = {(line, robot): -i for i, (line, robot) in enumerate((a, b) for a in lines for b in robots)}
+    quantities = (("drift", "mm", 1e3 * DISTANCE_M), ("tilt", "deg", float(np.degrees(TILT_RAD))))
+    for axes, (name, unit, limit) in zip(panels, quantities, strict=True):
+        for row in rows:
+            old = row["loaded_before_s"] > 0
+            y = places[row["line"], row["robot"]] - (0.15 if old else -0.15)
+            low, mid, high = (row[f"{name}_q{q}_{unit}"] for q in ("05", "50", "95"))
+            colour = _STILL if old else _MOVED
+            axes.plot([low, high], [y, y], color=colour, lw=2)
+            label = ("an hour under load" if old else "new wires") if row is rows[0] or row is rows[1] else None
+            axes.plot(mid, y, "o", color=colour, ms=4, label=label)
+        axes.axvline(limit, color="black", lw=0.8, ls="--")
+        axes.set_xscale("log")
+        axes.set_xlabel(f"{name} after 60 s, {'degrees' if unit == 'deg' else unit}")
+    panels[0].set_yticks(list(places.values()), [f"{line}, {robot}" for line, robot in places], fontsize=8)
+    panels[0].legend(frameon=False, fontsize=8)
     return figure

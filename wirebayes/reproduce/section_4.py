@@ -1,11 +1,67 @@
-"""Section 4 of the paper, the robot: the one place where reproduce and the robot meet."""
+"""Section 4 of the paper, the robot: the one place where the reproduced fits and the robot meet.
 
-from pathlib import Path
+The paper gives no coordinates of its robot, so its claim is asked of two representative ones, over their workspace.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wirebayes.bayes.fit import seed_of
+from wirebayes.bayes.result import Stored
+from wirebayes.report.blocks import number
+from wirebayes.report.paper_figures import drifts
+from wirebayes.reproduce.pictures import Gallery
+from wirebayes.robot import claim, draws, schema
+from wirebayes.robot.draws import WireDraws
+
+Row = dict[str, Any]
+ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as the paper's; the second is redundant
+# spread from specimen to specimen, and for how long the wires had hung under the same load before
+CASES = ((0.0, 0.0), (0.05, 0.0), (0.05, 3600.0))
+_DRAWS, _GRID = 100, (3, 3, 2)
 
 
-def write(directory: Path, seed: int) -> None:
-    """Add what the paper says of the robot's drift to a folder of reproduced fits.
+def rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
+    """Drift and tilt of a vertical platform after a minute, over posterior and workspace, for each wire and robot.
 
-    Called when all fits are stored and before the page is written. Tables go beside the others, pictures into the
-    index of ``figures`` under the section ``robot``.
+    Parameters
+    ----------
+    chains : mapping of wire name to Stored
+    seed : int
     """
+    out = []
+    for wire, stored in chains.items():
+        line = as_line(stored)
+        for name in ROBOTS:
+            robot = schema.read(name)
+            for spread, loaded_s in CASES:
+                rng = np.random.default_rng(seed_of(seed, "robot", wire, name, f"{spread} {loaded_s}"))
+                wires = draws.for_robot(robot, line, spread, rng)
+                found = claim.over_workspace(robot, wires, claim.grid(robot, _GRID), loaded_s=loaded_s)
+                row: Row = {"experiment": wire, "robot": name, "specimen_spread": spread, "loaded_before_s": loaded_s}
+                for key, values in (("drift_mm", 1e3 * found.distance_m), ("tilt_deg", np.degrees(found.tilt_rad))):
+                    quantiles = np.nanquantile(values, [0.05, 0.5, 0.95])
+                    row |= {f"{q}_{key}": v for q, v in zip(("q05", "q50", "q95"), quantiles, strict=True)}
+                out.append(row | {"probability": float(found.holds().mean()), "solved": found.found})
+    return out
+
+
+def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
+    """One picture a robot."""
+    for name in ROBOTS:
+        mine = [row for row in told if row["robot"] == name]
+        best = max(row["probability"] for row in mine if not row["loaded_before_s"])
+        alt = f"Drift of the platform of {name} within a minute, for each wire, new and after an hour under load."
+        caption = f"Highest probability that the claim holds on new wires: {number(best, 2)}."
+        gallery.add("robot", name, drifts(mine, limit_mm, f"Robot {name}"), alt, caption)
+
+
+def as_line(stored: Stored) -> WireDraws:
+    """Posterior draws of a wire, some of them, as the robot takes them."""
+    pick = np.linspace(0, len(stored.theta) - 1, _DRAWS).round().astype(int)
+    model = stored.sample.model
+    parameters = {name: stored.draws[name][pick] for name in draws.CORE}
+    length = stored.sample.protocol.length_mm
+    return WireDraws(parameters, length, model.law, model.history, tension_ref_N=model.tension_ref_N)

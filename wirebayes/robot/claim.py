@@ -103,3 +103,22 @@ def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
     rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
                    highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip
     return replace(robot, mass_kg=mass_kg, rule=rule, **{name: getattr(robot, name) * factor for name in lengths})
+
+
+def summary(robot: Robot, wires: Wires, position_m: Floats, loaded_s: float = 0.0) -> dict[str, float]:
+    """The claim in numbers: quantiles over workspace and draws, and how probable it is, somewhere and everywhere."""
+    out = over_workspace(robot, wires, position_m, loaded_s=loaded_s)
+    inside = (out.distance_m < DISTANCE_M) & (out.tilt_rad < TILT_RAD)
+    quantiles = {
+        f"{name}_q{q:02d}_{unit}": float(np.quantile(value, q / 100))
+        for name, unit, value in (("drift", "mm", 1e3 * out.distance_m), ("tilt", "deg", np.degrees(out.tilt_rad)))
+        for q in (5, 50, 95)
+    }
+    return quantiles | {
+        "probability": float(inside.mean()),
+        "probability_everywhere": float(inside.all(0).mean()),
+        "lowest_tension_N": float(out.tension_N.min()),
+        "highest_tension_N": float(out.tension_N.max()),
+        "feasible": out.feasible,
+        "solved": out.found,
+    }
