@@ -73,6 +73,38 @@ def last_hold(
     return figure
 
 
+def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Figure:
+    """How far a platform moves within a minute, on each wire, new and loaded before.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of `wirebayes.reproduce.section_4.rows`, one robot's.
+    limit_mm : float
+        What the paper claims.
+    """
+    figure, axes = panel("drift within a minute, mm", "", title)
+    names = list(dict.fromkeys(row["experiment"] for row in rows))
+    shown = [row for row in rows if row["specimen_spread"] > 0]
+    for row in shown:
+        loaded = row["loaded_before_s"] > 0
+        y = len(names) - names.index(row["experiment"]) + (-0.14 if loaded else 0.14)
+        colour = CHAIN if loaded else HOLD
+        axes.plot([row["q05_drift_mm"], row["q95_drift_mm"]], [y, y], lw=3.2, color=colour, solid_capstyle="butt")
+        axes.plot([row["q50_drift_mm"]], [y], "o", ms=5, color=colour)
+    axes.plot([], [], color=HOLD, lw=3.2, label="new wires")
+    hours = sorted({row["loaded_before_s"] / 3600.0 for row in shown if row["loaded_before_s"] > 0})
+    for time_h in hours:
+        axes.plot([], [], color=CHAIN, lw=3.2, label=f"after {time_h:g} h under load")
+    axes.axvline(limit_mm, color=INK, lw=1, ls="--", label=f"the paper: less than {limit_mm:g} mm")
+    logarithmic(axes)
+    axes.set_yticks(range(len(names), 0, -1), names)
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(0.4, len(names) + 0.6)
+    legend_below(figure, axes)
+    return figure
+
+
 def prior_predictive(protocol: Protocol, drawn_N: Array, tension_N: Array, title: str) -> Figure:
     """What a person expects before the test: tension when each hold begins, and how the first hold goes on.
 

@@ -79,6 +79,19 @@ def creep(rows: Rows, caption: str) -> Table:
     return Table(header, lines, caption)
 
 
+def robot(rows: Rows) -> Table:
+    """The paper's claim on the drift of a robot."""
+    header = ["wire", "robot", "specimens differ by", "under load before", "drift, mm", "90 %", "tilt, degrees", "90 %"]
+    lines = []
+    for r in rows:
+        loaded = f"{r['loaded_before_s'] / 3600:g} h" if r["loaded_before_s"] else "never"
+        line = [r["experiment"], r["robot"], f"{100 * r['specimen_spread']:g} %", loaded]
+        for key in ("drift_mm", "tilt_deg"):
+            line += [number(r[f"q50_{key}"], 2), span(r[f"q05_{key}"], r[f"q95_{key}"], 2)]
+        lines.append([*line, f"{r['probability']:.2f}"])
+    return Table([*header, "claim holds with probability"], lines)
+
+
 def sampling(rows: Rows) -> Table:
     """How the sampler did."""
     header = ["sample", "reading of the model", "trained on", "converged", "autocorrelation time, steps"]

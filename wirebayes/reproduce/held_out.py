@@ -71,9 +71,7 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
     return HeldOut(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
 
 
-def last_hold_course(
-    stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator
-) -> Array:
+def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator) -> Array:
     """(len(time_s), n) predicted readings of the last hold given its first reading, hold by hold."""
     protocol, first = _last_alone(experiment, time_s)
     question = Question(protocol, 0, np.array([True]), first)

@@ -68,7 +68,6 @@ def reproduce(
         jobs = fits(experiments, training)
         run_jobs(jobs, directory, seed, policy=policy, report=report)
         _tables_and_pictures(directory, experiments, published, training, seed, report)
-        section_4.write(directory, seed)
         write_page(directory)
         run.finish()
     return _not_converged(directory, fits(experiments, training))
@@ -114,6 +113,7 @@ def _tables_and_pictures(
     creep: list[Row] = []
     forecasts: list[Row] = []
     sampling: list[Row] = []
+    chains: dict[str, Stored] = {}
     drawn = pictures.Gallery(directory)
     for e in experiments:
         full: dict[str, Stored] = {}
@@ -131,12 +131,16 @@ def _tables_and_pictures(
             forecasts.append(_forecast_row(e.name, likelihood, seen[likelihood]))
             for suffix in ("", f"-first-{training}"):
                 sampling.append(_sampling_row(directory, e.name, likelihood, suffix))
+        chains[e.name] = full["chain"]
         mine = [row for row in posterior if row["experiment"] == e.name]
         _draw(drawn, e, table_4[e.name], full, first, seen, mine, seed)
     for name, rows in (("posterior", posterior), ("creep", creep), ("held_out", forecasts), ("sampling", sampling)):
         write_table(directory, name, rows)
     write_table(directory, "measured", [_measured_row(e) for e in experiments])
     report("tables and pictures", 2, 3)
+    robot = section_4.rows(chains, seed)
+    write_table(directory, "robot", robot)
+    section_4.draw(drawn, robot, published["pose_claim"]["centre_moves_less_than_mm"])
     drawn.finish()
     report("tables and pictures", 3, 3)
 

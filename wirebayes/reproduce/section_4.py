@@ -10,7 +10,6 @@ import numpy as np
 
 from wirebayes.bayes.fit import seed_of
 from wirebayes.bayes.result import Stored
-from wirebayes.report.blocks import number
 from wirebayes.report.paper_figures import drifts
 from wirebayes.reproduce.pictures import Gallery
 from wirebayes.robot import claim, draws, schema
@@ -54,7 +53,7 @@ def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
         mine = [row for row in told if row["robot"] == name]
         best = max(row["probability"] for row in mine if not row["loaded_before_s"])
         alt = f"Drift of the platform of {name} within a minute, for each wire, new and after an hour under load."
-        caption = f"Highest probability that the claim holds on new wires: {number(best, 2)}."
+        caption = f"Highest probability that the claim holds on new wires: {best:.2f}."
         gallery.add("robot", name, drifts(mine, limit_mm, f"Robot {name}"), alt, caption)
 
 
