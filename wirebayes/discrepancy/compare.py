@@ -4,7 +4,7 @@ import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -86,7 +86,8 @@ def _scores(task: Task, seed: int, policy: Policy) -> dict[str, Any]:
         return fit(problem_of(candidate, training, effects_of(candidate, training, known, seed)), own, policy=policy)
 
     full = fitted(task.train_holds or recorded)
-    left = loho(full, seed_of(seed, task.experiment.name, candidate.name, "without"))
+    again = replace(policy, ess=policy.ess / 2, most_steps=min(policy.most_steps, 400))
+    left = loho(full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again)
     early = full if task.train_holds else fitted(first)
     content: dict[str, Any] = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],

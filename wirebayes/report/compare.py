@@ -1,0 +1,98 @@
+"""Pictures of a comparison: how much better or worse each model predicts, and the held-out holds themselves."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend, panel
+
+_SEEN = 12.0  # worse by more than this many times the best-known spread is drawn at the edge
+
+
+def save(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, Any]]) -> None:
+    """Write the pictures of one experiment into its folder."""
+    save_figure(differences(name, table), folder / "differences.png")
+    held = {m["name"]: m for m in models if m["failed"] is None and m["held_out"]}
+    if table["base"] in held:
+        save_figure(held_out_errors(name, table), folder / "held-out-errors.png")
+        for way, readings in held[table["base"]]["held_out"].items():
+            if way in ("free", "given_first") and readings:
+                save_figure(bands(f"{name}: {WORDS[way]}", readings), folder / f"held-out-{way.replace('_', '-')}.png")
+                save_figure(pit(f"{name}: {WORDS[way]}", readings), folder / f"pit-{way.replace('_', '-')}.png")
+
+
+WORDS = {"free": "held-out holds, predicted freely", "given_first": "held-out holds, given their first reading"}
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a picture whose bytes do not depend on the day."""
+    figure.savefig(path, dpi=150, metadata={"Software": None})
+
+
+def differences(name: str, table: dict[str, Any]) -> Figure:
+    """Elpd difference from the base with two standard errors, one line a model."""
+    rows = [r for r in table["models"] if r["difference"] is not None and r["name"] != table["base"]]
+    figure, axes = panel(f"elpd − elpd of {table['base']}, all holds left out in turn", "", name,
+                         (5.4, 1.2 + 0.22 * len(rows)))  # fmt: skip
+    axes.axvline(0, color=QUIET, lw=1)
+    axes.axvspan(-4, 4, color=QUIET, alpha=0.25, lw=0)
+    values = np.array([r["difference"]["elpd"] for r in rows], float)
+    edge = -max(_SEEN, 3.0 * float(values.max(initial=0.0)), 40.0)
+    for place, (row, value) in enumerate(zip(rows, values, strict=True)):
+        colour = CHAIN if row["converged"] else QUIET
+        if value < edge:
+            axes.annotate(f"← {value:.0f}", (edge, place), fontsize=8, color=HOLD, va="center")
+            continue
+        axes.errorbar(value, place, xerr=2 * row["difference"]["se"], fmt="o", ms=4, lw=1, color=colour)
+    axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlim(edge * 1.05, None)
+    return figure
+
+
+def held_out_errors(name: str, table: dict[str, Any]) -> Figure:
+    """Root mean square error on the held-out holds, freely and given the first reading."""
+    rows = [r for r in table["models"] if r["failed"] is None and r["held_out"]]
+    figure, axes = panel("rms error on held-out holds, N", "", name, (5.4, 1.2 + 0.22 * len(rows)))
+    for way, colour, label in (("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")):
+        found = [(place, r["held_out"][way]["rmse_N"]) for place, r in enumerate(rows) if r["held_out"][way]]
+        axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
+    axes.invert_yaxis()
+    legend(axes, loc="best")
+    return figure
+
+
+def bands(title: str, scores: dict[str, Any]) -> Figure:
+    """Measured readings minus the predictive median, in the 50, 90 and 99 % bands."""
+    r = {k: np.asarray(v, float) for k, v in scores["readings"].items()}
+    figure, axes = panel("hold (readings in order of time within each)", "measured − predicted, N", title)
+    numbers = list(dict.fromkeys(r["hold"].astype(int).tolist()))
+    longest = max(float(r["time_s"].max()), 1e-9)
+    place = np.array([numbers.index(int(h)) for h in r["hold"]]) - 0.35 + 0.7 * r["time_s"] / longest
+    q = r["quantiles_N"]
+    for i, number in enumerate(numbers):
+        here = r["hold"] == number
+        for low, high, alpha, label in ((0, 6, 0.12, "99 %"), (1, 5, 0.16, "90 %"), (2, 4, 0.22, "50 %")):
+            axes.fill_between(place[here], (q[low] - q[3])[here], (q[high] - q[3])[here], color=CHAIN, alpha=alpha,
+                              lw=0, label=label if i == 0 else None)  # fmt: skip
+    axes.axhline(0, color=CHAIN, lw=1)
+    axes.scatter(place, r["observed_N"] - q[3], s=14, color=INK, zorder=3, label="measured − median")
+    axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
+    legend(axes, loc="best")
+    return figure
+
+
+def pit(title: str, scores: dict[str, Any]) -> Figure:
+    """Share of readings below each level of their predictive distribution, in its simultaneous 95 % band."""
+    level, low, high = np.asarray(scores["pit_band"], float)
+    values = np.asarray(scores["readings"]["pit"], float)
+    figure, axes = panel("level of the predictive distribution", "share of readings below", title)
+    axes.fill_between(level, low, high, color=CHAIN, alpha=0.2, lw=0, label="95 % band, all levels at once")
+    axes.plot([0, 1], [0, 1], color=QUIET, lw=1)
+    axes.step(level, [(values <= x).mean() for x in level], where="post", color=INK, lw=1.5, label="measured")
+    legend(axes, loc="best")
+    return figure
