@@ -9,7 +9,7 @@ U              0.16 to 1.6           linear viscoelasticity is 1; polymers under
 k2             0.0042 to 0.22 s^-N   half the creep within seconds up to hours, together with N
 N              0.31 to 1.4           1 is an exponential, below it a stretched one
 preload        -1.1 to 2.1 mm        the test begins at a small tension, at a step of about 1 mm
-sensor_sd      0.001 to 0.1 N        a load cell of 10 to 100 N range
+sensor_sd      0.0014 to 0.1 N       a load cell of 10 to 100 N range
 setting_sd     0.004 to 0.2 mm       a milling machine's screw up to a hand-set vernier
 =============  ====================  ==========================================================================
 """
