@@ -100,6 +100,7 @@ def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, An
     }
     content["forward"] = _round_trip(robot, shared, told, x, R)
     content["equilibria"] = _all_equilibria(robot, shared, told, x, rng)
+    content["certificate"] = _certificate(robot, shared, x, R)
     courses = {}
     content["drift"] = []
     for spread in SPREADS:
@@ -152,6 +153,23 @@ def _all_equilibria(
             for p, v, t in zip(found.position_m, turning.vector(found.rotation), found.tension_N, strict=True)
         ],
     }
+
+
+def _certificate(robot: Robot, wires: Wires, x: Floats, R: Floats) -> dict[str, Any]:
+    """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed."""
+    from wirebayes.robot.certificate import certify
+
+    if wires.at("strain"):
+        return {"proved": None, "sentence": "Proofs know laws (1), (3) and (6) without further effects."}
+    mean = control.known(wires)
+    k1 = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
+    tau = inverse.tensions(robot, x[None], R[None])
+    here = inverse.commands(robot, mean, x[None], R[None], tau)
+    try:
+        proof = certify(robot, wires.law, (k1, k1), (here.zero_m[0], here.zero_m[0]), here.offset_m[0], x, R)
+    except ImportError:
+        return {"proved": None, "sentence": "python-flint is not installed (extra: certificate)."}
+    return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}
 
 
 def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
