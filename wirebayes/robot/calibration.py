@@ -85,18 +85,20 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
         J[open_] = derivatives(robot, prior, session, mean, root, white[open_], _part(here, open_))[0]
         normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
         slope = np.einsum("mrd,mr->md", J, readings - here.readings) - white
+        # What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached.
+        decrement = np.einsum("md,md->m", slope, np.linalg.solve(normal, slope[..., None])[..., 0])
+        converged |= decrement < 1e-3
+        if converged.all():
+            break
         ridge = damping[:, None, None] * np.einsum("mdd->md", normal)[:, None] * np.eye(d)
         step = np.linalg.solve(normal + ridge, slope[..., None])[..., 0]
         step[converged] = 0.0
         there = predict(robot, prior, session, mean + (white + step) @ root.T, near=(here.begun_m, here.begun_rotation))
         new = _cost(there, readings, white + step)
         better = new <= cost + 1e-9 * (1 + np.where(np.isfinite(cost), cost, 0.0))
-        converged |= better & (np.abs(step).max(1) < 3e-3)
         white = np.where(better[:, None], white + step, white)
         damping = np.where(better, damping / 10, damping * 10)
         here, cost = _pick(better, there, here), np.where(better, new, cost)
-        if converged.all():
-            break
     J, G = derivatives(robot, prior, session, mean, root, white, here)
     spread = np.linalg.inv(np.swapaxes(J, 1, 2) @ J + np.eye(d))
     variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
