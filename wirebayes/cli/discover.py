@@ -62,7 +62,8 @@ def discover(
         findings = investigate(experiments, Settings(elastic_law, history, kinds), seed, report)
         jobs = _jobs(findings, elastic_law, history, own_effects)
         run(jobs, output, seed, report=report)
-    _pictures(findings, output)
+    _pictures(findings, output, own_effects)
+    _say_posterior(findings, output)
     write_json(output / "discovery.json", findings.report)
     opened.finish()
     for job in jobs:
@@ -85,9 +86,18 @@ def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type
     return out
 
 
-def _pictures(findings: "Findings", output: Path) -> None:
+def _say_posterior(findings: "Findings", output: Path) -> None:
+    """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
+    for e in findings.experiments:
+        parameters = json.loads((output / e.name / "final" / "summary.json").read_text())["parameters"]
+        for name, amplitude in findings.report["experiments"][e.name]["amplitudes"].items():
+            column = next(c for c in parameters if c.startswith(f"{name}."))
+            amplitude |= {key: parameters[column][key] for key in ("mean", "q05", "q95")}
+
+
+def _pictures(findings: "Findings", output: Path, own_effects: Path | None) -> None:
     """Before and after, hold by hold."""
     from wirebayes.report.discover import before_and_after
 
     for e in findings.experiments:
-        before_and_after(output / e.name, findings.report["experiments"][e.name], output / f"{e.name}.png")
+        before_and_after(output / e.name, findings.report["experiments"][e.name], output / f"{e.name}.png", own_effects)

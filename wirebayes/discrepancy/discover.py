@@ -153,7 +153,7 @@ def investigate(
     for i, block in enumerate(plain):
         report("held-out holds", i, len(plain))
         affected = [a for a in accepted if i in a.blocks]
-        common = _common(verdict, choice, affected, plain, i, test, where[i], alike)
+        common = _common(verdict, choice, affected, plain, final[i], i, test, where[i], alike)
         common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
         checks = _held_out(block, final[i], verdict, choice, i, rng)
         for e, check in zip(block.experiments, checks, strict=True):
@@ -184,11 +184,19 @@ def final_effects(findings: Findings, experiment: Experiment) -> tuple[Effect, .
 
 @dataclass(frozen=True)
 class _Accepted:
-    """An effect taken into the model."""
+    """An effect taken into the model.
+
+    Attributes
+    ----------
+    name : str
+    blocks : tuple of int
+    effects : dict of int to Effect
+        Its form in each block.
+    """
 
     name: str
     blocks: tuple[int, ...]
-    amplitudes: dict[int, dict[str, Any]]
+    effects: dict[int, Effect]
 
 
 def _strike_gross_errors(
@@ -271,23 +279,29 @@ def _add(
     blocks: list[Block], choice: Choice, name: str, settings: Settings, rng: np.random.Generator
 ) -> tuple[list[Block], _Accepted]:
     """The blocks refitted with a name's best form."""
-    out, amplitudes = list(blocks), {}
+    out, effects = list(blocks), {}
     for b, r in choice.amplitudes(name).items():
-        main = r.effect.amplitudes[0]
-        hold = r.effect.hold if isinstance(r.effect, EventEffect) else None
-        amplitudes[b] = {
-            "mean": r.amplitude,
-            "q05": r.amplitude - 1.645 * r.sd,
-            "q95": r.amplitude + 1.645 * r.sd,
-            "unit": main.unit,
-            "hold": hold,
-        }
+        effects[b] = r.effect
         out[b] = fitted(blocks[b].experiments, (*blocks[b].effects, r.effect), settings.law, settings.history, rng)
-    return out, _Accepted(name, tuple(amplitudes), amplitudes)
+    return out, _Accepted(name, tuple(effects), effects)
+
+
+def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
+    """Amplitude in the final model, by its normal approximation."""
+    main = effect.amplitudes[0]
+    target, best = final.target, final.modes
+    column = next(i for i, name in enumerate(target.problem.names) if name.split("[")[0] == effect.columns()[0])
+    mean = float(target.coordinates.to_natural(best.z[:1])[0, column])
+    sd = float(np.sqrt(best.covariance[0, column, column]) * target.coordinates.scale[column])
+    low, high = (float(v) for v in main.prior.support())
+    hold = effect.hold if isinstance(effect, EventEffect) else None
+    interval = {"q05": max(mean - 1.645 * sd, low), "q95": min(mean + 1.645 * sd, high)}
+    return {"mean": mean, **interval, "unit": main.unit, "hold": hold}
 
 
 def _common(
-    verdict: str, choice: Choice | None, affected: list[_Accepted], plain: list[Block], i: int, test: GlobalTest,
+    verdict: str, choice: Choice | None, affected: list[_Accepted], plain: list[Block], final: Block, i: int,
+    test: GlobalTest,
     where: list[dict[str, Any]], alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What the experiments of one block share in the report."""
@@ -306,7 +320,7 @@ def _common(
         "set": members,
         "group": (power.group_of(named, alike) if named else []) + (["unknown"] if "unknown" in members else []),
         "accepted": names,
-        "amplitudes": {a.name: a.amplitudes[i] for a in affected},
+        "amplitudes": {a.name: _amplitude(final, a.effects[i]) for a in affected},
         "probabilities": shares,
         "p_global": test.p,
         "shared_with": list(dict.fromkeys(shared)),

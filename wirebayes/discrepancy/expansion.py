@@ -343,8 +343,13 @@ def scan(x: Expansion) -> Scan:
         np.take_along_axis(np.array(amplitude), best[None], axis=0)[0],
         np.take_along_axis(np.array(norm), best[None], axis=0)[0],
         Pieces(
-            np.array(kept["shared"]), np.array(kept["rss"]), np.array(kept["along"]), np.array(kept["square"]),
-            degrees, least, x.one_sided,
+            np.array(kept["shared"]),
+            np.array(kept["rss"]),
+            np.array(kept["along"]),
+            np.array(kept["square"]),
+            degrees,
+            least,
+            x.one_sided,
         ),  # fmt: skip
     )
 

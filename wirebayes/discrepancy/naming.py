@@ -17,6 +17,7 @@ from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
 LARGEST = 40.0
+_OUTWARD = 6
 _DELTAS = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
 
 
@@ -78,17 +79,24 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
     value, ends = curve(grid, None)
-    for _ in range(2):
+    outward = refined = 0
+    while refined < 2:
         best = int(np.argmax(value))
-        left = grid[best - 1] if best else (main.neutral if one_sided else 2 * grid[0] - grid[1])
-        right = grid[best + 1] if best + 1 < len(grid) else grid[best]
-        finer = np.linspace(left, right, 8)[1:-1]
+        edge = best in (0, len(grid) - 1) and low < grid[best] < high and grid[best] != main.neutral
+        if edge and outward < _OUTWARD:
+            # The scan's unit was too small: go on outwards before looking closer.
+            finer = np.clip(main.neutral + (grid[best] - main.neutral) * np.array([1.3, 1.7, 2.3]), low, high)
+            outward += 1
+        else:
+            left = grid[best - 1] if best else (main.neutral if one_sided else 2 * grid[0] - grid[1])
+            right = grid[best + 1] if best + 1 < len(grid) else grid[best]
+            finer = np.linspace(left, right, 8)[1:-1]
+            refined += 1
         more, more_ends = curve(finer, [e[best] for e in ends])
-        order = np.argsort(np.concatenate([grid, finer]), kind="stable")
-        grid, value = np.concatenate([grid, finer])[order], np.concatenate([value, more])[order]
-        ends = [np.concatenate([e, m])[order] for e, m in zip(ends, more_ends, strict=True)]
-        keep = np.concatenate([[True], np.diff(grid) > 0])
-        grid, value, ends = grid[keep], value[keep], [e[keep] for e in ends]
+        grid, value = np.concatenate([grid, finer]), np.concatenate([value, more])
+        ends = [np.concatenate([e, m]) for e, m in zip(ends, more_ends, strict=True)]
+        grid, order = np.unique(grid, return_index=True)
+        value, ends = value[order], [e[order] for e in ends]
     best = int(np.argmax(value))
     sd = _width(grid, value, best, per_delta)
     span = LARGEST if one_sided else 2.0 * LARGEST

@@ -96,6 +96,8 @@ def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
         if variant not in ("k1", "B", "U", "N"):
             raise InputError(f"effect {key}: name the parameter as in {name}@k1 (one of k1, B, U, N)")
         return kind(which=variant)
+    if kind is creep.SteadyCreep and variant == "carried":
+        return creep.SteadyCreepCarried()
     if variant:
         raise InputError(f"effect {key}: {name} takes no '@'")
     return kind()

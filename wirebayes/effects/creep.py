@@ -1,5 +1,6 @@
 """Effects on the creep within and between holds."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy import stats
 
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.laws import creep_fraction
+from wirebayes.wire.protocol import Protocol
 
 Own = dict[str, NDArray[Any]]
 
@@ -74,6 +76,21 @@ class SteadyCreep(Effect):
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         return value + own["a"] * hold.initial_tension * hold.time_s
+
+    @classmethod
+    def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
+        return [SteadyCreep(), SteadyCreepCarried()]
+
+
+class SteadyCreepCarried(SteadyCreep):
+    """The same flow as a part of the carried creep: what has flowed counts towards the next hold's total."""
+
+    place = "creep"
+    shows = "tail of the hold; given back on unloading"
+
+    @property
+    def key(self) -> str:
+        return f"{self.name}@carried"
 
 
 class TensionDependentRate(Effect):

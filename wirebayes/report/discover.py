@@ -18,7 +18,7 @@ Array = NDArray[Any]
 _MEASURED, _BAND, _HELD = "#1b1b1b", "#4c78a8", "#f2e6d0"
 
 
-def before_and_after(folder: Path, verdict: dict[str, Any], target: Path) -> None:
+def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_effects: Path | None = None) -> None:
     """Draw measured minus predicted tension for a folder's ``plain`` and ``final`` posteriors.
 
     Parameters
@@ -29,12 +29,14 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path) -> Non
         The experiment's part of ``discovery.json``.
     target : Path
         The picture to write.
+    own_effects : Path, optional
+        The user's Python file of effects.
     """
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
     added = " + ".join(verdict["accepted"]) or {"unknown": "something unknown"}.get(verdict["verdict"], "nothing")
     titles = {"plain": "plain model", "final": f"with {added}"}
     for axis, model in zip(axes, titles, strict=True):
-        _residuals(axis, folder / model, verdict["held_out"]["holds"])
+        _residuals(axis, result.load(folder / model, own_effects=own_effects), verdict["held_out"]["holds"])
         axis.set_title(f"{folder.name}: {titles[model]}", loc="left", fontsize=10)
         axis.set_ylabel("measured − predicted (N)")
     axes[1].set_xlabel("hold number; within each hold, time runs to the right")
@@ -43,8 +45,7 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path) -> Non
     plt.close(figure)
 
 
-def _residuals(axis: Axes, folder: Path, held: list[int]) -> None:
-    stored = result.load(folder)
+def _residuals(axis: Axes, stored: result.Stored, held: list[int]) -> None:
     sample = stored.sample
     rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
     own = {name: values[rows] for name, values in stored.draws.items()}
