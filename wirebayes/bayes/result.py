@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wirebayes import __version__
 from wirebayes.bayes.fit import Fit
+from wirebayes.bayes.identifiability import identifiability, told
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample
 from wirebayes.bayes.replicate import readings as replicate
@@ -365,6 +366,7 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
         "convergence": chains.why,
         "parameters": parameters,
         "derived": {"tension_N": tension, **quantities},
+        "identifiability": told(identifiability(fit)),
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,
         "autocorrelation_steps": float(chains.autocorrelation_steps.max()),
