@@ -82,15 +82,22 @@ class SteadyCreep(Effect):
         return [SteadyCreep(), SteadyCreepCarried()]
 
 
-class SteadyCreepCarried(SteadyCreep):
+class SteadyCreepCarried(Effect):
     """The same flow as a part of the carried creep: what has flowed counts towards the next hold's total."""
 
+    name = "steady_creep"
     place = "creep"
+    scope = "material"
+    amplitudes = SteadyCreep.amplitudes
+    sentence = "The wire also flows steadily under tension; unloaded, it takes the flow back."
     shows = "tail of the hold; given back on unloading"
 
     @property
     def key(self) -> str:
         return f"{self.name}@carried"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["a"] * hold.initial_tension * hold.time_s
 
 
 class TensionDependentRate(Effect):
