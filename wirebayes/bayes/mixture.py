@@ -80,7 +80,7 @@ def _em(x: Array, k: int, rng: np.random.Generator, iterations: int = 60) -> tup
     covariance = np.cov(x.T).reshape(d, d)
     ridge = 1e-9 * np.diag(np.diag(covariance))
     root = np.linalg.cholesky(covariance + ridge)
-    centres = x[_spread(np.linalg.solve(root, x.T).T, k, rng)]
+    centres = x[spread_rows(np.linalg.solve(root, x.T).T, k, rng)]
     mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(root[None], k, axis=0))
     last = -np.inf
     for _ in range(iterations):
@@ -107,7 +107,7 @@ def _em(x: Array, k: int, rng: np.random.Generator, iterations: int = 60) -> tup
     return mixture, log_likelihood
 
 
-def _spread(x: Array, k: int, rng: np.random.Generator) -> list[int]:
+def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
     """Rows far from one another, for a start (k-means++)."""
     chosen = [int(rng.integers(len(x)))]
     nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)

@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.mixture import spread_rows
 
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
+_POPULATION = 800
+_MOVES = 2
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 
@@ -135,13 +138,18 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
 def modes(
     target: Target, rng: np.random.Generator, *, draws: int = 2000, starts: int = 24, extra: Array | None = None
 ) -> Optimum:
-    """The distinct modes of a posterior, best first: the best of many prior draws, each climbed.
+    """The distinct modes of a posterior, best first: good ones among many prior draws, each climbed.
 
-    `extra` are further starts ``(m, d)`` in sampled coordinates.
+    Half of the starts are the best draws, which may all lie about one mode; the others come from a population of draws
+    that was cooled to the posterior and so holds every mode that had weight on the way. `extra` are further starts
+    ``(m, d)`` in sampled coordinates.
     """
     z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
     value = target(z)
-    best = z[np.argsort(-value)[:starts]]
+    best = z[np.argsort(-value)[: starts // 2]]
+    cooled = _cooled(target, z[:_POPULATION], value[:_POPULATION], rng)
+    spread = spread_rows(cooled / np.maximum(cooled.std(axis=0), 1e-300), starts - len(best), rng)
+    best = np.vstack([best, cooled[spread]])
     start = best if extra is None else np.vstack([extra, best])
     found = climb(lambda points, rows: target(points), start)
     order = np.argsort(-found.log_density)
@@ -153,6 +161,46 @@ def modes(
         if all(distance > 4.0 for distance in apart):
             keep.append(int(i))
     return Optimum(found.z[keep], found.log_density[keep], found.curvature[keep], found.converged[keep])
+
+
+def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> Array:
+    """(m, d) rows from the density to a power that grows from 0 to 1: an annealed start, near enough to find modes.
+
+    Each step of the power halves the effective number of rows and moves them by differential evolution.
+    """
+    m, d = z.shape
+    value = np.where(np.isfinite(value), value, -1e300)
+    power = 0.0
+    while power < 1.0:
+        step = _next_step(value, 1.0 - power)
+        power += step
+        weight = np.exp(step * (value - value.max()))
+        kept = rng.choice(m, m, p=weight / weight.sum())
+        z, value = z[kept], value[kept]
+        for _ in range(_MOVES):
+            one, other = rng.integers(m, size=(2, m))
+            moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)
+            tried = target(moved)
+            taken = np.log(rng.uniform(size=m)) < power * (tried - value)
+            z = np.where(taken[:, None], moved, z)
+            value = np.where(taken, tried, value)
+    return z
+
+
+def _next_step(value: Array, most: float) -> float:
+    """The largest step of the power that leaves half of the rows effective."""
+
+    def effective(step: float) -> float:
+        weight = np.exp(step * (value - value.max()))
+        return float(weight.sum() ** 2 / (weight**2).sum())
+
+    if effective(most) >= 0.5 * len(value):
+        return most
+    low, high = -40.0, float(np.log(most))
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if effective(np.exp(middle)) > 0.5 * len(value) else (low, middle)
+    return float(np.exp(low))
 
 
 def rowwise(target: Target, readings: Sequence[Array]) -> Density:

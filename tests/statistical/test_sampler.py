@@ -1,0 +1,173 @@
+"""The sampler on analytic targets: first and second moments over independent runs, and broken ones that must fail."""
+
+import numpy as np
+import pytest
+
+from tests.statistical.targets import TARGETS, Analytic, gaussian
+from wirebayes.bayes import ensemble, moves
+from wirebayes.bayes.ensemble import Policy, sample
+from wirebayes.bayes.optimum import Optimum
+
+pytestmark = pytest.mark.statistical
+SMALL = Policy(ensembles=4, walkers=48, ess=300.0, rounds=3, round_steps=12, most_rounds=4, block=24, most_steps=240)
+RUNS = 24
+# |t| of this size in any of 16 moments happens by chance once in three hundred tests (23 degrees of freedom)
+LIMIT = 4.5
+
+
+def worst(target_of, policy=SMALL, runs=RUNS):
+    """Largest |t| over the first and second moments of all coordinates, from the spread of independent runs; and the
+    ratio of that spread to what the reported effective sample sizes promise."""
+    estimates, promised = [], []
+    for seed in range(runs):
+        target = target_of()
+        chains = sample(target, 1000 + seed, policy)
+        z = chains.z.reshape(-1, chains.z.shape[-1])
+        estimates.append(np.concatenate([z.mean(axis=0), (z**2).mean(axis=0)]))
+        promised.append(z.var(axis=0) / chains.ess)
+    estimates, truth = np.array(estimates), np.concatenate([target.mean, target.second])
+    spread = estimates.std(axis=0, ddof=1)
+    t = np.abs(estimates.mean(axis=0) - truth) / (spread / np.sqrt(runs))
+    half = len(target.mean)
+    return t.max(), np.sqrt((spread[:half] ** 2).mean() / np.mean(promised))
+
+
+@pytest.mark.parametrize("name", ["gaussian", "two_modes"])
+def test_moments_are_right_within_monte_carlo_error(name):
+    t, ratio = worst(TARGETS[name])
+    assert t < LIMIT
+    assert 0.6 < ratio < 1.7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TARGETS)
+def test_moments_are_right_over_many_runs_with_the_policy_s_own_walkers(name):
+    policy = Policy(walkers=128, ess=4000.0, block=40, most_steps=800)
+    t, ratio = worst(TARGETS[name], policy, runs=60)
+    print(f"{name}: largest |t| {t:.2f}, spread over promised {ratio:.2f}")
+    assert t < LIMIT
+    assert 0.6 < ratio < 1.5
+
+
+class _ForgetsTheProposal(moves.IndependenceMove):
+    """Metropolis without Hastings: takes the proposal for symmetric."""
+
+    def _propose(self, x, random):
+        y, factor = super()._propose(x, random)
+        return y, 0.0 * factor
+
+
+def test_a_sampler_that_forgets_the_proposal_s_density_fails(monkeypatch):
+    monkeypatch.setattr(ensemble, "IndependenceMove", _ForgetsTheProposal)
+    t, _ = worst(gaussian)
+    assert t > LIMIT
+
+
+def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
+    """Walkers set back to good places during the kept steps, which only burn-in may do, shrink the second moments."""
+
+    def wrong(target, state, policy, kept=ensemble._kept_block):
+        for positions in state.positions:
+            value = target(positions)
+            positions[value < np.median(value)] = positions[value >= np.median(value)][0]
+        kept(target, state, policy)
+
+    monkeypatch.setattr(ensemble, "_kept_block", wrong)
+    t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "block": 2, "most_steps": 24}))
+    assert t > LIMIT
+
+
+def first_order(rho, shape, rng):
+    x = np.empty(shape)
+    x[:, 0] = rng.normal(size=x[:, 0].shape)
+    for i in range(1, shape[1]):
+        x[:, i] = rho * x[:, i - 1] + np.sqrt(1 - rho**2) * rng.normal(size=x[:, i].shape)
+    return x
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, 0.9, 0.97])
+def test_the_autocorrelation_time_of_a_first_order_process(rho):
+    x = first_order(rho, (4, 4000, 32, 2), np.random.default_rng(1))
+    assert ensemble.autocorrelation_steps(x) == pytest.approx((1 + rho) / (1 - rho), rel=0.1)
+
+
+def test_walkers_that_stay_apart_are_seen_by_both_diagnostics():
+    rng = np.random.default_rng(2)
+    x = first_order(0.5, (4, 400, 32, 1), rng)
+    assert ensemble.nested_r_hat(x)[0] < 1.005
+    time = ensemble.autocorrelation_steps(x)[0]
+    alone = x.copy()
+    alone[:, :, :2] += 6.0  # two walkers of every ensemble in a place of their own
+    assert ensemble.autocorrelation_steps(alone)[0] > 10 * time
+    x[0] += 0.5  # one whole ensemble elsewhere
+    assert ensemble.nested_r_hat(x)[0] > 1.02
+
+
+def test_walkers_stuck_in_a_far_mode_of_no_weight_are_set_back():
+    """A second mode e^-30 as high: walkers that start there are set back before draws are kept."""
+    shift = 20.0 * np.eye(8)[0]
+
+    def density(z):
+        return np.logaddexp(-0.5 * (z**2).sum(axis=1), -0.5 * ((z - shift) ** 2).sum(axis=1) - 30.0)
+
+    found = Optimum(np.array([0.0 * shift, shift]), np.array([0.0, -30.0]), np.array([np.eye(8)] * 2), np.ones(2, bool))
+    # a single round of two steps: too few for the learned move to bring them back by itself
+    hasty = Policy(**{**SMALL.__dict__, "rounds": 1, "round_steps": 2, "most_rounds": 1})
+    chains = sample(Analytic(density, np.zeros(8), np.ones(8)), 3, hasty, found=found)
+    assert chains.stuck > 0
+    assert np.abs(chains.z[..., 0]).max() < 10.0
+
+
+def ridge(z):
+    """A shell: no mixture of a few ellipsoids resembles it."""
+    radius = np.sqrt((z**2).sum(axis=1))
+    return -0.5 * ((radius - 20.0) / 0.05) ** 2
+
+
+def test_a_poor_learned_move_gives_way_to_differential_evolution_and_a_hopeless_chain_is_called_so():
+    target = Analytic(ridge, np.zeros(8), np.ones(8))
+    policy = Policy(**{**SMALL.__dict__, "most_steps": 72, "acceptance": 0.2})
+    chains = sample(target, 1, policy)
+    assert not chains.learned
+    assert not chains.converged
+    assert chains.why.startswith("not converged after 72 steps: x")
+    assert "wanted 300" in chains.why
+
+
+def test_no_answer_depends_on_what_ran_before():
+    first = sample(gaussian(), 5, SMALL)
+    sample(TARGETS["banana"](), 6, SMALL)
+    np.random.seed(99)  # noqa: NPY002 - a stranger's use of the global generator
+    again = sample(gaussian(), 5, SMALL)
+    assert first.z.tobytes() == again.z.tobytes()
+    assert sample(gaussian(), 7, SMALL).z.tobytes() != first.z.tobytes()
+
+
+class Killed(Exception):
+    pass
+
+
+@pytest.mark.parametrize("blow", [1, 3, 5, 7])
+def test_a_killed_run_goes_on_to_the_same_bytes(blow, tmp_path, monkeypatch):
+    policy = Policy(**{**SMALL.__dict__, "ess": 12000.0})
+    whole = sample(gaussian(), 11, policy)
+    path = tmp_path / "checkpoint"
+    calls = 0
+
+    def mortal(*arguments, advance=ensemble._advance):
+        nonlocal calls
+        calls += 1
+        if calls == 4 * blow + 2:  # in the middle of a round or a block, some ensembles done and others not
+            raise Killed
+        return advance(*arguments)
+
+    monkeypatch.setattr(ensemble, "_advance", mortal)
+    with pytest.raises(Killed):
+        sample(gaussian(), 11, policy, checkpoint=path)
+    monkeypatch.undo()
+    resumed = sample(gaussian(), 11, policy, checkpoint=path)
+    for name in ("z", "log_density", "ess", "r_hat"):
+        assert getattr(resumed, name).tobytes() == getattr(whole, name).tobytes()
+    assert (resumed.evaluations, resumed.why) == (whole.evaluations, whole.why)
+    finished = sample(gaussian(), 11, policy, checkpoint=path)
+    assert finished.z.tobytes() == whole.z.tobytes()
