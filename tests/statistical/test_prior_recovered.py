@@ -1,0 +1,57 @@
+"""A likelihood that says nothing returns the prior, for every parameter, through the whole sampler."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.bayes.coordinates import Coordinates
+from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.fit import fit
+from wirebayes.bayes.problem import Problem, build
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.simulate import Bench, Truth, draw
+
+pytestmark = pytest.mark.statistical
+POLICY = Policy(walkers=128, ess=2000.0)
+
+
+class Silent(Problem):
+    """No reading says anything."""
+
+    def log_likelihood(self, theta, readings=None):
+        return np.zeros(len(theta))
+
+
+def silent(effects=(), likelihood="chain"):
+    made = draw([Bench()], Truth({"k1": 900.0}, effects), seed=3).problem
+    rebuilt = build([Bench().experiment()], effects, likelihood=likelihood)
+    return Silent(made.samples, rebuilt.prior, likelihood)
+
+
+def assert_prior(problem, seed):
+    done = fit(problem, seed, policy=POLICY)
+    assert done.chains.converged
+    last = done.problem.prior
+    draws = done.chains
+    z = draws.z[:, -1].reshape(-1, draws.z.shape[-1])  # as good as independent: the last of every walker
+    theta = Coordinates(problem).to_natural(z)
+    for i, (name, distribution) in enumerate(last.distributions.items()):
+        # a level that all parameters together miss once in a thousand
+        assert stats.kstest(theta[:, i], distribution.cdf).pvalue > 1e-4, name
+        ess = done.chains.ess[i]
+        share = distribution.cdf(done.flat[:, i])
+        assert share.mean() == pytest.approx(0.5, abs=4.5 * np.sqrt(1 / 12 / ess)), name
+        assert share.std() == pytest.approx(np.sqrt(1 / 12), rel=4.5 * 0.6 / np.sqrt(ess)), name
+
+
+@pytest.mark.parametrize("likelihood", ["chain", "hold"])
+def test_the_plain_model_s_prior_comes_back(likelihood):
+    assert_prior(silent(likelihood=likelihood), 1)
+
+
+@pytest.mark.slow
+def test_the_prior_of_every_amplitude_comes_back():
+    keys = [f"{name}@5" if name in ("grip_slip", "unrecorded_hold") else name for name in CATALOGUE]
+    keys = [f"{name}@k1" if name == "length_dependence" else name for name in keys]
+    for first in range(0, len(keys), 5):
+        assert_prior(silent(tuple(named(key) for key in keys[first : first + 5])), 2)
