@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
 Array = NDArray[Any]
-DEGREES = 6.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
+DEGREES = 10.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,9 @@ def wider(mixture: Mixture, factor: float) -> Mixture:
     return Mixture(mixture.weights, mixture.centres, mixture.factors * factor)
 
 
-def fit(x: Array, rng: np.random.Generator, *, most: int = 4) -> Mixture:
+def fit(x: Array, rng: np.random.Generator, *, most: int = 6) -> Mixture:
     """The mixture with the best Bayesian information criterion among 1 to `most` components, for points (n, d)."""
+    x = x[:: 1 + len(x) // _ENOUGH]
     n, d = x.shape
     best, score = None, np.inf
     for k in range(1, most + 1):
@@ -101,17 +102,17 @@ def _em(x: Array, k: int, rng: np.random.Generator, iterations: int = 60) -> tup
             factors.append(np.linalg.cholesky(scale + ridge))
         mixture = Mixture(share.sum(axis=1) / n, new_centres, np.array(factors))
         log_likelihood = float(total.sum())
-        if log_likelihood - last < 1e-5 * n:
+        if log_likelihood - last < 1e-4 * n:
             break
         last = log_likelihood
     return mixture, log_likelihood
 
 
 def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
-    """Rows far from one another, for a start (k-means++)."""
+    """Rows far from one another, for a start (k-means++); fewer than `k` where there are not so many different ones."""
     chosen = [int(rng.integers(len(x)))]
     nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)
-    while len(chosen) < k:
+    while len(chosen) < k and nearest.any():
         chosen.append(int(rng.choice(len(x), p=nearest / nearest.sum())))
         nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
     return chosen

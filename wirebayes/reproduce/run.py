@@ -27,8 +27,7 @@ from wirebayes.reproduce.held_out import HeldOut, held_out
 Array = NDArray[Any]
 Row = dict[str, Any]
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
-# Five holds leave a longer ridge than twelve: more burn-in rounds than usual pay for themselves many times.
-POLICY = Policy(rounds=8)
+POLICY = Policy()
 _PRIOR_DRAWS = 20_000
 
 
