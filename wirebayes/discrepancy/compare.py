@@ -115,12 +115,13 @@ def _held_out(result: HeldOut) -> dict[str, Any]:
     return {
         "trained_on": result.trained,
         "holds": np.unique(result.given.hold),
-        "free": None if result.free is None else _told(result.free),
-        "given_first": _told(result.given),
+        "free": None if result.free is None else told(result.free),
+        "given_first": told(result.given),
     }
 
 
-def _told(scores: Scores) -> dict[str, Any]:
+def told(scores: Scores) -> dict[str, Any]:
+    """Scores as plain values, with what the pictures need."""
     return {
         "rmse_N": scores.rmse_N, "elpd": float(scores.elpd.sum()), "per_hold": scores.elpd,
         "elpd_together": scores.elpd_together,
