@@ -176,3 +176,15 @@ def test_what_is_carried_is_the_posterior_of_the_creep():
     found = filtered(LOADING, theta, y)
     assert found.carried_mean[-1, 0] == pytest.approx(mean, rel=1e-8)
     assert found.carried_var[-1, 0] == pytest.approx(variance, rel=1e-6)
+
+
+def test_absurd_parameters_are_not_likely():
+    """A stiffness and a setting error beyond all reason make products that cancel; what is left must not be praise."""
+    y = measured(LOADING, PLAIN | ERRORS)
+    sensible = filtered(LOADING, PLAIN | ERRORS, y).log_likelihood.sum()
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        theta = {name: value * np.exp(20.0 * rng.normal()) for name, value in (PLAIN | ERRORS).items()}
+        with np.errstate(all="ignore"):
+            found = filtered(LOADING, theta, y).log_likelihood.sum()
+        assert not found > sensible

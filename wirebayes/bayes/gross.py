@@ -115,12 +115,13 @@ def chain(
         by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
         r = readings[j][keep] - line.tension[j][keep] - by_c * m
         log_weight, cc, cs, ss, cr, sr, rr = _sums(by_c, by_s, r, share, variance, wide)
-        det = 1.0 + p * cc + setting_var * ss + p * setting_var * (cc * ss - cs * cs)
+        det = 1.0 + p * cc + setting_var * ss + p * setting_var * np.maximum(cc * ss - cs * cs, 0.0)
         v_cc = p * (1.0 + setting_var * ss) / det
         v_ss = setting_var * (1.0 + p * cc) / det
         v_cs = -p * setting_var * cs / det
         post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
-        each = log_weight - 0.5 * (rr - cr * post_c - sr * post_s + np.log(det))
+        # squares are never negative, however rounding treats their difference
+        each = log_weight - 0.5 * (np.maximum(rr - cr * post_c - sr * post_s, 0.0) + np.log(det))
         out[j] = logsumexp(each, axis=0)
         weight = np.exp(each - out[j])
         carried = a * (m + post_c) + c * post_s
@@ -167,9 +168,9 @@ def suspects(problem: GrossProblem, theta: Array) -> list[Array]:
             r = sample.readings[j][keep] - line.tension[j][keep] - by_c * filtered.carried_mean[j]
             log_weight, cc, cs, ss, cr, sr, rr = _sums(by_c, by_s, r, share, variance, wide)
             p, q = filtered.carried_var[j], setting_sd**2
-            det = 1.0 + p * cc + q * ss + p * q * (cc * ss - cs * cs)
+            det = 1.0 + p * cc + q * ss + p * q * np.maximum(cc * ss - cs * cs, 0.0)
             gain = (p * (1.0 + q * ss) * cr**2 - 2.0 * p * q * cs * cr * sr + q * (1.0 + p * cc) * sr**2) / det
-            each = log_weight - 0.5 * (rr - gain + np.log(det))
+            each = log_weight - 0.5 * (np.maximum(rr - gain, 0.0) + np.log(det))
             weight = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
             probability[j, keep] = weight @ patterns(int(keep.sum()))
         out.append(probability)

@@ -76,13 +76,18 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
         ss = np.einsum("rn,rn->n", by_s, by_s) * weight
         cr = np.einsum("rn,rn->n", by_c, r) * weight
         sr = np.einsum("rn,rn->n", by_s, r) * weight
-        det = 1.0 + p * cc + setting_var * ss + p * setting_var * (cc * ss - cs * cs)
+        # the difference of two products may come out below zero by rounding
+        det = 1.0 + p * cc + setting_var * ss + p * setting_var * np.maximum(cc * ss - cs * cs, 0.0)
         # Posterior covariance of (carried creep, setting error), its columns divided by the determinant.
         v_cc = p * (1.0 + setting_var * ss) / det
         v_ss = setting_var * (1.0 + p * cc) / det
         v_cs = -p * setting_var * cs / det
         post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
-        square = np.einsum("rn,rn->n", r, r) * weight - cr * post_c - sr * post_s
+        pull_c = ((1.0 + setting_var * ss) * cr - setting_var * cs * sr) / det
+        pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
+        # a sum of squares: the shorter difference of products can turn negative at absurd parameters
+        left = r - by_c * post_c - by_s * post_s
+        square = np.einsum("rn,rn->n", left, left) * weight + p * pull_c**2 + setting_var * pull_s**2
         out[j] = -0.5 * (square + r.shape[0] * log_variance + np.log(det))
         mean[j + 1] = a * (m + post_c) + c * post_s
         var[j + 1] = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
