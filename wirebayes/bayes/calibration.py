@@ -6,6 +6,7 @@ every quantity of parameters and readings. The band here holds the empirical dis
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -33,11 +34,14 @@ class Ranked:
     share_below : dict of name to float
         Of every parameter and of the joint log-likelihood; uniform between 0 and 1 when all is well.
     fit : Fit
+    redrawn : int
+        Data sets that were refused before this one.
     """
 
     truth: dict[str, float]
     share_below: dict[str, float]
     fit: Fit
+    redrawn: int
 
 
 def one(
@@ -46,6 +50,7 @@ def one(
     policy: Policy | None = None,
     *,
     fitted: Callable[[Problem], Problem] = lambda problem: problem,
+    accepted: Callable[[Problem], bool] = lambda problem: True,
 ) -> Ranked:
     """Draw a truth from the prior, simulate readings, fit, rank.
 
@@ -57,14 +62,19 @@ def one(
     policy : Policy
     fitted : function of the simulated problem
         What is fitted instead of it, to see that a wrong likelihood is found out.
+    accepted : function of the simulated problem
+        Whether its readings are a test anybody would keep; a choice by the readings alone leaves shares uniform.
 
     Returns
     -------
     Ranked
     """
     rng = np.random.default_rng(seed)
-    truth = problem.prior.rvs(1, rng)
-    simulated = with_readings(problem, [readings(problem, truth, sample, rng) for sample in problem.samples])
+    for redrawn in count():
+        truth = problem.prior.rvs(1, rng)
+        simulated = with_readings(problem, [readings(problem, truth, sample, rng) for sample in problem.samples])
+        if accepted(simulated):
+            break
     target = fitted(simulated)
     done = fit(target, seed_of(seed, "fit"), policy=policy or Policy())
     draws = _last_of_every_walker(done)
@@ -72,10 +82,8 @@ def one(
     value = np.append(truth[0], target.log_likelihood(truth))
     below, ties = (columns < value).sum(axis=0), (columns == value).sum(axis=0)
     share = (below + rng.uniform(size=len(value)) * (ties + 1)) / (len(draws) + 1)
-    names = (*problem.names, JOINT)
-    return Ranked(
-        dict(zip(problem.names, truth[0].tolist(), strict=True)), dict(zip(names, share.tolist(), strict=True)), done
-    )
+    below_by_name = dict(zip((*problem.names, JOINT), share.tolist(), strict=True))
+    return Ranked(dict(zip(problem.names, truth[0].tolist(), strict=True)), below_by_name, done, redrawn)
 
 
 def _last_of_every_walker(done: Fit) -> Array:
