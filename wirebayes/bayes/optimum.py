@@ -148,10 +148,25 @@ def modes(
     value = target(z)
     best = z[np.argsort(-value)[: starts // 2]]
     cooled = _cooled(target, z[:_POPULATION], value[:_POPULATION], rng)
-    spread = spread_rows(cooled / np.maximum(cooled.std(axis=0), 1e-300), starts - len(best), rng)
+    width = cooled.std(axis=0)
+    spread = spread_rows(cooled / np.where(width > 0, width, 1.0), starts - len(best), rng)
     best = np.vstack([best, cooled[spread]])
     start = best if extra is None else np.vstack([extra, best])
-    found = climb(lambda points, rows: target(points), start)
+
+    def density(points: Array, rows: Array) -> Array:
+        return target(points)
+
+    # Most starts run into few valleys: once they are in sight, one climber each is enough.
+    for iterations in (6, 3):
+        found = climb(density, start, iterations=iterations)
+        start = found.z[_distinct(found)]
+    found = climb(density, start)
+    keep = _distinct(found)
+    return Optimum(found.z[keep], found.log_density[keep], found.curvature[keep], found.converged[keep])
+
+
+def _distinct(found: Optimum) -> list[int]:
+    """Rows apart from all better ones and not hopelessly below the best, best first."""
     order = np.argsort(-found.log_density)
     keep: list[int] = []
     for i in order:
@@ -160,7 +175,7 @@ def modes(
         apart = [(found.z[i] - found.z[k]) @ found.curvature[k] @ (found.z[i] - found.z[k]) for k in keep]
         if all(distance > 4.0 for distance in apart):
             keep.append(int(i))
-    return Optimum(found.z[keep], found.log_density[keep], found.curvature[keep], found.converged[keep])
+    return keep
 
 
 def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> Array:
