@@ -6,7 +6,6 @@ every quantity of parameters and readings. The band here holds the empirical dis
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -70,11 +69,13 @@ def one(
     Ranked
     """
     rng = np.random.default_rng(seed)
-    for redrawn in count():
+    redrawn = 0
+    while True:
         truth = problem.prior.rvs(1, rng)
         simulated = with_readings(problem, [readings(problem, truth, sample, rng) for sample in problem.samples])
         if accepted(simulated):
             break
+        redrawn += 1
     target = fitted(simulated)
     done = fit(target, seed_of(seed, "fit"), policy=policy or Policy())
     draws = _last_of_every_walker(done)
