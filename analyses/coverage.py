@@ -8,6 +8,7 @@ third of the holds predicted from the rest.
 import argparse
 import json
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from wirebayes.simulate import Bench, Simulated, Truth, draw
 from wirebayes.wire.staircase import linearise
 
 Array = Any
-POLICY = Policy(walkers=128, ess=1000.0)
+POLICY = Policy(walkers=128, ess=1000.0, most_steps=800)
 
 
 def bench(rng: np.random.Generator) -> Bench:
@@ -122,13 +123,15 @@ def main() -> int:
     parser.add_argument("--output", type=Path, default=Path("out/coverage"))
     parser.add_argument("--wires", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
     asked = parser.parse_args()
     asked.output.mkdir(parents=True, exist_ok=True)
     path = asked.output / f"rows-seed{asked.seed}.jsonl"
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    with path.open("a", encoding="utf-8") as file:
-        for index in range(len(rows), asked.wires):
-            rows.append(one(asked.seed, index))
+    missing = range(len(rows), asked.wires)
+    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(asked.workers) as pool:
+        for future in [pool.submit(one, asked.seed, index) for index in missing]:
+            rows.append(future.result())
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
     result = summary(rows[: asked.wires])
