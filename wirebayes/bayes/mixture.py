@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
 Array = NDArray[Any]
-DEGREES = 10.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
+DEGREES = 6.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
 _ENOUGH = 8000  # points that settle a mixture in a handful of dimensions; more only take time
 
 
