@@ -20,7 +20,7 @@ def save_pose(
     folder: Path, robot: Robot, asked: Question, content: dict[str, Any], courses: dict[float, Course]
 ) -> None:
     """Write the pictures that go with ``pose.json``; none when the pose cannot be held."""
-    if not courses:
+    if not courses or not courses[0.0].found.any():
         return
     shared = courses[0.0]
     scene(robot, asked.position_m, asked.rotation, shared).savefig(folder / "robot.png", dpi=150)

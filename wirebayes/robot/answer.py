@@ -43,7 +43,7 @@ class Question:
 
 def band(values: Floats) -> dict[str, Any]:
     """Mean, sd and quantiles over the first axis (the draws); NaN draws are left out."""
-    good = values[np.isfinite(values.reshape(len(values), -1)).all(1)]
+    good = values[np.isfinite(values).all(axis=tuple(range(1, values.ndim)))]
     if not len(good):
         return dict.fromkeys(("mean", "sd", *QUANTILES), None)
     quantiles = np.quantile(good, list(QUANTILES.values()), axis=0)
@@ -93,6 +93,10 @@ def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, An
     if not content["feasible"]:
         return content | {"sentence": "No tensions within the bounds hold the platform at this pose."}, {}
     told = inverse.commands(robot, shared, x[None], R[None], tau)
+    content["feasible_draws"] = float(told.feasible.mean())
+    if not told.feasible.any():
+        content["feasible"] = False
+        return content | {"sentence": "These wires cannot pull as hard as the pose asks, however far stretched."}, {}
     content["inverse"] = {
         "tension_N": tau[0],
         "zero_tension_length_m": band(told.zero_m),
@@ -144,7 +148,8 @@ def _all_equilibria(
 ) -> dict[str, Any]:
     """How many poses the mean wire's lengths allow, found from many starts."""
     mean = control.known(wires)
-    found = forward.equilibria(robot, mean, told.zero_m.mean(0), told.offset_m.mean(0), rng)
+    lengths = told.zero_m[told.feasible].mean(0), told.offset_m[told.feasible].mean(0)
+    found = forward.equilibria(robot, mean, *lengths, rng)
     return {
         "stable_found": len(found.position_m),
         "starts": 64,

@@ -4,7 +4,7 @@ An equilibrium is a minimum of the potential energy of weight and wires, slack w
 that energy, damped where the Hessian is not positive definite or the energy would rise, finds it from any start.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,7 @@ def solve(
     robot : Robot
     wires : Wires
     zero_m : (n, w) array
-        Zero-tension length of every wire, creep included.
+        Zero-tension length of every wire, creep included. Rows with NaN are not solved.
     offset_m : (n, w) or (w,) array
         Stretched length that is not between exit and platform point: wire beyond the exit point, and ``r q``.
     start_m : (n, 3) or (3,) array
@@ -82,21 +82,41 @@ def solve(
     Equilibria
     """
     n = len(zero_m)
+    sane = np.flatnonzero(np.isfinite(zero_m).all(1) & np.isfinite(np.broadcast_to(offset_m, zero_m.shape)).all(1))
+    if len(sane) < n:
+        offsets = np.broadcast_to(offset_m, zero_m.shape)[sane]
+        x, R = np.broadcast_to(start_m, (n, 3))[sane], np.broadcast_to(start_rotation, (n, 3, 3))[sane]
+        return _spread(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
+    if not n:
+        return _spread(None, sane, 0, robot.legs)
     position = np.array(np.broadcast_to(start_m, (n, 3)).T)
     rotation = np.array(np.moveaxis(np.broadcast_to(start_rotation, (n, 3, 3)), 0, -1))
     zero = np.ascontiguousarray(zero_m.T)
     offset = np.ascontiguousarray(np.broadcast_to(offset_m, zero_m.shape).T)
     quick = min(_QUICK, max_iterations)
-    x, R, tau, status, count, left = _in_chunks(robot, wires, zero, offset, position, rotation, quick)
+    at, turn, tau, status, count, left = _in_chunks(robot, wires, zero, offset, position, rotation, quick)
     slow = np.flatnonzero(status == NOT_CONVERGED)
     if slow.size and max_iterations > quick:
         # The few slow cases of all chunks go on together: small arrays waste the machine.
-        rest = _in_chunks(
-            robot, wires.part(slow), zero[:, slow], offset[:, slow], x[:, slow], R[..., slow], max_iterations - quick
-        )
-        x[:, slow], R[..., slow], tau[:, slow], status[slow], left[slow] = *rest[:4], rest[5]
+        part = wires.part(slow), zero[:, slow], offset[:, slow], at[:, slow], turn[..., slow]
+        rest = _in_chunks(robot, *part, max_iterations - quick)
+        at[:, slow], turn[..., slow], tau[:, slow], status[slow], left[slow] = *rest[:4], rest[5]
         count[slow] += rest[4]
-    return Equilibria(x.T, np.moveaxis(R, -1, 0), tau.T, status, count, left)
+    return Equilibria(at.T, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
+
+
+def _spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
+    """Solutions put back among rows that could not be tried."""
+    if found is not None:
+        legs = found.tension_N.shape[1]
+    whole = Equilibria(
+        np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, legs), np.nan),
+        np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf),
+    )  # fmt: skip
+    if found is not None:
+        for field in fields(Equilibria):
+            getattr(whole, field.name)[rows] = getattr(found, field.name)
+    return whole
 
 
 def _in_chunks(
@@ -117,7 +137,7 @@ def _solve(
     n, d, size = zero.shape[1], robot.degrees, robot.size_m
     scale = np.ones((d, 1))
     scale[3:] = 1.0 / size  # rotations are stepped in metres at the platform's edge
-    reach = 10.0 * (np.ptp(robot.exit_m, axis=0).max() + zero.max())
+    reach = 10.0 * (np.ptp(robot.exit_m, axis=0).max() + zero.max(0))
     out_x, out_R, out_tau = np.array(x), np.array(R), np.zeros_like(zero)
     status, count, left = np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf)
     live = np.arange(n)
@@ -163,7 +183,7 @@ def _solve(
             status[gone] = np.where(lost, NO_EQUILIBRIUM, np.where(done, FOUND, NOT_CONVERGED))[finished]
             left[gone] = at.size[finished]
             keep = np.flatnonzero(~finished)
-            live, damping, floor, level = live[keep], damping[keep], floor[keep], level[keep]
+            live, damping, floor, level, reach = live[keep], damping[keep], floor[keep], level[keep], reach[keep]
             x, R, zero, offset = x[:, keep], R[..., keep], zero[:, keep], offset[:, keep]
             wires, at = wires.part(keep), at.part(keep)
         if not live.size:

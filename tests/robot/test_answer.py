@@ -1,0 +1,69 @@
+import numpy as np
+
+from wirebayes.output import plain
+from wirebayes.report import robot as pictures
+from wirebayes.robot import draws, schema
+from wirebayes.robot.answer import Question, answer, band
+
+TIMES = np.array([0.0, 60.0])
+
+
+def _line(n, k1, law="hooke"):
+    rng = np.random.default_rng(0)
+    means = {"k1": k1, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
+    return draws.WireDraws({k: v * np.exp(0.02 * rng.standard_normal(n)) for k, v in means.items()}, 1000.0, law)
+
+
+def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
+    # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
+    robot = schema.read("cogiro-desk")
+    asked = Question(robot.home_m, np.eye(3), TIMES)
+    content, courses = answer(robot, _line(40, 3.0, "modified"), asked)
+    assert not content["feasible"]
+    assert "cannot pull" in content["sentence"]
+    pictures.save_pose(tmp_path, robot, asked, content, courses)
+    assert not list(tmp_path.iterdir())
+    plain(content)
+
+
+def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
+    robot = schema.read("cogiro-desk")
+    weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
+    both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
+    asked = Question(robot.home_m, np.eye(3), TIMES)
+    content, courses = answer(robot, draws.WireDraws(both, 1000.0, "modified"), asked)
+    assert content["feasible_draws"] == 0.5
+    assert content["forward"]["solved"] == 0.5
+    assert [entry["solved"] for entry in content["drift"]] == [0.5, 0.5]
+    alone, _ = answer(robot, strong, asked)
+    wanted = alone["drift"][0]["distance_mm"]["mean"]
+    np.testing.assert_allclose(content["drift"][0]["distance_mm"]["mean"], wanted, rtol=1e-9)
+    pictures.save_pose(tmp_path, robot, asked, content, courses)
+    assert (tmp_path / "drift.png").exists()
+
+
+def test_one_draw_is_enough():
+    robot = schema.read("hangprinter-4")
+    content, _ = answer(robot, _line(1, 5000.0), Question(robot.home_m, np.eye(3), TIMES))
+    assert content["forward"]["solved"] == 1.0
+    assert "sentence" in content["variance_shares"]
+
+
+def test_given_wires_have_no_uncertainty_and_keep_their_leg():
+    robot = schema.read("linear-6")
+    given = schema.GivenWire({"k1": 5e4, "B": 1e-3, "U": 1.0, "k2": 0.01, "N": 1.0}, 1000.0)
+    from dataclasses import replace
+
+    mixed = replace(robot, given={"steel": given}, wire=("steel", *robot.wire[1:]))
+    wires = draws.for_robot(mixed, _line(20, 800.0))
+    assert wires.theta["k1"].shape == (6, 20)
+    np.testing.assert_array_equal(wires.theta["k1"][0], 5e4)
+    np.testing.assert_array_equal(wires.theta["k1"][1], wires.theta["k1"][5])
+    content, _ = answer(mixed, _line(20, 800.0), Question(mixed.home_m, np.eye(3), TIMES))
+    assert content["forward"]["largest_round_trip_error_m"] < 1e-9
+
+
+def test_bands_leave_lost_draws_out():
+    values = np.array([[1.0, 2.0], [np.nan, 2.0], [3.0, 4.0]])
+    np.testing.assert_allclose(band(values)["mean"], [2.0, 3.0])
+    assert band(np.empty((0, 2)))["mean"] is None
