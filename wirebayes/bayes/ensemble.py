@@ -1,9 +1,10 @@
 """The posterior by emcee: independent ensembles, a learned move, a written stop rule, exact resumption.
 
 Policy. The modes found from many starts give the first proposal. Burn-in runs in rounds; after each the proposal
-mixture is fitted anew to the walkers of all ensembles, and the walkers whose log density lies hopelessly below the
-others' (stuck in a far mode of no weight) are set back to draws of the proposal, which is allowed only here. Rounds
-grow longer while the proposal leaves out a tail that walkers have found. Then the proposal is frozen and draws are kept, block by block, until for every parameter
+mixture is fitted anew to the draws of this round and the one before, and the walkers whose log density lies hopelessly
+below the others' (stuck in a far mode of no weight) are set back to draws of the proposal, which is allowed only here.
+Rounds grow longer while the proposal leaves out a tail that walkers have found. Then the proposal is frozen and draws
+are kept, block by block, until for every parameter
 
 - the effective sample size from the autocorrelation time is at least `Policy.ess`, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`,
@@ -71,6 +72,9 @@ class Policy:
     most_steps: int = 4000
 
 
+DEFAULT = Policy()
+
+
 @dataclass(frozen=True)
 class Chains:
     """Kept draws and how they came about.
@@ -115,7 +119,7 @@ class Chains:
 def sample(
     target: Target,
     seed: int,
-    policy: Policy = Policy(),
+    policy: Policy = DEFAULT,
     *,
     checkpoint: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
@@ -163,6 +167,7 @@ class _State:
     """Everything a resumed run needs, in one pickled file of our own making."""
 
     positions: list[Array]
+    values: list[Array]
     randoms: list[Any]
     proposal: mixtures.Mixture
     safety: mixtures.Mixture
@@ -173,6 +178,7 @@ class _State:
     frozen: bool = False
     learned: bool = True
     stuck: int = 0
+    seen: Any = None
     kept_z: Any = None
     kept_log_density: Any = None
     kept_evaluations: int = 0
@@ -206,37 +212,41 @@ def _begin(target: Target, seed: int, policy: Policy, found: Optimum | None) -> 
     before = target.evaluations
     found = found or modes(target, rng)
     proposal = mixtures.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
-    positions, randoms = [], []
+    positions, values, randoms = [], [], []
     for sequence in spawned[1:]:
         random = np.random.RandomState(np.random.MT19937(sequence))
-        positions.append(_finite_draws(target, proposal, policy.walkers, random))
+        drawn, value = _finite_draws(target, proposal, policy.walkers, random)
+        positions.append(drawn)
+        values.append(value)
         randoms.append(random.get_state())
-    return _State(positions, randoms, proposal, proposal, rng, len(found.z), target.evaluations - before)
+    return _State(positions, values, randoms, proposal, proposal, rng, len(found.z), target.evaluations - before)
 
 
-def _finite_draws(target: Target, proposal: mixtures.Mixture, n: int, random: Any) -> Array:
-    """Draws of the proposal where the density is above zero."""
-    drawn = np.empty((0, proposal.centres.shape[1]))
+def _finite_draws(target: Target, proposal: mixtures.Mixture, n: int, random: Any) -> tuple[Array, Array]:
+    """Draws of the proposal where the density is above zero, and its logarithm there."""
+    drawn, values = np.empty((0, proposal.centres.shape[1])), np.empty(0)
     while len(drawn) < n:
-        z = proposal.rvs(2 * n, random)
-        drawn = np.vstack([drawn, z[np.isfinite(target(z))]])
-    return drawn[:n]
+        z = proposal.rvs(n, random)
+        value = target(z)
+        good = np.isfinite(value)
+        drawn, values = np.vstack([drawn, z[good]]), np.concatenate([values, value[good]])
+    return drawn[:n], values[:n]
 
 
 def _moves(state: _State) -> list[tuple[Any, float]]:
     evolution = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DEMove(gamma0=1.0), 0.2)]
     if not state.learned:
         return evolution
-    return [(IndependenceMove(state.proposal), 0.85), (evolution[0][0], 0.15)]
+    return [(IndependenceMove(state.proposal), 1.0 - _EVOLUTION), (evolution[0][0], _EVOLUTION)]
 
 
 def _advance(target: Target, state: _State, policy: Policy, i: int, steps: int, moves: Any) -> Any:
     """Run one ensemble on; its position and random state are left in `state`."""
     sampler = emcee.EnsembleSampler(policy.walkers, state.positions[i].shape[1], target, moves=moves, vectorize=True)
     before = target.evaluations
-    start = emcee.State(state.positions[i], random_state=state.randoms[i])
+    start = emcee.State(state.positions[i], log_prob=state.values[i], random_state=state.randoms[i])
     end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
-    state.positions[i], state.randoms[i] = end.coords, sampler.random_state
+    state.positions[i], state.values[i], state.randoms[i] = end.coords, end.log_prob, sampler.random_state
     used = target.evaluations - before
     state.evaluations += used
     return sampler, used
@@ -245,12 +255,11 @@ def _advance(target: Target, state: _State, policy: Policy, i: int, steps: int, 
 def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
     tails, acceptance, weights = [], [], []
     moves = _moves(state)
-    steps = policy.round_steps * 2 ** int(np.clip(state.round - policy.rounds + 1, 0, 2))
+    steps = policy.round_steps * 2 ** int(np.clip(state.round - policy.rounds + 1, 0, 3))
     for i in range(policy.ensembles):
         sampler, _ = _advance(target, state, policy, i, steps, moves)
-        tail = sampler.get_chain(discard=steps // 2)
-        density = state.proposal.log_density(tail.reshape(-1, tail.shape[-1]))
-        weights.append(sampler.get_log_prob(discard=steps // 2).ravel() - density)
+        tail = sampler.get_chain(discard=steps // 2, flat=True)
+        weights.append(sampler.get_log_prob(discard=steps // 2, flat=True) - state.proposal.log_density(tail))
         tails.append(tail)
         acceptance.append(sampler.acceptance_fraction.mean())
     state.round += 1
@@ -262,12 +271,15 @@ def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
         state.learned = float(np.mean(acceptance)) > policy.acceptance
         state.kept_z = [[] for _ in range(policy.ensembles)]
         state.kept_log_density = [[] for _ in range(policy.ensembles)]
-    points = np.concatenate([t.reshape(-1, t.shape[-1]) for t in tails])
+    points = np.concatenate(tails)
+    before, state.seen = state.seen, points
+    if before is not None and state.round > 2:
+        points = np.concatenate([before, points])
     try:
         fitted = mixtures.fit(points, state.generator, most=policy.components)
         # What the start knew stays in reach: small modes, and tails that the burn-in has not walked.
         safety = mixtures.blend(state.safety, mixtures.wider(fitted, 2.0), 0.5)
-        state.proposal = mixtures.blend(fitted, safety, 0.15)
+        state.proposal = mixtures.blend(fitted, safety, _SAFETY)
     except np.linalg.LinAlgError:
         pass  # too few distinct points yet: keep the proposal that made them
 
@@ -275,20 +287,23 @@ def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
 def _free_stuck_walkers(target: Target, state: _State) -> None:
     """Set walkers far below the others back to the proposal's draws; a step outside the chain, so burn-in only."""
     d = state.positions[0].shape[1]
-    values = [target(p) for p in state.positions]
-    state.evaluations += sum(len(v) for v in values)
-    floor = np.median(np.concatenate(values)) - 0.5 * d - 15.0
-    for i, value in enumerate(values):
+    floor = np.median(np.concatenate(state.values)) - 0.5 * d - 15.0
+    for i, value in enumerate(state.values):
         low = np.flatnonzero(value < floor)
-        if len(low):
-            random = np.random.RandomState()
-            random.set_state(state.randoms[i])
-            good = np.flatnonzero(value >= floor)
-            state.positions[i][low] = state.positions[i][random.choice(good, len(low))] if len(good) > 2 * d else (
-                _finite_draws(target, state.proposal, len(low), random)
-            )  # fmt: skip
-            state.randoms[i] = random.get_state()
-            state.stuck += len(low)
+        if not len(low):
+            continue
+        random = np.random.RandomState()
+        random.set_state(state.randoms[i])
+        good = np.flatnonzero(value >= floor)
+        if len(good) > 2 * d:
+            taken = random.choice(good, len(low))
+            state.positions[i][low], state.values[i][low] = state.positions[i][taken], value[taken]
+        else:
+            before = target.evaluations
+            state.positions[i][low], state.values[i][low] = _finite_draws(target, state.proposal, len(low), random)
+            state.evaluations += target.evaluations - before
+        state.randoms[i] = random.get_state()
+        state.stuck += len(low)
 
 
 def _kept_block(target: Target, state: _State, policy: Policy) -> None:
@@ -366,3 +381,5 @@ def describe(policy: Policy) -> dict[str, Any]:
 
 _OVERDISPERSED = 1.7
 _GOOD_ACCEPTANCE = 0.25
+_EVOLUTION = 0.15  # share of steps that do not trust the proposal
+_SAFETY = 0.15  # share of the proposal that does not trust its fit
