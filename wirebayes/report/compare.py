@@ -23,7 +23,7 @@ def save(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, 
                 save_figure(pit(f"{name}: {WORDS[way]}", readings), folder / f"pit-{way.replace('_', '-')}.png")
 
 
-WORDS = {"free": "held-out holds, predicted freely", "given_first": "held-out holds, given their first reading"}
+WORDS = {"free": "held out, predicted freely", "given_first": "held out, given first reading"}
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -46,8 +46,7 @@ def differences(name: str, table: dict[str, Any]) -> Figure:
             axes.annotate(f"← {value:.0f}", (edge, place), fontsize=8, color=HOLD, va="center")
             continue
         axes.errorbar(value, place, xerr=2 * row["difference"]["se"], fmt="o", ms=4, lw=1, color=colour)
-    axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
-    axes.invert_yaxis()
+    _names(axes, rows)
     axes.set_xlim(edge * 1.05, None)
     return figure
 
@@ -60,10 +59,14 @@ def held_out_errors(name: str, table: dict[str, Any]) -> Figure:
         found = [(place, r["held_out"][way]["rmse_N"]) for place, r in enumerate(rows) if r["held_out"][way]]
         axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
     axes.set_xscale("log")
-    axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
-    axes.invert_yaxis()
+    _names(axes, rows)
     legend(axes, loc="best")
     return figure
+
+
+def _names(axes: Any, rows: list[dict[str, Any]]) -> None:
+    axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
 
 
 def bands(title: str, scores: dict[str, Any]) -> Figure:
