@@ -30,19 +30,20 @@ class Study:
     protocol: str
     likelihood: str
     broken: bool = False
+    policy: Policy = POLICY
 
     @property
     def name(self) -> str:
         return f"{self.protocol}-{self.likelihood}" + ("-broken" if self.broken else "")
 
-    def data_set(self, seed: int, index: int, policy: Policy = POLICY) -> dict[str, Any]:
+    def data_set(self, seed: int, index: int) -> dict[str, Any]:
         """Simulate and fit the data set of a number; the same whatever else is run."""
         own = seed_of(seed, "calibration", self.protocol, self.likelihood, str(index))
         problem = build([BENCHES[self.protocol].experiment()], likelihood=self.likelihood)
         if self.likelihood == "hold":
             problem = _with_first_readings(problem, self.protocol, own)
         fitted = _without_setting_error if self.broken else _as_it_is
-        ranked = one(problem, own, policy, fitted=fitted, accepted=stays_taut)
+        ranked = one(problem, own, self.policy, fitted=fitted, accepted=stays_taut)
         chains = ranked.fit.chains
         return {
             "study": self.name, "index": index, "share_below": ranked.share_below, "truth": ranked.truth,

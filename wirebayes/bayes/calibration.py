@@ -6,6 +6,7 @@ every quantity of parameters and readings. The band here holds the empirical dis
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from wirebayes.bayes.replicate import readings
 Array = NDArray[Any]
 JOINT = "log_likelihood"
 _GRID = np.linspace(0.0, 1.0, 101)[1:-1]
+_CHUNK = 10_000
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ def extremeness(share_below: Array) -> float:
     return float(_tails(n)[np.arange(len(_GRID)), counts].min())
 
 
+@cache
 def _tails(n: int) -> Array:
     """(points, n + 1) two-sided binomial tail of every count at every point of the grid."""
     counts = np.arange(n + 1)
@@ -116,12 +119,13 @@ def threshold(n: int, quantities: int, joint: float = 0.99, *, replicates: int =
     """
     rng = np.random.default_rng(seed)
     tails, points = _tails(n), np.arange(len(_GRID))
-    smallest = np.empty(replicates)
-    for i in range(replicates):
+    cells = np.full(len(_GRID) + 1, 1.0 / (len(_GRID) + 1))
+    smallest = []
+    for start in range(0, replicates, _CHUNK):
         # counts of n uniforms in the cells of the grid, without sorting them
-        cells = rng.multinomial(n, np.full(len(_GRID) + 1, 1.0 / (len(_GRID) + 1)))
-        smallest[i] = tails[points, np.cumsum(cells)[:-1]].min()
-    return float(np.quantile(smallest, 1.0 - joint ** (1.0 / quantities)))
+        counts = np.cumsum(rng.multinomial(n, cells, size=min(_CHUNK, replicates - start)), axis=1)[:, :-1]
+        smallest.append(tails[points, counts].min(axis=1))
+    return float(np.quantile(np.concatenate(smallest), 1.0 - joint ** (1.0 / quantities)))
 
 
 def band(n: int, level: float) -> tuple[Array, Array, Array]:
