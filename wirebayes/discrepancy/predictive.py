@@ -84,7 +84,7 @@ def _readings(problem: Problem, theta: Array, sample: Sample, question: Question
 def chain_course(own: Theta, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
     """(H, R, n) readings without sensor error, of trained holds as replicates.
 
-    A model with an unknown discrepancy beside the staircase adds its own conditional draw to this.
+    An unknown discrepancy is an effect among the others here: its draws were made given the training readings.
     """
     protocol, trained = question.protocol, question.trained
     n = len(own["k1"])

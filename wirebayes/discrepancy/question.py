@@ -67,8 +67,8 @@ def read_question(path: Path, stored: Stored) -> Asked:
     first = np.array([hold.tension_N[0] for hold in file.holds])
     repeated = np.array([hold.number in row_of for hold in file.holds])
     if not repeated.any():
-        reference = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
-        alone = protocol_of(file.holds, trained.length_mm, reference)
+        began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
+        alone = protocol_of(file.holds, trained.length_mm, began_at)
         return Asked(_without_events(stored), Question(alone, 0, np.ones(len(first), bool), first), file.holds, True)
     file.check_repeats(trained, row_of)
     rows = np.array([row_of[int(h.number or 0)] for h, known in zip(file.holds, repeated, strict=True) if known])
@@ -77,9 +77,8 @@ def read_question(path: Path, stored: Stored) -> Asked:
     given = np.full(len(trained.number), np.nan)
     given[rows] = first[repeated]
     after = tuple(h for h, known in zip(file.holds, repeated, strict=True) if not known)
-    whole = trained
-    if after:
-        whole = _joined(trained, protocol_of(after, trained.length_mm, file.reference_C(trained, row_of)))
+    reference = file.reference_C(trained, row_of)
+    whole = _joined(trained, protocol_of(after, trained.length_mm, reference)) if after else trained
     everything = np.append(asked, np.ones(len(after), bool))
     question = Question(whole, len(trained.number), everything, np.append(given, first[~repeated]))
     return Asked(stored, question, file.holds, False)
