@@ -89,6 +89,8 @@ def test_slack_wires_do_not_mislead_the_calibration():
 @pytest.mark.statistical
 def test_intervals_cover_and_hooke_alone_does_not():
     robot = schema.read("segesta-8")
+    # well taut, as one would calibrate: on the edge of slackness a mode need not have zero slope
+    robot = replace(robot, rule=replace(robot.rule, lowest_N=2.5))
     rng = np.random.default_rng(4)
     line = _line()
     session = _session(robot, line, 6, rng)

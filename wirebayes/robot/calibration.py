@@ -53,7 +53,7 @@ class Calibration:
         return self.length_m - half, self.length_m + half
 
 
-def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, iterations: int = 25) -> Calibration:
+def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, iterations: int = 40) -> Calibration:
     """Posterior of the wires' lengths from standardised readings of one session on ``m`` robots.
 
     Parameters
@@ -87,7 +87,8 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
         slope = np.einsum("mrd,mr->md", J, readings - here.readings) - white
         # What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached.
         decrement = np.einsum("md,md->m", slope, np.linalg.solve(normal, slope[..., None])[..., 0])
-        converged |= decrement < 1e-3
+        # A mode on the edge of slackness has no zero slope; there, no step however short improves.
+        converged |= (decrement < 1e-3) | (damping > 1e8)
         if converged.all():
             break
         ridge = damping[:, None, None] * np.einsum("mdd->md", normal)[:, None] * np.eye(d)
@@ -95,7 +96,7 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
         step[converged] = 0.0
         there = predict(robot, prior, session, mean + (white + step) @ root.T, near=(here.begun_m, here.begun_rotation))
         new = _cost(there, readings, white + step)
-        better = new <= cost + 1e-9 * (1 + np.where(np.isfinite(cost), cost, 0.0))
+        better = new < cost - 1e-9 * np.where(np.isfinite(cost), cost, 0.0)
         white = np.where(better[:, None], white + step, white)
         damping = np.where(better, damping / 10, damping * 10)
         here, cost = _pick(better, there, here), np.where(better, new, cost)
