@@ -255,7 +255,7 @@ def _advance(target: Target, state: _State, policy: Policy, i: int, steps: int, 
 def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
     tails, acceptance, weights = [], [], []
     moves = _moves(state)
-    steps = policy.round_steps * 2 ** int(np.clip(state.round - policy.rounds + 1, 0, 3))
+    steps = policy.round_steps * 2 ** int(np.clip(state.round - policy.rounds + 1, 0, 2))
     for i in range(policy.ensembles):
         sampler, _ = _advance(target, state, policy, i, steps, moves)
         tail = sampler.get_chain(discard=steps // 2, flat=True)
