@@ -95,7 +95,7 @@ def test_one_wrong_reading_does_not_move_the_answer_and_is_named():
     y = sample.readings.copy()
     y[3, 4] -= 1.45
     spoiled = with_readings(made.problem, [y])
-    policy = Policy(ensembles=2, walkers=96, most_rounds=4, ess=300.0, most_steps=160)
+    policy = Policy(ensembles=2, walkers=96, most_rounds=3, ess=300.0, most_steps=80)
     robust = fit(with_gross_errors(spoiled), 1, policy=policy)
     clean, plain = fit(made.problem, 1, policy=policy), fit(spoiled, 1, policy=policy)
     names = made.problem.names
