@@ -18,6 +18,7 @@ from wirebayes.wire.effect import Effect
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
+DENSE_S = (0.0, *np.geomspace(2, 600, 24).round(1))
 FEW = 199  # simulations behind a p-value here; the command uses 999
 
 
@@ -83,7 +84,7 @@ def test_play_shows_on_the_way_back(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("bench", [
     Bench(displacements_mm=(1, 3, 5, 3, 1, -0.5, 1, 3, 5)),  # goes slack in between
-    Bench(times_s=tuple(np.round(np.concatenate([[0.0], np.geomspace(2, 600, 24)]), 1)), displacements_mm=(1, 2, 3, 4, 5, 6)),
+    Bench(times_s=DENSE_S, displacements_mm=(1, 2, 3, 4, 5, 6)),
 ], ids=["slack", "25 readings"])  # fmt: skip
 def test_other_protocols_are_answered(tmp_path: Path, bench: Bench) -> None:
     found = answer(made(tmp_path, [bench], {}, []))

@@ -56,7 +56,8 @@ STRENGTH = {
     "thermal_expansion": {"alpha": 1e-4}, "length_dependence": {"p": 0.5}, "permanent_creep": {"psi": 0.6},
     "memory": {"omega": 0.7}, "second_relaxation": {"A": 0.05, "T2": 40.0}, "steady_creep": {"a": 5e-4},
     "tension_dependent_rate": {"m": 0.8}, "ageing": {"a": 0.5}, "creep_threshold": {"tau_c": 1.0},
-    "grip_slip": {"w": 0.4}, "unrecorded_hold": {"T": 200.0}, "reading_delay": {"t_d": 8.0}, "sensor_drift": {"a": 1e-3},
+    "grip_slip": {"w": 0.4}, "unrecorded_hold": {"T": 200.0}, "reading_delay": {"t_d": 8.0},
+    "sensor_drift": {"a": 1e-3},
     "sensor_nonlinearity": {"a": 0.02}, "clamp_transient": {"a": 0.05, "T": 20.0}, "lost_motion": {"w": 0.2},
     "guide_friction": {"mu": 0.05},
 }  # fmt: skip

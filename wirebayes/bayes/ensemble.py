@@ -330,7 +330,8 @@ def _look(target: Target, state: _State, policy: Policy) -> None:
     long_enough = steps >= 10.0 * state.autocorrelation.max()
     if long_enough and (state.ess >= policy.ess).all() and (state.r_hat <= policy.r_hat).all():
         state.finished, state.converged = True, True
-        state.why = f"after {steps} steps: smallest ESS {state.ess.min():.0f}, largest nested R-hat {state.r_hat.max():.4f}"
+        least, most = float(state.ess.min()), float(state.r_hat.max())
+        state.why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
     elif steps >= policy.most_steps:
         names = target.problem.names
         worst = names[int(np.argmin(state.ess))]
