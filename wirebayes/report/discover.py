@@ -40,7 +40,8 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
         axis.set_title(f"{folder.name}: {titles[model]}", loc="left", fontsize=10)
         axis.set_ylabel("measured − predicted (N)")
     axes[1].set_xlabel("hold number; within each hold, time runs to the right")
-    axes[0].legend(loc="best", fontsize=8, frameon=False)
+    handles = axes[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     figure.savefig(target, dpi=130)
     plt.close(figure)
 
