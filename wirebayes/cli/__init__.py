@@ -78,7 +78,7 @@ _ALL = {
     "export": Command(
         "wirebayes.cli.robot",
         "export",
-        "A robot with its wires as a MuJoCo model.",
+        "A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.",
         "wirebayes export data/robots/cogiro.toml --wires out/fit/roc-line-1m --output out/export",
     ),
     "report": Command(
