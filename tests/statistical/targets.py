@@ -22,7 +22,7 @@ class Analytic:
 
     def __call__(self, z, readings=None):
         self.evaluations += len(z)
-        return self.log_density(z)
+        return np.atleast_1d(self.log_density(z))  # scipy makes a number of one row
 
 
 def gaussian():
