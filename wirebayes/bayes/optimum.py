@@ -43,7 +43,11 @@ class Optimum:
     @property
     def covariance(self) -> Array:
         """(n, d, d) covariance of the normal approximation."""
-        return np.linalg.inv(self.curvature)
+        eigen, vectors = np.linalg.eigh(self.curvature)
+        # A ridge thinner than this against its length has no Cholesky factor in double precision.
+        eigen = np.maximum(eigen, 1e-10 * eigen.max(axis=1, keepdims=True))
+        half = vectors / np.sqrt(eigen)[:, None, :]
+        return half @ np.swapaxes(half, 1, 2)
 
     @property
     def log_evidence(self) -> Array:
