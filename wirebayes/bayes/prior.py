@@ -4,7 +4,7 @@ The ranges (5 % to 95 %) and their reasons:
 
 =============  ====================  ==========================================================================
 k1             170 to 24,000 N       nylon monofilament of 0.2 mm to braided polyethylene of 1 mm (modulus x area)
-B              0.05 to 2.7e-3 L0/N^U creep strain at 1 N; 1e-4 to 1e-3 measured on light polymer lines
+B              5.1e-5 to 2.7e-3 L0   creep strain at 1 N; 1e-4 to 1e-3 measured on light polymer lines
 U              0.16 to 1.6           linear viscoelasticity is 1; polymers under small loads lie below
 k2             0.0042 to 0.22 s^-N   half the creep within seconds up to hours, together with N
 N              0.31 to 1.4           1 is an exponential, below it a stretched one
