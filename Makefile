@@ -32,6 +32,10 @@ discover-benchmark: .venv/run.stamp
 benchmark: .venv/test.stamp
 	$(BIN)/python analyses/robot_speed.py
 	$(BIN)/python analyses/robot_agreement.py
+	$(BIN)/python -m analyses.benchmarks.cost --output out/benchmarks
+	test -x .venv-benchmark/bin/python || $(PYTHON) -m venv .venv-benchmark
+	.venv-benchmark/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[benchmark]"
+	.venv-benchmark/bin/python -m analyses.benchmarks --output out/benchmarks
 
 docs: .venv/docs.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

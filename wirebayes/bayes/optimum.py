@@ -156,21 +156,7 @@ def modes(
     spread = spread_rows(cooled / np.where(width > 0, width, 1.0), starts - len(best), rng)
     best = np.vstack([best, cooled[spread]])
     start = best if extra is None else np.vstack([extra, best])
-
-    def density(points: Array, rows: Array) -> Array:
-        return target(points)
-
-    # Most starts run into few valleys: once they are in sight, one climber each is enough.
-    for iterations in (6, 3):
-        found = climb(density, start, iterations=iterations)
-        start = found.z[_distinct(found)]
-    found = climb(density, start)
-    keep = _distinct(found)
-    return Optimum(found.z[keep], found.log_density[keep], found.curvature[keep], found.converged[keep])
-
-
-def _distinct(found: Optimum) -> list[int]:
-    """Rows apart from all better ones and not hopelessly below the best, best first."""
+    found = climb(lambda points, rows: target(points), start)
     order = np.argsort(-found.log_density)
     keep: list[int] = []
     for i in order:
@@ -179,7 +165,7 @@ def _distinct(found: Optimum) -> list[int]:
         apart = [(found.z[i] - found.z[k]) @ found.curvature[k] @ (found.z[i] - found.z[k]) for k in keep]
         if all(distance > 4.0 for distance in apart):
             keep.append(int(i))
-    return keep
+    return Optimum(found.z[keep], found.log_density[keep], found.curvature[keep], found.converged[keep])
 
 
 def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> Array:

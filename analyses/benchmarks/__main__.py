@@ -1,0 +1,130 @@
+"""Effective draws a second against other samplers, on the same posterior, in one run.
+
+    python -m analyses.benchmarks --output out/benchmarks [--minutes 10] [--wires NAME ...] [--likelihoods chain hold]
+
+Every peer gets the same data, prior and likelihood; before anything is timed its model is compared with the package's.
+A peer that did not finish, diverged or has R-hat above 1.01 is printed as not converged and gets no ratio. wirebayes is
+run anew beside each peer, so that a busy machine slows both.
+"""
+
+import argparse
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from analyses.benchmarks import gradient, measure, model, plain
+from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.optimum import modes
+from wirebayes.bayes.problem import build
+from wirebayes.output import write_json
+from wirebayes.paper import experiments
+
+PEERS = {
+    "NumPyro NUTS, natural": lambda p, s, t: gradient.numpyro_nuts(p, s, t, True),
+    "NumPyro NUTS, our coordinates": lambda p, s, t: gradient.numpyro_nuts(p, s, t, False),
+    "compiled NUTS, natural": lambda p, s, t: gradient.blackjax_nuts(p, s, t, True),
+    "compiled NUTS, our coordinates": lambda p, s, t: gradient.blackjax_nuts(p, s, t, False),
+    "ChEES-HMC, natural": lambda p, s, t: gradient.chees(p, s, t, True),
+    "ChEES-HMC, our coordinates": lambda p, s, t: gradient.chees(p, s, t, False),
+    "emcee stretch, natural": lambda p, s, t: plain.stretch(p, s, t, True),
+    "emcee stretch, our coordinates": lambda p, s, t: plain.stretch(p, s, t, False),
+    "dynesty, unit cube": plain.dynesty_run,
+    "nutpie, natural": lambda p, s, t: gradient.nutpie_run(p, s, t, True),
+    "nutpie, our coordinates": lambda p, s, t: gradient.nutpie_run(p, s, t, False),
+}
+
+
+def check(problem, seed):
+    """Largest difference of the two log likelihoods and log posteriors over draws about the mode."""
+    target, rng = Target(problem), np.random.default_rng(seed)
+    found = modes(target, rng)
+    z = found.z[0] + rng.normal(size=(20, len(found.z[0]))) @ np.linalg.cholesky(found.covariance[0]).T
+    theta = target.coordinates.to_natural(z.copy())
+    likelihood, convert = model.log_likelihood(jnp, problem), model.natural(jnp, problem, target.coordinates)
+    values = [float(likelihood(dict(zip(problem.names, row, strict=True)))) for row in theta]
+    whole = [float(convert(row)[1]) + value for row, value in zip(z, values, strict=True)]
+    return max(np.abs(problem.log_likelihood(theta) - values).max(), np.abs(target(z) - whole).max())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
+    parser.add_argument(
+        "--minutes", type=float, default=10.0, help="of processor time to sample for each peer, at most"
+    )
+    parser.add_argument("--wires", nargs="*")
+    parser.add_argument("--likelihoods", nargs="*", default=["chain", "hold"])
+    parser.add_argument("--peers", nargs="*", help="words that the names of wanted peers begin with")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    cases = []
+    for experiment in experiments():
+        if options.wires and experiment.name not in options.wires:
+            continue
+        for likelihood in options.likelihoods:
+            cases.append(run(build([experiment], likelihood=likelihood), f"{experiment.name}, {likelihood}", options))
+            write_json(options.output / "samplers.json", {"wanted_ess": measure.WANTED, "minutes": options.minutes,
+                                                          "cases": cases})  # fmt: skip
+    print("\nratio of effective draws per second of processor time, all costs counted: median over cases, worst case")
+    for name in PEERS:
+        ratios = [c["peers"][name]["ratio_all_costs_cpu"] for c in cases if name in c["peers"]
+                  and "ratio_all_costs_cpu" in c["peers"][name]]  # fmt: skip
+        tried = sum(name in c["peers"] for c in cases)
+        if tried:
+            told = f"{np.median(ratios):8.1f} {min(ratios):8.1f}" if ratios else "not converged"
+            print(f"  {name:32s} {told}   ({len(ratios)} of {tried} converged)")
+
+
+def run(problem, title, options):
+    difference = check(problem, options.seed)
+    print(f"\n{title}: log density differs from the peers' by {difference:.1e} at most", flush=True)
+    if difference > 1e-8:
+        raise SystemExit("the peers' model is not the package's")
+    out = {"case": title, "log_density_difference": difference, "ours": [], "peers": {}}
+    print(f"  {'':32s} {'all costs':>10s} {'sampling':>10s} {'ratio':>8s}  effective draws per processor second")
+    for name, peer in PEERS.items():
+        if options.peers and not any(name.startswith(word) for word in options.peers):
+            continue
+        mine, reference = plain.ours(problem, options.seed, 0.0)
+        out["ours"].append(mine)
+        try:
+            theirs, values = peer(problem, options.seed, 60.0 * options.minutes)
+        except Exception as error:  # a peer that cannot run is told, and the others go on
+            theirs = {"converged": False, "why": f"{type(error).__name__}: {error}"[:300]}
+        else:
+            theirs["agreement"] = measure.agreement(values, reference)
+            if theirs["converged"]:
+                for kind in ("all_costs_per_cpu_s", "all_costs_per_wall_s", "sampling_per_cpu_s"):
+                    key = {"all_costs_per_cpu_s": "ratio_all_costs_cpu", "all_costs_per_wall_s": "ratio_all_costs_wall",
+                           "sampling_per_cpu_s": "ratio_sampling_cpu"}[kind]  # fmt: skip
+                    theirs[key] = mine[kind] / theirs[kind]
+        out["peers"][name] = theirs
+        _tell(name, theirs)
+    _tell("wirebayes (median)", {k: float(np.median([m[k] for m in out["ours"]])) for k in
+          ("all_costs_per_cpu_s", "sampling_per_cpu_s", "ess_per_kept_evaluation", "ess_per_evaluation")}
+          | {"converged": all(m["converged"] for m in out["ours"])})  # fmt: skip
+    return out
+
+
+def _tell(name, r):
+    if "why" in r:
+        line = f"could not be run: {r['why']}"
+    else:
+        line = f"{r['all_costs_per_cpu_s']:10.1f} {r['sampling_per_cpu_s']:10.1f}"
+        line += f" {r['ratio_all_costs_cpu']:8.1f}" if "ratio_all_costs_cpu" in r else " " * 9
+        if "agreement" in r:
+            line += f"  mean off {r['agreement']['mean_in_sd']:.3f} sd, log sd off {r['agreement']['log_sd']:.3f}"
+        if "ess_per_evaluation" in r:
+            line += f"  ESS per evaluation {r['ess_per_kept_evaluation']:.3f},"
+            line += f" burn-in counted {r['ess_per_evaluation']:.3f}"
+        if not r["converged"]:
+            line = (
+                f"not converged (divergences {r.get('divergences')}, R-hat {r.get('r_hat')}, ESS {r.get('ess', 0):.0f})"
+            )
+    print(f"  {name:32s} {line}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+"""What a likelihood evaluation costs: against readings, holds, experiments and effects; memory; its share of a fit.
+
+    python -m analyses.benchmarks.cost --output out/benchmarks
+
+Times are of processor, the least of several interleaved repeats; costs are printed as ratios to the first row.
+"""
+
+import argparse
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+
+from wirebayes.bayes import coordinates
+from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.fit import fit
+from wirebayes.bayes.problem import build
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.experiment import Experiment, Hold
+from wirebayes.output import write_json
+from wirebayes.paper import experiments
+
+BATCH, REPEATS = 256, 7
+
+
+def staircase(holds, readings, name="made"):
+    """An experiment of equal steps; the readings' values do not matter for the time."""
+    times = np.linspace(0.0, 120.0, readings)
+    return Experiment(
+        name=name, material="line", length_mm=1000.0, resolution_N=0.01, source=Path("made"),
+        holds=tuple(Hold(number=j + 1, displacement_mm=1.0 + 10.0 * j / holds, duration_s=120.0, time_s=times,
+                         tension_N=5.0 + 10.0 * j / holds + np.exp(-times / 30.0)) for j in range(holds)),
+    )  # fmt: skip
+
+
+def timed(problems, seed=0):
+    """Per problem: microseconds of processor per evaluation in batches of 256, and bytes at the peak of one batch."""
+    prepared = []
+    for problem in problems:
+        theta = problem.prior.rvs(BATCH, np.random.default_rng(seed))
+        problem.log_likelihood(theta)
+        tracemalloc.start()
+        problem.log_likelihood(theta)
+        prepared.append((problem, theta, tracemalloc.get_traced_memory()[1]))
+        tracemalloc.stop()
+    best = np.full(len(problems), np.inf)
+    for _ in range(REPEATS):
+        for i, (problem, theta, _) in enumerate(prepared):
+            began, calls = time.process_time(), 0
+            while time.process_time() - began < 0.02:
+                problem.log_likelihood(theta)
+                calls += 1
+            best[i] = min(best[i], (time.process_time() - began) / calls)
+    return [(1e6 * b / BATCH, peak) for b, (_, _, peak) in zip(best, prepared, strict=True)]
+
+
+def growth(title, sizes, problems):
+    """Print and return the cost against a size; the last column is cost over size, relative to the largest."""
+    found = timed(problems)
+    print(f"\n{title:>14s} {'us/evaluation':>14s} {'ratio':>8s} {'ratio/size':>11s} {'MB a batch':>11s}")
+    rows = []
+    for size, (cost, peak) in zip(sizes, found, strict=True):
+        per = (cost / found[-1][0]) / (size / sizes[-1])
+        rows.append({"size": size, "us": cost, "ratio": cost / found[0][0], "per_size": per, "peak_bytes": peak})
+        print(f"{size:14d} {cost:14.2f} {cost / found[0][0]:8.2f} {per:11.2f} {peak / 1e6:11.2f}", flush=True)
+    return rows
+
+
+def share_in_likelihood(problem, seed):
+    """Share of a fit's processor time within the likelihood, within the target around it, and elsewhere."""
+    spent = {"likelihood": 0.0, "target": 0.0}
+    kind, likelihood, target = type(problem), type(problem).log_likelihood, coordinates.Target.__call__
+
+    def watch(function, key):
+        def watched(*given):
+            began = time.process_time()
+            try:
+                return function(*given)
+            finally:
+                spent[key] += time.process_time() - began
+
+        return watched
+
+    kind.log_likelihood, Target.__call__ = watch(likelihood, "likelihood"), watch(target, "target")
+    try:
+        began = time.process_time()
+        fit(problem, seed)
+        whole = time.process_time() - began
+    finally:
+        kind.log_likelihood, Target.__call__ = likelihood, target
+    return {"fit_cpu_s": whole, "likelihood": spent["likelihood"] / whole,
+            "coordinates_and_prior": (spent["target"] - spent["likelihood"]) / whole,
+            "sampler": 1.0 - spent["target"] / whole}  # fmt: skip
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    out = {}
+    sizes = [5, 15, 50, 150, 500]
+    out["readings"] = growth("readings a hold", sizes, [build([staircase(12, r)]) for r in sizes])
+    sizes = [5, 15, 50, 200]
+    out["holds"] = growth("holds", sizes, [build([staircase(h, 5)]) for h in sizes])
+    sizes = [1, 5, 20, 200]
+    out["experiments"] = growth(
+        "experiments", sizes, [build([staircase(12, 5, f"made-{i}") for i in range(e)]) for e in sizes]
+    )
+    wire = experiments()[0]
+    singles = [k for k in CATALOGUE if "@" not in k and _plain(k)]
+    print("\neffect: cost over that of no effect")
+    found = timed([build([wire])] + [build([wire], [named(k)]) for k in singles])
+    out["effects"] = {k: cost / found[0][0] for k, (cost, _) in zip(["none", *singles], found, strict=True)}
+    for key, ratio in out["effects"].items():
+        print(f"  {key:28s} {ratio:6.2f}")
+    print("\nshare of a fit")
+    out["share"] = {}
+    for likelihood in ("chain", "hold"):
+        out["share"][likelihood] = share = share_in_likelihood(build([wire], likelihood=likelihood), 0)
+        print(f"  {wire.name}, {likelihood}: " + ", ".join(f"{k} {v:.2f}" for k, v in share.items()), flush=True)
+    write_json(options.output / "cost.json", out)
+
+
+def _plain(key):
+    try:
+        named(key)
+    except Exception:  # effects that want a hold or a parameter named
+        return False
+    return True
+
+
+if __name__ == "__main__":
+    main()
