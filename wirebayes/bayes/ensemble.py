@@ -67,7 +67,7 @@ class Policy:
     most_rounds: int = 6
     tail: float = 4.0
     acceptance: float = 0.05
-    components: int = 4
+    components: int = 8
     block: int = 40
     most_steps: int = 4000
 
@@ -237,7 +237,8 @@ def _moves(state: _State) -> list[tuple[Any, float]]:
     evolution = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DEMove(gamma0=1.0), 0.2)]
     if not state.learned:
         return evolution
-    return [(IndependenceMove(state.proposal), 1.0 - _EVOLUTION), (evolution[0][0], _EVOLUTION)]
+    share = _EVOLUTION if state.frozen else _EXPLORATION
+    return [(IndependenceMove(state.proposal), 1.0 - share), (evolution[0][0], share)]
 
 
 def _advance(target: Target, state: _State, policy: Policy, i: int, steps: int, moves: Any) -> Any:
@@ -256,10 +257,11 @@ def _burn_in_round(target: Target, state: _State, policy: Policy) -> None:
     tails, acceptance, weights = [], [], []
     moves = _moves(state)
     steps = policy.round_steps * 2 ** int(np.clip(state.round - policy.rounds + 1, 0, 2))
+    forgotten = steps // 2 if state.round == 0 else 0
     for i in range(policy.ensembles):
         sampler, _ = _advance(target, state, policy, i, steps, moves)
-        tail = sampler.get_chain(discard=steps // 2, flat=True)
-        weights.append(sampler.get_log_prob(discard=steps // 2, flat=True) - state.proposal.log_density(tail))
+        tail = sampler.get_chain(discard=forgotten, flat=True)
+        weights.append(sampler.get_log_prob(discard=forgotten, flat=True) - state.proposal.log_density(tail))
         tails.append(tail)
         acceptance.append(sampler.acceptance_fraction.mean())
     state.round += 1
@@ -382,5 +384,6 @@ def describe(policy: Policy) -> dict[str, Any]:
 
 _OVERDISPERSED = 1.7
 _GOOD_ACCEPTANCE = 0.25
-_EVOLUTION = 0.15  # share of steps that do not trust the proposal
-_SAFETY = 0.15  # share of the proposal that does not trust its fit
+_EXPLORATION = 0.4  # the same in burn-in, whose draws should reach the tails for the proposal to learn them
+_EVOLUTION = 0.1  # share of steps that do not trust the proposal
+_SAFETY = 0.1  # share of the proposal that does not trust its fit
