@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,6 +116,17 @@ def test_effect_options_name_hold_and_amplitude():
     effect, chosen = effect_option("grip_slip@7.w=.2")
     assert (effect.key, chosen) == ("grip_slip@7", {"grip_slip.w": 0.2})
     assert effect_option("memory")[1] == {}
+
+
+def test_an_effect_of_ones_own_is_written_into_the_readings(tmp_path):
+    own = str(Path(__file__).parent.parent / "docs" / "own_effect.py")
+    wire = ["--parameter", "sensor_sd=1e-6", "--parameter", "setting_sd=1e-6", "--parameter", "k1=700"]
+    for name, p in (("plain", "0"), ("power", "0.5")):
+        options = ["--own-effects", own, "--effect", f"power_strain.p={p}", *wire]
+        assert main(["simulate", "--output", str(tmp_path / name), *options]) == 0
+    plain, power = (read_experiments(tmp_path / name / "experiments.toml")[0].tension() for name in ("plain", "power"))
+    assert (power[-1, 0] / plain[-1, 0]) > 2.0  # strains well above 0.001
+    assert main(["simulate", "--output", str(tmp_path / "no"), "--effect", "power_strain.p=1"]) == 2
 
 
 def test_the_experiment_file_is_plain_toml(tmp_path):

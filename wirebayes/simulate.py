@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.problem import Problem, Sample, build, with_readings
 from wirebayes.bayes.replicate import rounded
-from wirebayes.effects import named
+from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment
 from wirebayes.output import write_csv, write_json, write_text
@@ -176,8 +176,13 @@ def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: 
     return made
 
 
-def effect_option(text: str) -> tuple[Effect, dict[str, float]]:
+def effect_option(text: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> tuple[Effect, dict[str, float]]:
     """An effect and the amplitude given with it, from ``NAME``, ``NAME.p=VALUE`` or ``NAME@HOLD.p=VALUE``.
+
+    Parameters
+    ----------
+    text : str
+    known : mapping of name to effect class, optional
 
     Raises
     ------
@@ -186,12 +191,12 @@ def effect_option(text: str) -> tuple[Effect, dict[str, float]]:
     """
     left, equals, value = text.partition("=")
     if not equals:
-        return named(text), {}
+        return named(text, known), {}
     key, _, parameter = left.rpartition(".")
-    effect = named(key or left)
-    known = [amplitude.name for amplitude in effect.amplitudes]
-    if parameter not in known:
-        raise InputError(f"--effect {text}: {effect.name} has no amplitude {parameter!r}; it has {', '.join(known)}")
+    effect = named(key or left, known)
+    own = [amplitude.name for amplitude in effect.amplitudes]
+    if parameter not in own:
+        raise InputError(f"--effect {text}: {effect.name} has no amplitude {parameter!r}; it has {', '.join(own)}")
     return effect, {f"{effect.name}.{parameter}": number(f"--effect {text}", value)}
 
 

@@ -7,8 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import typer
@@ -26,7 +24,7 @@ class Command(NamedTuple):
     example: str
 
 
-_ALL = {
+COMMANDS = {
     "reproduce": Command(
         "wirebayes.cli.reproduce",
         "reproduce",
@@ -88,15 +86,6 @@ _ALL = {
         "wirebayes report out/reproduce",
     ),
 }
-
-
-def _written(command: Command) -> bool:
-    spec = find_spec(command.module)
-    return spec is not None and f"def {command.function}(" in Path(spec.origin or "").read_text(encoding="utf-8")
-
-
-# a command that has not been written yet is not offered
-COMMANDS = {name: command for name, command in _ALL.items() if _written(command)}
 
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

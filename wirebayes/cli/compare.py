@@ -1,7 +1,6 @@
 """`wirebayes compare`: laws, histories, likelihoods and effects side by side."""
 
 import json
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,13 +12,11 @@ from wirebayes.cli.options import (
     HistoryOption,
     LikelihoodOption,
     Output,
+    OwnEffects,
     Seed,
     TrainHolds,
 )
 
-OwnEffects = Annotated[
-    Path | None, typer.Option("--own-effects", metavar="FILE.py", help="A Python file with effects of your own.")
-]
 Only = Annotated[
     list[str] | None,
     typer.Option("--only", metavar="NAME", help="Only this model beside the plain one; may be repeated."),

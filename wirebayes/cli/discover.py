@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wirebayes.cli.fit import OwnEffects
 from wirebayes.cli.options import (
     ElasticLawOption,
     ExperimentFile,
     ExperimentName,
     HistoryOption,
     Output,
+    OwnEffects,
     Seed,
     TrainHolds,
 )

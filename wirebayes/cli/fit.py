@@ -2,7 +2,6 @@
 
 import json
 import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,13 +13,10 @@ from wirebayes.cli.options import (
     HistoryOption,
     LikelihoodOption,
     Output,
+    OwnEffects,
     Seed,
     TrainHolds,
 )
-
-OwnEffects = Annotated[
-    Path | None, typer.Option("--own-effects", metavar="FILE.py", help="A Python file with effects of your own.")
-]
 
 
 def fit(

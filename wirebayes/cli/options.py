@@ -32,3 +32,6 @@ HistoryOption = Annotated[
 LikelihoodOption = Annotated[
     Literal["chain", "hold"], typer.Option("--likelihood", help="The holds as one history, or every hold by itself.")
 ]
+OwnEffects = Annotated[
+    Path | None, typer.Option("--own-effects", metavar="FILE.py", help="A Python file with effects of your own.")
+]

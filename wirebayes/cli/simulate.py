@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import ElasticLawOption, HistoryOption, Output, Seed
+from wirebayes.cli.options import ElasticLawOption, HistoryOption, Output, OwnEffects, Seed
 
 
 def simulate(
@@ -34,11 +34,13 @@ def simulate(
         list[str] | None,
         typer.Option("--effect", metavar="NAME.p=VALUE", help="As strain_stiffening.c=12 or grip_slip@7.w=0.2."),
     ] = None,
+    own_effects: OwnEffects = None,
     elastic_law: ElasticLawOption = "hooke",
     history: HistoryOption = "saturating",
 ) -> None:
     """Write synthetic tests: DIR/experiments.toml, a CSV for each test, and DIR/truth.json."""
     from wirebayes import __version__
+    from wirebayes.effects import catalogue
     from wirebayes.errors import InputError
     from wirebayes.output import check_run, open_run
     from wirebayes.simulate import Bench, Truth, draw, effect_option, number, write
@@ -48,8 +50,9 @@ def simulate(
         name, _, value = text.partition("=")
         chosen[name] = number(f"--parameter {text}", value)
     effects = {}
+    known = catalogue(own_effects)
     for text in effect or ():
-        found, amplitudes = effect_option(text)
+        found, amplitudes = effect_option(text, known)
         effects[found.key] = found
         chosen |= amplitudes
     path = _numbers("--displacements", displacements)
@@ -77,6 +80,7 @@ def simulate(
         "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
         "displacements_mm": path, "times_s": moments, "unrecorded": sorted(gaps), "temperatures_C": warmth,
         "resolution_N": resolution, "parameters": chosen, "effects": list(effects),
+        "own_effects": own_effects.read_text() if own_effects else None,
         "elastic_law": elastic_law, "history": history,
     }  # fmt: skip
     if check_run(output, configuration) == "new":
