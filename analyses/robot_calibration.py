@@ -125,7 +125,7 @@ def main():
     options = parser.parse_args()
     rng = np.random.default_rng(7)
     if options.wires:
-        from wirebayes.cli.robot import read_wires
+        from wirebayes.cli.wires import read_wires
 
         line = read_wires(options.wires, 1000)
     else:

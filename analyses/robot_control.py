@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.cli.robot import read_wires
+from wirebayes.cli.wires import read_wires
 from wirebayes.robot import control, draws, inverse, schema
 from wirebayes.robot.creep import HoldCreep, fresh
 

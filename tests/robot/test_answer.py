@@ -3,7 +3,8 @@ import numpy as np
 from wirebayes.output import plain
 from wirebayes.report import robot as pictures
 from wirebayes.robot import draws, schema
-from wirebayes.robot.answer import Question, answer, band
+from wirebayes.robot.answer import answer
+from wirebayes.robot.question import Question, band
 
 TIMES = np.array([0.0, 60.0])
 
@@ -18,10 +19,11 @@ def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
     robot = schema.read("cogiro-desk")
     asked = Question(robot.home_m, np.eye(3), TIMES)
-    content, courses = answer(robot, _line(40, 3.0, "modified"), asked)
+    found = answer(robot, _line(40, 3.0, "modified"), asked)
+    content = found.content
     assert not content["feasible"]
     assert "cannot pull" in content["sentence"]
-    pictures.save_pose(tmp_path, robot, asked, content, courses)
+    pictures.save_pose(tmp_path, robot, asked, found)
     assert not list(tmp_path.iterdir())
     plain(content)
 
@@ -31,20 +33,21 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
     both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
     asked = Question(robot.home_m, np.eye(3), TIMES)
-    content, courses = answer(robot, draws.WireDraws(both, 1000.0, "modified"), asked)
+    found = answer(robot, draws.WireDraws(both, 1000.0, "modified"), asked)
+    content = found.content
     assert content["feasible_draws"] == 0.5
     assert content["forward"]["solved"] == 0.5
     assert [entry["solved"] for entry in content["drift"]] == [0.5, 0.5]
-    alone, _ = answer(robot, strong, asked)
+    alone = answer(robot, strong, asked).content
     wanted = alone["drift"][0]["distance_mm"]["mean"]
     np.testing.assert_allclose(content["drift"][0]["distance_mm"]["mean"], wanted, rtol=1e-9)
-    pictures.save_pose(tmp_path, robot, asked, content, courses)
+    pictures.save_pose(tmp_path, robot, asked, found)
     assert (tmp_path / "drift.png").exists()
 
 
 def test_one_draw_is_enough():
     robot = schema.read("hangprinter-4")
-    content, _ = answer(robot, _line(1, 5000.0), Question(robot.home_m, np.eye(3), TIMES))
+    content = answer(robot, _line(1, 5000.0), Question(robot.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["solved"] == 1.0
     assert "sentence" in content["variance_shares"]
 
@@ -59,7 +62,7 @@ def test_given_wires_have_no_uncertainty_and_keep_their_leg():
     assert wires.theta["k1"].shape == (6, 20)
     np.testing.assert_array_equal(wires.theta["k1"][0], 5e4)
     np.testing.assert_array_equal(wires.theta["k1"][1], wires.theta["k1"][5])
-    content, _ = answer(mixed, _line(20, 800.0), Question(mixed.home_m, np.eye(3), TIMES))
+    content = answer(mixed, _line(20, 800.0), Question(mixed.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["largest_round_trip_error_m"] < 1e-9
 
 

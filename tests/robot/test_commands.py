@@ -29,7 +29,7 @@ def fitted(tmp_path, monkeypatch):
         Sample("made-up", "made up", PROTOCOL, np.array([[0.85, 0.8], [7.65, 7.3]])[..., None], 0.01, Model()),
         "chain",
     )
-    monkeypatch.setattr("wirebayes.bayes.result.load", lambda folder, experiment=None: stored)
+    monkeypatch.setattr("wirebayes.bayes.result.load", lambda folder, experiment=None, own_effects=None: stored)
     folder = tmp_path / "fit"
     folder.mkdir()
     (folder / "posterior.nc").write_bytes(b"made up")

@@ -1,19 +1,20 @@
 """The robot's commands: `pose`, `calibrate` and `export`."""
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from wirebayes.cli.options import ExperimentName, Output, Seed
-
-if TYPE_CHECKING:
-    from wirebayes.bayes.result import Stored
-    from wirebayes.robot.draws import WireDraws
+from wirebayes.cli.options import ExperimentName, Output, OwnEffects, Seed
+from wirebayes.cli.wires import numbers, read_wires, rising_times
 
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
 Wires = Annotated[Path, typer.Option("--wires", metavar="FOLDER", help="A folder with a posterior.nc.")]
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
+
+
+POSTERIOR = "posterior.nc"
 
 
 def pose(
@@ -23,33 +24,49 @@ def pose(
     position: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Pose in metres; default: the file's.")] = None,
     rotation: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Rotation vector in radians.")] = None,
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")] = "0,10,30,60,120,300,600,1800,3600",
+    tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Pose error that is allowed.")] = 0.3,
+    tolerance_tilt: Annotated[
+        float, typer.Option("--tolerance-tilt", metavar="DEG", help="Rotation that is allowed.")
+    ] = 0.055,
+    told: Annotated[
+        Path | None,
+        typer.Option("--told", metavar="FOLDER", help="Another fit of the wire, told to one more controller."),
+    ] = None,
     draws: Draws = 1000,
     experiment: ExperimentName = None,
+    own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
-    """Kinematics with creeping wires, drift and pose error with bands."""
+    """Kinematics with creeping wires, drift and pose error with bands.
+
+    Give the final fit of discover as --wires and its plain one as --told to see what the effects are worth.
+    """
     from wirebayes.robot import schema
 
     machine = schema.read(robot)
-    line = read_wires(wires, draws, experiment)
-    where = machine.home_m if position is None else _numbers("--position", position, 3)
-    turn = machine.home_rotation_rad if rotation is None else _numbers("--rotation", rotation, 3)
-    moments = _times(times)
+    line = read_wires(wires, draws, experiment, own_effects)
+    where = machine.home_m if position is None else numbers("--position", position, 3)
+    turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
+    moments = rising_times(times)
+    _above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
+    other = read_wires(told, draws, experiment, own_effects) if told else None
 
     from wirebayes.output import open_run, write_json
     from wirebayes.report import robot as pictures
-    from wirebayes.robot.answer import Question, answer
+    from wirebayes.robot.answer import answer
+    from wirebayes.robot.question import Question
     from wirebayes.robot.rotation import matrix
 
-    asked = Question(where, matrix(turn), moments, seed=seed)
-    run = open_run(output, _configuration("pose", robot, wires, draws, seed, experiment, position, rotation, times))
+    asked = Question(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), seed)
+    options = (experiment, position, rotation, times, tolerance, tolerance_tilt, told and _content(told / POSTERIOR))
+    run = open_run(output, _configuration("pose", robot, wires, draws, seed, own_effects, *options))
     if run.state == "done":
         return
-    content, courses = answer(machine, line, asked)
-    write_json(run.directory / "pose.json", content)
-    pictures.save_pose(run.directory, machine, asked, content, courses)
+    found = answer(machine, line, asked, other)
+    write_json(run.directory / "pose.json", found.content)
+    pictures.save_pose(run.directory, machine, asked, found)
     run.finish()
-    for warning in content.get("warnings", []):
+    for warning in found.content.get("warnings", []):
         typer.echo(f"warning: {warning}", err=True)
 
 
@@ -66,6 +83,7 @@ def calibrate(
     spread: Annotated[float, typer.Option("--specimen-spread", help="Relative, from wire to wire of one line.")] = 0.05,
     draws: Draws = 1000,
     experiment: ExperimentName = None,
+    own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
     """Current zero-tension length of every wire from joint values and tensions, no external sensor needed."""
@@ -75,16 +93,14 @@ def calibrate(
     from wirebayes.robot.calibration_answer import answer
     from wirebayes.robot.session import Prior
 
-    for name, value in (("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd)):
-        if not 0 < value < float("inf"):
-            raise InputError(f"{name}: found {value:g}; expected a finite number above 0")
+    _above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd))
     if not 0 <= spread < 1:
         raise InputError(f"--specimen-spread: found {spread:g}; expected a number from 0 to 1")
     machine = schema.read(robot)
     session, values = session_file.read(readings, machine, tension_sd, tilt_sd)
-    line = read_wires(wires, draws, experiment)
+    line = read_wires(wires, draws, experiment, own_effects)
     options = (experiment, tension_sd, tilt_sd, reference_sd, spread, _content(readings))
-    run = open_run(output, _configuration("calibrate", robot, wires, draws, seed, *options))
+    run = open_run(output, _configuration("calibrate", robot, wires, draws, seed, own_effects, *options))
     if run.state == "done":
         return
     prior = Prior(line, 1e-3 * reference_sd, spread)
@@ -100,6 +116,7 @@ def export(
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times of the creep table, s.")] = "60,600,3600,86400",
     draws: Draws = 1000,
     experiment: ExperimentName = None,
+    own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
     """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
@@ -114,11 +131,13 @@ def export(
     from wirebayes.robot.rotation import matrix
 
     machine = schema.read(robot)
-    loads, moments = _numbers("--tensions", tensions), _times(times)
+    loads, moments = numbers("--tensions", tensions), rising_times(times)
     if loads.min() <= 0:
         raise InputError(f"--tensions: found {tensions!r}; expected numbers above 0")
-    line = read_wires(wires, draws, experiment)
-    run = open_run(output, _configuration("export", robot, wires, draws, seed, experiment, tensions, times))
+    line = read_wires(wires, draws, experiment, own_effects)
+    run = open_run(
+        output, _configuration("export", robot, wires, draws, seed, own_effects, experiment, tensions, times)
+    )
     if run.state == "done":
         return
     write_csv(run.directory / "creep-table.csv", files.TABLE, files.creep_table(machine, line, loads, moments))
@@ -135,62 +154,17 @@ def export(
     run.finish()
 
 
-def read_wires(folder: Path, count: int, experiment: str | None = None) -> "WireDraws":
-    """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
-    from wirebayes.bayes.result import load
-
-    return wire_draws(load(folder, experiment), count)
-
-
-def wire_draws(stored: "Stored", count: int) -> "WireDraws":
-    """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
-    import numpy as np
-
-    from wirebayes.robot.draws import CORE, PLACES, WireDraws
-
-    sample = stored.sample
-    effects = tuple(sample.model.effects)
-    names = [*CORE, *(c for e in effects if e.scope == "material" and e.place in PLACES for c in e.columns())]
-    pick = np.unique(np.linspace(0, len(stored.draws["k1"]) - 1, count).round().astype(int))
-    protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
-    return WireDraws(
-        {name: stored.draws[name][pick] for name in names},
-        protocol.length_mm,
-        sample.model.law,
-        sample.model.history,
-        effects,
-        (float(readings.min()), float(readings.max())),
-        (0.0, float(protocol.duration_s.max())),
-        sample.model.tension_ref_N,
-    )
-
-
-def _numbers(option: str, text: str, count: int | None = None) -> Any:
-    import numpy as np
-
+def _above_zero(*options: tuple[str, float]) -> None:
     from wirebayes.errors import InputError
 
-    try:
-        values = np.array([float(word) for word in text.split(",")])
-    except ValueError:
-        values = np.array([np.nan])
-    if not np.isfinite(values).all() or (count is not None and len(values) != count):
-        raise InputError(f"{option}: found {text!r}; expected {count or 'some'} finite numbers separated by commas")
-    return values
+    for name, value in options:
+        if not 0 < value < float("inf"):
+            raise InputError(f"{name}: found {value:g}; expected a finite number above 0")
 
 
-def _times(text: str) -> Any:
-    import numpy as np
-
-    from wirebayes.errors import InputError
-
-    values = _numbers("--times", text)
-    if values[0] < 0 or np.any(np.diff(values) <= 0):
-        raise InputError(f"--times: found {text!r}; expected rising times from 0 on")
-    return values
-
-
-def _configuration(command: str, robot: str, wires: Path, draws: int, seed: int, *rest: Any) -> dict[str, Any]:
+def _configuration(
+    command: str, robot: str, wires: Path, draws: int, seed: int, own_effects: Path | None, *rest: Any
+) -> dict[str, Any]:
     """Everything that decides the results; files by their content, not by where they lie."""
     from wirebayes import __version__
 
@@ -198,7 +172,8 @@ def _configuration(command: str, robot: str, wires: Path, draws: int, seed: int,
         "command": command,
         "version": __version__,
         "robot": _content(Path(robot)),
-        "wires": _content(wires / "posterior.nc"),
+        "wires": _content(wires / POSTERIOR),
+        "own_effects": own_effects and own_effects.read_text(encoding="utf-8"),
         "draws": draws,
         "seed": seed,
         "options": list(rest),

@@ -7,16 +7,27 @@ from wirebayes.report.blocks import (
     Block,
     Columns,
     Page,
+    Picture,
     Pictures,
     Points,
     Section,
     Table,
     Text,
+    embedded,
     number,
-    pictures_in,
     span,
 )
 from wirebayes.report.page import read_json
+from wirebayes.report.robot import CONTROLLERS
+
+_CAPTIONS = {
+    "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
+    "drift": "How far the platform moves while the actuators stand still. Line: median, band: 90 % of the draws.",
+    "rotation": "How far it turns. A symmetric pose turns only because specimens of one line differ.",
+    "pose-error": "Distance from the pose under controllers that know more and more of the wires, specimens alike.",
+    "error-budget": "Whose uncertainty makes the drift uncertain.",
+    "workspace": "A level platform at other places, wires new. White with a cross: no tensions within bounds hold it.",
+}
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -25,9 +36,12 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     blocks: list[Block] = [Columns([_asked(pose), *_answers(pose)])]
     if not pose.get("feasible", True):
         blocks.insert(0, Text("No tensions within the stated bounds hold the platform at this pose.", strong=True))
-    pictures = pictures_in(folder)
+    files = {name: folder / f"{name}.png" for name in _CAPTIONS}
+    pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p.is_file()]
     sections = [Section("In a minute", blocks), Section("Pictures", [Pictures(pictures)] if pictures else [])]
-    sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose)), Section("Doubts", _doubts(pose))]
+    sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
+    sections += [Section("Between calibrations", _between(pose)), Section("Doubts", _doubts(pose))]
+    sections += [Section("How many equilibria", _equilibria(pose))]
     lead = "A platform on wires that creep: the pose it was sent to, and where it will be."
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
 
@@ -38,7 +52,13 @@ def _asked(pose: dict[str, Any]) -> Points:
     points = [f"Platform of {pose['mass_kg']:g} kg at ({place}) m."]
     if wires:
         tested = f"{wires['tested_length_mm']:g} mm"
-        points.append(f"Wires known from {wires['draws']} posterior draws of a sample of {tested}.")
+        effects = wires["effects"]
+        model = f"the plain model with {', '.join(effects).replace('_', ' ')}" if effects else "the plain model"
+        points.append(f"Wires known from {wires['draws']} posterior draws of a sample of {tested}: {model}.")
+        if pose.get("inverse"):
+            low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
+            rule = pose["tension_distribution"]["choice"].replace("_", " ")
+            points.append(f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N.")
     return Points("What was asked", points)
 
 
@@ -57,6 +77,11 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
         for entry in claim["holds"]:
             spread, chance = f"{100 * entry['specimen_spread']:g} %", number(entry["probability"], 2)
             known.append(f"It moves {limits} within {claim['time_s']:g} s: probability {chance} (spread {spread}).")
+    space = pose.get("workspace")
+    if space:
+        moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
+        chance = number(space["probability"], 2)
+        known.append(f"Over the whole workspace {claim['time_s']:g} s move it {moved}; probability {chance}.")
     loose += [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
     loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
     return [Points("What is known", known or ["Nothing: the pose is not held."]), Points("What is not", loose)]
@@ -79,13 +104,35 @@ def _drift(pose: dict[str, Any]) -> list[Block]:
 def _errors(pose: dict[str, Any]) -> list[Block]:
     lines = []
     for entry in pose.get("pose_error", []):
-        if entry["distance_mm"]["q50"]:
-            low, middle, high = (entry["distance_mm"][q][-1] for q in ("q05", "q50", "q95"))
-            within = entry.get("longest_time_within_s")
-            who = [entry["controller"].replace("_", " "), f"{100 * entry['specimen_spread']:g} %"]
-            lines.append([*who, f"{entry['times_s'][-1]:g}", number(middle), span(low, high), number(within)])
+        for i, time in enumerate(entry["times_s"]):
+            if not entry["distance_mm"]["q50"] or time not in (60, 600, entry["times_s"][-1]):
+                continue
+            low, middle, high = (entry["distance_mm"][q][i] for q in ("q05", "q50", "q95"))
+            who = [CONTROLLERS[entry["controller"]], f"{100 * entry['specimen_spread']:g} %"]
+            lines.append([*who, f"{time:g}", number(middle), span(low, high), _lasts(entry)])
     header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %", "longest time within tolerance, s"]
-    return [Table(header, lines)] if lines else []
+    return [Table(header, lines, _limits(pose["pose_error"][0]))] if lines else []
+
+
+def _between(pose: dict[str, Any]) -> list[Block]:
+    lines = []
+    for entry in pose.get("between_calibrations", []):
+        loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
+        spread = f"{100 * entry['specimen_spread']:g} %"
+        lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _lasts(entry)])
+    header = ["controller", "specimen spread", "under load before", "longest time between calibrations, s"]
+    told = "The pose is exact when a calibration ends. " + (_limits(pose["between_calibrations"][0]) if lines else "")
+    return [Table(header, lines, told)] if lines else []
+
+
+def _limits(entry: dict[str, Any]) -> str:
+    allowed = f"{entry['tolerance_mm']:g} mm and {entry['tolerance_deg']:.3g}°"
+    return f"Within tolerance: less than {allowed} with a probability of 95 %, at every time before."
+
+
+def _lasts(entry: dict[str, Any]) -> str:
+    longest = number(float(entry["longest_time_within_s"]))
+    return f"more than {longest}" if entry["still_within_at_the_end"] else longest
 
 
 def _doubts(pose: dict[str, Any]) -> list[Block]:
@@ -95,3 +142,19 @@ def _doubts(pose: dict[str, Any]) -> list[Block]:
     lines = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
     caption = f"Which parameter the variance of the drift after {pose['variance_shares']['time_s']:g} s comes from."
     return [Table(["parameter", "share"], lines, caption)]
+
+
+def _equilibria(pose: dict[str, Any]) -> list[Block]:
+    found = pose.get("equilibria")
+    if not found:
+        return []
+    count = found["stable_found"]
+    many = "one stable equilibrium" if count == 1 else f"{count} stable equilibria"
+    text = f"From {found['starts']} starts the mean wire's lengths lead to {many}."
+    proof = pose["certificate"]
+    if proof.get("sentence"):
+        return [Text(f"{text} {proof['sentence']}")]
+    if not proof["proved"]:
+        return [Text(f"{text} Interval arithmetic could not prove that the one shown is alone.")]
+    alone = f"{number(1e3 * proof['alone_within_m'])} mm"
+    return [Text(f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose.")]

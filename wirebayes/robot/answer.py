@@ -6,52 +6,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot import control, draws, drift, forward, inverse, shares
+from wirebayes.robot import acting, claim, control, draws, drift, forward, inverse, shares
 from wirebayes.robot import rotation as turning
 from wirebayes.robot.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.description import Robot
 from wirebayes.robot.draws import WireDraws
+from wirebayes.robot.question import SPREADS, Question, band
 from wirebayes.robot.wires import Wires
 
 Floats = NDArray[np.float64]
-SPREADS = (0.0, 0.05)
-QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+_GRID, _MAP_DRAWS = (7, 7, 3), 60
 
 
 @dataclass(frozen=True)
-class Question:
-    """What is asked.
+class Answer:
+    """What `pose` found.
 
     Attributes
     ----------
-    position_m : (3,) array
-    rotation : (3, 3) array
-    times_s : (t,) array
-        Rising, the first zero.
-    tolerance_m, tolerance_rad : float
-        Of the pose, for the longest time between calibrations.
-    seed : int
+    content : dict
+        The content of ``pose.json`` (arrays not yet lists).
+    courses : dict of specimen spread to Course
+        The drifts, for pictures; empty when the pose cannot be held.
+    workspace : WorkspaceDrift or None
+        A minute's drift over the workspace, for its map.
     """
 
-    position_m: Floats
-    rotation: Floats
-    times_s: Floats
-    tolerance_m: float = DISTANCE_M
-    tolerance_rad: float = TILT_RAD
-    seed: int = 0
+    content: dict[str, Any]
+    courses: dict[float, drift.Course]
+    workspace: claim.WorkspaceDrift | None = None
 
 
-def band(values: Floats) -> dict[str, Any]:
-    """Mean, sd and quantiles over the first axis (the draws); NaN draws are left out."""
-    good = values[np.isfinite(values).all(axis=tuple(range(1, values.ndim)))]
-    if not len(good):
-        return dict.fromkeys(("mean", "sd", *QUANTILES), None)
-    quantiles = np.quantile(good, list(QUANTILES.values()), axis=0)
-    named = dict(zip(QUANTILES, quantiles, strict=True))
-    return {"mean": good.mean(0), "sd": good.std(0)} | named
-
-
-def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, Any], dict[float, drift.Course]]:
+def answer(robot: Robot, line: WireDraws, asked: Question, other: WireDraws | None = None) -> Answer:
     """Inverse and forward kinematics, drift, pose error and where it comes from.
 
     Parameters
@@ -59,13 +45,12 @@ def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, An
     robot : Robot
     line : WireDraws
     asked : Question
+    other : WireDraws, optional
+        Another fit of the same line, told to one more controller.
 
     Returns
     -------
-    dict
-        The content of ``pose.json`` (arrays not yet lists).
-    dict of specimen spread to Course
-        The drifts, for pictures.
+    Answer
     """
     rng = np.random.default_rng(asked.seed)
     shared = draws.for_robot(robot, line)
@@ -91,12 +76,13 @@ def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, An
         "feasible": bool(np.isfinite(tau).all()),
     }  # fmt: skip
     if not content["feasible"]:
-        return content | {"sentence": "No tensions within the bounds hold the platform at this pose."}, {}
+        return Answer(content | {"sentence": "No tensions within the bounds hold the platform at this pose."}, {})
     told = inverse.commands(robot, shared, x[None], R[None], tau)
     content["feasible_draws"] = float(told.feasible.mean())
     if not told.feasible.any():
         content["feasible"] = False
-        return content | {"sentence": "These wires cannot pull as hard as the pose asks, however far stretched."}, {}
+        said = "These wires cannot pull as hard as the pose asks, however far stretched."
+        return Answer(content | {"sentence": said}, {})
     content["inverse"] = {
         "tension_N": tau[0],
         "zero_tension_length_m": band(told.zero_m),
@@ -112,10 +98,20 @@ def answer(robot: Robot, line: WireDraws, asked: Question) -> tuple[dict[str, An
         courses[spread] = drift.from_command(robot, wires, x, R, asked.times_s)
         content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))
     content["claim"] = _claim(courses, x, asked)
-    content["pose_error"] = _errors(robot, line, asked, rng)
+    content["pose_error"] = acting.errors(robot, line, asked, rng, other)
+    content["between_calibrations"] = acting.between_calibrations(robot, line, asked, rng)
     content["variance_shares"] = _shares(line, courses, x, R)
     content["warnings"] = draws.warnings(line, tau, float(asked.times_s[-1]), told.zero_m)
-    return content, courses
+    space = _workspace(robot, line)
+    content["workspace"] = claim.summary(space) if space else None
+    return Answer(content, courses, space)
+
+
+def _workspace(robot: Robot, line: WireDraws) -> claim.WorkspaceDrift | None:
+    """A minute's drift of a level platform over the workspace, one draw for all wires of the line."""
+    few = line.part(np.unique(np.linspace(0, line.count - 1, _MAP_DRAWS).round().astype(int)))
+    space = claim.over_workspace(robot, draws.for_robot(robot, few), claim.grid(robot, _GRID))
+    return space if len(space.position_m) else None
 
 
 def _round_trip(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:
@@ -203,30 +199,6 @@ def _claim(courses: dict[float, drift.Course], x: Floats, asked: Question) -> di
             value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]]) < TILT_RAD)).mean())
         probability.append({"specimen_spread": spread, "probability": value})
     return out | {"holds": probability}
-
-
-def _errors(robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Pose error under two controllers told the posterior, and how long each stays within tolerance."""
-    out = []
-    for spread in SPREADS:
-        wires = draws.for_robot(robot, line, spread, rng)
-        told = draws.for_robot(robot, line)
-        for name, build in (("hooke_only", control.hooke_only), ("creep_aware", control.creep_aware)):
-            schedule = build(robot, told, asked.position_m, asked.rotation)
-            error = control.error(robot, wires, schedule, asked.position_m, asked.rotation, asked.times_s)
-            within = control.longest_interval(error, asked.tolerance_m, asked.tolerance_rad)
-            out.append({
-                "specimen_spread": spread,
-                "controller": name,
-                "times_s": error.times_s,
-                "distance_mm": band(1e3 * error.distance_m[error.found]),
-                "rotation_deg": band(np.degrees(error.angle_rad[error.found])),
-                "tolerance_mm": 1e3 * asked.tolerance_m,
-                "tolerance_deg": float(np.degrees(asked.tolerance_rad)),
-                "longest_time_within_s": within if np.isfinite(within) else float(error.times_s[-1]),
-                "still_within_at_the_end": not np.isfinite(within),
-            })  # fmt: skip
-    return out
 
 
 def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: Floats) -> dict[str, Any]:

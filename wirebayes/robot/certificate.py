@@ -106,14 +106,16 @@ def _krawczyk(system: "_Balance", C: Floats, radius: Floats) -> Floats:
     import flint
 
     d = len(radius)
-    point, _ = system.evaluate([flint.arb(0)] * d)
     box = [flint.arb(0, float(r)) for r in radius]
     _, slope = system.evaluate(box)
     precondition = flint.arb_mat(C.tolist())
     eye = flint.arb_mat([[int(i == j) for j in range(d)] for i in range(d)])
-    image = -(precondition * flint.arb_mat([[g] for g in point])) + (eye - precondition * slope) * flint.arb_mat(
-        [[b] for b in box]
-    )
+    image = (eye - precondition * slope) * flint.arb_mat([[b] for b in box])
+    # Wire by wire: an uncertain tension moves all balances together, so it is multiplied in last.
+    weight, pulls = system.at_centre()
+    image -= precondition * weight
+    for wrench, tau in pulls:
+        image -= (precondition * wrench) * tau
     out = [image[i, 0].abs_upper() for i in range(d)]
     return np.array([np.nextafter(float(v), np.inf) if v.is_finite() else np.inf for v in out])
 
@@ -159,8 +161,7 @@ class _Balance:
         if d == 6:
             slope += _block(arb_mat(3, 3), None, _skew(weight, arb) * _skew(c, arb) * by_turn, self.size)
         for i in range(robot.legs):
-            r = _times(turn, robot.platform_m[i], arb)
-            line = [self.x[k] + y[k] + r[k] - arb(float(robot.exit_m[i, k])) for k in range(3)]
+            r, line = self._line(i, y, turn)
             length = _square(line).sqrt()
             m = arb(float(robot.lines[i]))
             tau, stiff = self._tension(i, m * length + self.offset[i])
@@ -179,6 +180,31 @@ class _Balance:
             lever = _skew(r, arb)
             slope += _block(A, A * by_arm, lever * A * by_arm - _skew(pull, arb) * by_arm, self.size, lever * A)
         return (force if d == 3 else force + [v / self.size for v in moment]), slope
+
+    def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
+        """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
+        from flint import arb_mat
+
+        arb, robot = self.arb, self.robot
+
+        def stacked(force: list[Any], arm: list[Any]) -> Any:
+            moment = [] if robot.degrees == 3 else [v / self.size for v in _cross(arm, force)]
+            return arb_mat([[v] for v in [*force, *moment]])
+
+        pulls = []
+        for i in range(robot.legs):
+            r, line = self._line(i, [arb(0)] * 3, self.R)
+            length = _square(line).sqrt()
+            m = arb(float(robot.lines[i]))
+            tau, _ = self._tension(i, m * length + self.offset[i])
+            pulls.append((stacked([-m * a / length for a in line], r), tau))
+        weight = [arb(0), arb(0), -arb(robot.mass_kg) * arb(GRAVITY)]
+        return stacked(weight, _times(self.R, robot.centre_of_mass_m, arb)), pulls
+
+    def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
+        """Platform point from the reference point, and from the exit point."""
+        r = _times(turn, self.robot.platform_m[i], self.arb)
+        return r, [self.x[k] + y[k] + r[k] - self.arb(float(self.robot.exit_m[i, k])) for k in range(3)]
 
     def _tension(self, i: int, S: Any) -> tuple[Any, Any]:
         """Tension and its slope; the hull of taut and slack where both are possible."""

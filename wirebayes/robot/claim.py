@@ -9,6 +9,7 @@ from wirebayes.robot import drift, inverse
 from wirebayes.robot import rotation as turning
 from wirebayes.robot.creep import HoldCreep, fresh
 from wirebayes.robot.description import Robot
+from wirebayes.robot.draws import WireDraws, for_robot
 from wirebayes.robot.wires import Wires
 
 Floats = NDArray[np.float64]
@@ -105,16 +106,14 @@ def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
     return replace(robot, mass_kg=mass_kg, rule=rule, **{name: getattr(robot, name) * factor for name in lengths})
 
 
-def summary(robot: Robot, wires: Wires, position_m: Floats, loaded_s: float = 0.0) -> dict[str, float]:
+def summary(out: WorkspaceDrift) -> dict[str, float]:
     """The claim in numbers: quantiles over workspace and draws, and how probable it is, somewhere and everywhere."""
-    out = over_workspace(robot, wires, position_m, loaded_s=loaded_s)
     inside = (out.distance_m < DISTANCE_M) & (out.tilt_rad < TILT_RAD)
-    quantiles = {
-        f"{name}_q{q:02d}_{unit}": float(np.quantile(value, q / 100))
-        for name, unit, value in (("drift", "mm", 1e3 * out.distance_m), ("tilt", "deg", np.degrees(out.tilt_rad)))
-        for q in (5, 50, 95)
-    }
-    return quantiles | {
+    numbers: dict[str, float] = {}
+    for name, unit, value in (("drift", "mm", 1e3 * out.distance_m), ("tilt", "deg", np.degrees(out.tilt_rad))):
+        low, middle, high = np.nanquantile(value, [0.05, 0.5, 0.95])
+        numbers |= {f"q05_{name}_{unit}": low, f"q50_{name}_{unit}": middle, f"q95_{name}_{unit}": high}
+    return {key: float(value) for key, value in numbers.items()} | {
         "probability": float(inside.mean()),
         "probability_everywhere": float(inside.all(0).mean()),
         "lowest_tension_N": float(out.tension_N.min()),
@@ -122,3 +121,28 @@ def summary(robot: Robot, wires: Wires, position_m: Floats, loaded_s: float = 0.
         "feasible": out.feasible,
         "solved": out.found,
     }
+
+
+def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.05, steps: int = 9) -> float:
+    """Largest platform mass, kg, for which the claim holds with 95 % at nineteen poses of twenty, by bisection.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    size : float
+        Factor on every length of the robot.
+    spread : float
+        From specimen to specimen.
+    steps : int
+        Halvings of the range from 1 g to 20 kg on a logarithmic scale.
+    """
+    low, high = 1e-3, 20.0
+    for _ in range(steps):
+        mass = float(np.sqrt(low * high))
+        other = scaled(robot, size, mass)
+        wires = for_robot(other, line, spread, np.random.default_rng(1))
+        out = over_workspace(other, wires, grid(other, (3, 3, 2)))
+        good = np.mean(out.holds() >= 0.95) >= 0.95
+        low, high = (mass, high) if good else (low, mass)
+    return low

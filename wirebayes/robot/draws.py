@@ -70,9 +70,7 @@ def given(wire: GivenWire) -> WireDraws:
     return WireDraws({k: np.array([v]) for k, v in wire.parameters.items()}, wire.length_mm)
 
 
-def for_robot(
-    robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random.Generator | None = None
-) -> Wires:
+def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random.Generator | None = None) -> Wires:
     """Wires of all legs: one joint draw for all legs of one line, and a spread from specimen to specimen.
 
     Parameters

@@ -25,9 +25,7 @@ def is_hangprinter(robot: Robot) -> bool:
 
 def reprapfirmware(robot: Robot, line: WireDraws) -> str:
     """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
-    anchors = " ".join(
-        f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(LETTERS, robot.exit_m, strict=False)
-    )
+    anchors = " ".join(f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(LETTERS, robot.exit_m, strict=False))
     stretch, mean = _stiffness(line), float(line.parameters["k1"].mean())
     rows = [
         (f"M669 K6 {anchors}", "anchors, mm"),

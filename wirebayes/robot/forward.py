@@ -153,6 +153,7 @@ def _solve(
         for i in range(d):
             damped[i][i] = at.H[i][i] + damping * level
         step, positive = cholesky.solve(damped, -at.gradient)
+        np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
         length = np.sqrt((step * step).sum(0))
         # A step across the room is no Newton step; it is cut, the direction kept.
         cut = np.minimum(1.0, 0.25 * reach / np.maximum(length, 1e-300))

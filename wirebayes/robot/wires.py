@@ -14,6 +14,7 @@ from wirebayes.wire.effect import Effect, HoldContext
 
 Floats = NDArray[np.float64]
 _STEP = 1e-30
+_GAUSS = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True)
@@ -122,9 +123,8 @@ def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
     """Elastic energy, J: the integral of the tension from the zero-tension length; zero when slack."""
     stretch = np.maximum(stretched_m - zero_m, 0.0)
     if wires.at("strain"):
-        nodes, weights = np.polynomial.legendre.leggauss(8)
         total = np.zeros(np.broadcast_shapes(stretch.shape, zero_m.shape))
-        for node, weight in zip(nodes, weights, strict=True):
+        for node, weight in zip(*_GAUSS, strict=True):
             total += 0.5 * weight * tension(wires, zero_m + stretch * (0.5 * (node + 1.0)), zero_m)[0]
         return total * stretch
     if wires.law == "hooke":
