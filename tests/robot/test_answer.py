@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from wirebayes.output import plain
 from wirebayes.report import robot as pictures
@@ -70,3 +71,28 @@ def test_bands_leave_lost_draws_out():
     values = np.array([[1.0, 2.0], [np.nan, 2.0], [3.0, 4.0]])
     np.testing.assert_allclose(band(values)["mean"], [2.0, 3.0])
     assert band(np.empty((0, 2)))["mean"] is None
+
+
+@pytest.mark.parametrize(("name", "leg"), [("linear-6", 3.0), ("hangprinter-4", 4.0 * (2.29983 - 0.3))])
+def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
+    """A leg's wire of known length: B per length^exponent, by hand on the last leg."""
+    robot = schema.read(name)
+    line = _line(30, 800.0)
+    exponent = np.linspace(0.5, 1.5, 30)
+    told = draws.WireDraws({**line.parameters, draws.LENGTH_EXPONENT: exponent}, 1000.0)
+    wires = draws.for_robot(robot, told)
+    elongation = line.parameters["B"] * (leg / 1.0) ** exponent  # of the leg's own wire at 1 N, mm
+    tested = wires.theta["B"][-1] / wires.length_mm[-1] * 1e3 * leg
+    np.testing.assert_allclose(tested, elongation, rtol=1e-5)
+    content = answer(robot, told, Question(robot.home_m, np.eye(3), TIMES)).content
+    assert content["variance_shares"]["shared_draw"][draws.LENGTH_EXPONENT] > 0.1
+    assert any("exponent" in text for text in content["warnings"]) or name == "linear-6"
+
+
+def test_what_a_fit_could_not_name_is_said_to_be_missing():
+    from wirebayes.effects.unknown import Discrepancy
+
+    line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
+    said = draws.warnings(line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
+    assert len(said) == 1
+    assert "could not name" in said[0]

@@ -73,11 +73,14 @@ class Stored:
     sample : Sample
         Its holds and readings, law, history and effects.
     likelihood : {"chain", "hold"}
+    length_exponent : (n,) array or None
+        Where samples of two lengths were fitted together: creep grows as length to this power.
     """
 
     draws: dict[str, Array]
     sample: Sample
     likelihood: str
+    length_exponent: Array | None = None
 
     @property
     def problem(self) -> Problem:
@@ -150,10 +153,10 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         keys, known = json.loads(about["effects"]), catalogue(own_effects)
         model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
                       float(about["tension_ref_N"]))  # fmt: skip
+        exponent = draws.pop(LENGTH_EXPONENT, None)
         if len(names) > 1:
             reference = float(np.exp(np.mean(np.log(lengths))))
-            exponent = draws.pop(LENGTH_EXPONENT, np.ones_like(draws["k1"]))
-            draws["B"] = draws["B"] * (lengths[at] / reference) ** exponent
+            draws["B"] = draws["B"] * (lengths[at] / reference) ** (1.0 if exponent is None else exponent)
         here = constant["held"].values.astype(bool)
         protocol = Protocol(
             float(lengths[at]),
@@ -167,7 +170,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         tension = np.nan_to_num(observed["tension_N"].values[here])[..., None]
         resolutions = json.loads(about["resolutions_N"])
         sample = Sample(names[at], about["material"], protocol, tension, float(resolutions[at]), model)
-        return Stored(draws, sample, about["likelihood"])
+        return Stored(draws, sample, about["likelihood"], exponent)
 
 
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:

@@ -78,7 +78,7 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
             spread, chance = f"{100 * entry['specimen_spread']:g} %", number(entry["probability"], 2)
             known.append(f"It moves {limits} within {claim['time_s']:g} s: probability {chance} (spread {spread}).")
     space = pose.get("workspace")
-    if space:
+    if space and claim:
         moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
         chance = number(space["probability"], 2)
         known.append(f"Over the whole workspace {claim['time_s']:g} s move it {moved}; probability {chance}.")

@@ -205,6 +205,7 @@ def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: F
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     names = [*draws.CORE, *(column for effect in line.material() for column in effect.columns())]
+    names += [name for name in (draws.LENGTH_EXPONENT,) if name in line.parameters]
     kept = {name: line.parameters[name] for name in names}
     result: dict[str, Any] = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if line.count < 30:

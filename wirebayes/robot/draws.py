@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.description import GivenWire, Robot
+from wirebayes.robot.rotation import matrix
 from wirebayes.robot.wires import Wires
 from wirebayes.wire import laws
 from wirebayes.wire.effect import Effect
 
 Floats = NDArray[np.float64]
 CORE = ("k1", "B", "U", "k2", "N")
+LENGTH_EXPONENT = "length_exponent"  # creep elongation grows as length to this power; 1, a strain, unless fitted
 PLACES = ("strain", "drive", "amount", "rate", "creep", "elongation")  # where a material effect changes a robot's wire
 
 
@@ -26,7 +28,8 @@ class WireDraws:
     Attributes
     ----------
     parameters : mapping of name to (n,) array
-        ``k1`` (N), ``B`` (mm N^-U), ``U``, ``k2`` (s^-N), ``N`` and ``effect_name.parameter``.
+        ``k1`` (N), ``B`` (mm N^-U), ``U``, ``k2`` (s^-N), ``N`` and ``effect_name.parameter``; ``length_exponent``
+        where samples of two lengths told it.
     length_mm : float
         Zero-tension length of the tested sample; `B` refers to it.
     law : {"hooke", "modified"}
@@ -93,7 +96,8 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     n = line.count
     effects = line.material()
     names = CORE + tuple(c for e in effects for c in e.columns())
-    shared = spread == 0 and not robot.given
+    exponent = line.parameters.get(LENGTH_EXPONENT)
+    shared = spread == 0 and not robot.given and exponent is None
     theta: dict[str, Floats] = {}
     for name in names:
         if shared:
@@ -107,7 +111,21 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         for name in ("k1", "B", "k2"):
             theta[name] = theta[name] * np.exp(spread * rng.standard_normal((robot.legs, n)))
     length = np.array([wire.length_mm for wire in lines])[:, None]
+    if exponent is not None:
+        longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
+        theta["B"] = theta["B"] * longer ** (exponent - 1.0)
     return Wires(line.law, line.history, theta, length, effects, line.tension_ref_N)
+
+
+def nominal_length(robot: Robot) -> Floats:
+    """Length of each leg's wire, (w,) m: all of a linear actuator's, a drum's at the home pose."""
+    points = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+    free = robot.lines * np.linalg.norm(points - robot.exit_m, axis=1) + robot.beyond_m
+    return np.where(robot.is_linear, robot.wire_m, free)
+
+
+def _is_given(robot: Robot) -> NDArray[np.bool_]:
+    return np.array([[name in robot.given] for name in robot.wire])
 
 
 def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
@@ -135,10 +153,14 @@ def warnings(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) 
         out.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
     if lengths.size and (lengths.min() < 0.5 * line.length_mm or lengths.max() > 2.0 * line.length_mm):
+        rule = "is taken to be a strain of the whole wire"
+        if LENGTH_EXPONENT in line.parameters:
+            rule = "grows with length by the exponent fitted to the tested lengths"
         out.append(
-            f"wires of {lengths.min():.0f} to {lengths.max():.0f} mm, tested at {line.length_mm:.0f} mm: "
-            "creep is taken to be a strain of the whole wire"
+            f"wires of {lengths.min():.0f} to {lengths.max():.0f} mm, tested at {line.length_mm:.0f} mm: creep {rule}"
         )
     dropped = [e.name for e in line.effects if e.scope == "material" and e.place not in PLACES]
     out.extend(f"the material effect {name} has no place in the robot and is left out" for name in dropped)
+    if any(e.name == "discrepancy" for e in line.effects):
+        out.append("what the fit could not name is not in the robot: its wires follow the named model only")
     return out

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wirebayes.robot import forward, inverse
 from wirebayes.robot.creep import HoldCreep, fresh
 from wirebayes.robot.description import Robot
-from wirebayes.robot.draws import CORE, WireDraws, for_robot
+from wirebayes.robot.draws import CORE, LENGTH_EXPONENT, WireDraws, for_robot
 from wirebayes.robot.drift import steps_between, without_creep
 from wirebayes.robot.wires import Wires
 
@@ -88,6 +88,8 @@ class Prior:
         n, legs, p = len(unknowns), robot.legs, len(self.names)
         columns = unknowns[:, legs : legs + p].T
         values = {k: np.exp(c) if k in CORE else c for k, c in zip(self.names, columns, strict=True)}
+        if LENGTH_EXPONENT in self.line.parameters:
+            values[LENGTH_EXPONENT] = self.line.parameters[LENGTH_EXPONENT].mean(keepdims=True)
         wires = for_robot(robot, replace(self.line, parameters=values))
         own = unknowns[:, legs + p :].T.reshape(len(OWN), legs, n)
         theta = dict(wires.theta) | {
