@@ -12,7 +12,7 @@ from wirebayes.report.paper_tables import LEAST_COVERAGE, Rows
 
 Tables = dict[str, Rows]
 Gallery = Callable[[str], list[Block]]
-_TABLES = ("measured", "least_squares", "posterior", "creep", "held_out", "sampling", "robot")
+_TABLES = ("measured", "least_squares", "posterior", "creep", "held_out", "sampling", "robot", "robot_mass")
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -183,7 +183,10 @@ def _robot(tables: Tables, gallery: Gallery) -> Section:
         "pulley blocks, over their workspace, on wires as the chain knows them. Bands hold 90 % of poses and "
         "posterior draws."
     )
-    return Section("What it means for a robot", [words, *gallery("robot"), paper_tables.robot(tables["robot"])])
+    blocks: list[Block] = [words, paper_tables.robot(tables["robot"])]
+    if "robot_mass" in tables:
+        blocks.append(paper_tables.robot_mass(tables["robot_mass"]))
+    return Section("What it means for a robot", [*blocks, *gallery("robot")])
 
 
 def _computed(tables: Tables, gallery: Gallery) -> Section:

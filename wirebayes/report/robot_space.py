@@ -36,7 +36,9 @@ def workspace_map(result: WorkspaceDrift, title: str = "") -> Figure:
             field[np.searchsorted(along, y), np.searchsorted(across, x)] = value[level]
             lost = np.nonzero(np.isnan(field))
             axes.plot(across[lost[1]], along[lost[0]], "x", color=QUIET, ms=5)
-            image = axes.pcolormesh(across, along, field, vmin=value.min(), vmax=value.max(), shading="nearest")
+            image = axes.pcolormesh(
+                across, along, field, vmin=value.min(), vmax=value.max(), shading="nearest", rasterized=True
+            )
             axes.set_aspect("equal")
             axes.tick_params(labelsize=8)
         line[0].set_ylabel("y, m")

@@ -10,7 +10,9 @@ import numpy as np
 
 from wirebayes.bayes.fit import seed_of
 from wirebayes.bayes.result import Stored
+from wirebayes.report.blocks import number
 from wirebayes.report.paper_figures import drifts
+from wirebayes.report.robot_space import workspace_map
 from wirebayes.reproduce.pictures import Gallery
 from wirebayes.robot import claim, draws, schema
 from wirebayes.robot.draws import WireDraws
@@ -20,6 +22,8 @@ ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as 
 # spread from specimen to specimen, and for how long the wires had hung under the same load before
 CASES = ((0.0, 0.0), (0.05, 0.0), (0.05, 3600.0))
 _DRAWS, _GRID = 100, (3, 3, 2)
+MAPPED = "linear-7"
+_MAP, _SIZES, _FEW = (7, 7, 3), (0.5, 1.0, 2.0), 40
 
 
 def rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
@@ -47,6 +51,35 @@ def rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
     return out
 
 
+def needed(chains: Mapping[str, Stored]) -> list[Row]:
+    """Largest platform mass for which the claim holds on new wires, for each wire and size of the robot."""
+    robot = schema.read(MAPPED)
+    return [
+        {
+            "experiment": wire,
+            "robot": MAPPED,
+            "size_factor": size,
+            "specimen_spread": 0.05,
+            "largest_mass_kg": claim.largest_mass(robot, as_line(stored, _FEW), size, steps=7),
+        }
+        for wire, stored in chains.items()
+        for size in _SIZES
+    ]
+
+
+def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
+    """A map of the workspace for each wire, new and alike."""
+    robot = schema.read(MAPPED)
+    for wire, stored in chains.items():
+        wires = draws.for_robot(robot, as_line(stored, _FEW))
+        found = claim.over_workspace(robot, wires, claim.grid(robot, _MAP))
+        figure = workspace_map(found, f"Robot {MAPPED} on {wire}: median drift within {claim.TIME_S:g} s")
+        alt = f"Median drift and tilt of {MAPPED} on new {wire} within a minute, over its workspace at three heights."
+        low, high = (1e3 * f(np.nanmedian(found.distance_m, 1)) for f in (np.min, np.max))
+        caption = f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace."
+        gallery.add("robot", f"map-{wire}", figure, alt, caption)
+
+
 def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
     """One picture a robot."""
     for name in ROBOTS:
@@ -57,9 +90,9 @@ def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
         gallery.add("robot", name, drifts(mine, limit_mm, f"Robot {name}"), alt, caption)
 
 
-def as_line(stored: Stored) -> WireDraws:
+def as_line(stored: Stored, count: int = _DRAWS) -> WireDraws:
     """Posterior draws of a wire, some of them, as the robot takes them."""
-    pick = np.linspace(0, len(stored.theta) - 1, _DRAWS).round().astype(int)
+    pick = np.linspace(0, len(stored.theta) - 1, count).round().astype(int)
     model = stored.sample.model
     parameters = {name: stored.draws[name][pick] for name in draws.CORE}
     length = stored.sample.protocol.length_mm
