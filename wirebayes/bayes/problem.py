@@ -4,7 +4,7 @@ Columns are named ``k1``, ``preload`` …, effect amplitudes ``effect.parameter`
 once, a column of one sample is ``preload[sample]`` and one of a material ``k1[material]``; the most special name wins.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -95,9 +95,7 @@ class Problem:
         for effect in sample.model.effects:
             out |= {column: find(column) for column in effect.columns()}
         ratio = sample.protocol.length_mm / (sample.model.length_ref_mm or sample.protocol.length_mm)
-        if ratio != 1.0:
-            out["B"] = out["B"] * ratio ** find(LENGTH_EXPONENT)
-        return out
+        return out if ratio == 1.0 else at_length(out, sample.model.effects, ratio, find(LENGTH_EXPONENT))
 
     def hold_log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> list[Array]:
         """Per sample the (H, n) log-likelihood of each hold, given those before (chain) or its first reading (hold).
@@ -233,6 +231,15 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
                 raise InputError(
                     f"{key}: no such parameter; known are {', '.join(sorted(everything))} and effect.parameter"
                 )
+
+
+def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:
+    """Parameters of a sample `ratio` times as long as the reference: whatever is an elongation of the wire has grown.
+
+    The creep amount grows as the ratio to the power `exponent`, an effect's elongation as the ratio itself.
+    """
+    grown = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_elongation}
+    return {n: v * (ratio**exponent if n == "B" else ratio if n in grown else 1.0) for n, v in own.items()}
 
 
 def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:

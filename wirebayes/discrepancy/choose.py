@@ -15,7 +15,7 @@ from wirebayes.discrepancy.screen import Candidate, flexible_log_bayes, log_baye
 
 Array = NDArray[Any]
 UNKNOWN_WEIGHT = 1.0  # prior odds of *something unknown* to one named effect
-_MARGIN, _SHARE = 5.0, 0.35  # linear screening errs, and errs more for a large effect
+_MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
 _MOST, _MOST_A_NAME = 16, 3
 
 
@@ -67,9 +67,11 @@ def choose(
     ranked = sorted(forms.items(), key=lambda item: -linear[item[1]][0])
     top = linear[ranked[0][1]][0]
     refitted: dict[tuple[str, str, tuple[int, ...], bool], list[Refit]] = {}
+    near = [f for f, i in ranked if linear[i][0] >= top - _MARGIN - _SHARE * max(top, 0.0)][:_MOST]
+    names = {name for name, *_ in near}
     for form, i in ranked:
-        of_name = sum(f[0] == form[0] for f in refitted)
-        if linear[i][0] < top - _MARGIN - _SHARE * max(top, 0.0) or len(refitted) >= _MOST or of_name >= _MOST_A_NAME:
+        # A name that stands a chance is refitted in its other forms too: the scan may have taken the wrong one.
+        if form[0] not in names or sum(f[0] == form[0] for f in refitted) >= _MOST_A_NAME:
             continue
         c = candidates[i]
         effect = trials[c.probe].effect

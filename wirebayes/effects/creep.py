@@ -54,7 +54,7 @@ class SecondRelaxation(Effect):
     place = "elongation"
     scope = "material"
     amplitudes = (
-        Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.1)),
+        Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.1), is_elongation=True),
         Amplitude("T2", "s", 30.0, stats.lognorm(1.2, scale=30.0), is_shape=True),
     )
     sentence = "The wire creeps in two modes, one with a time constant of its own."
@@ -70,7 +70,7 @@ class SteadyCreep(Effect):
     name = "steady_creep"
     place = "elongation"
     scope = "material"
-    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 1e-3)),)
+    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 1e-3), is_elongation=True),)
     sentence = "The wire also flows steadily under tension and never settles."
     shows = "tail of the hold"
 
@@ -101,7 +101,7 @@ class SteadyCreepCarried(Effect):
 
 
 class TensionDependentRate(Effect):
-    """k2 (τ_j(0) / τref)^m."""
+    """k2 (τ_j(0) / τref)^m; a wire below a hundredth of τref, or slack, counts as at a hundredth."""
 
     name = "tension_dependent_rate"
     place = "rate"
@@ -111,9 +111,8 @@ class TensionDependentRate(Effect):
     shows = "hold shape changes with tension"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
-        tension = hold.initial_tension
-        ratio = np.where(tension.real > 0, tension, hold.tension_ref_N) / hold.tension_ref_N
-        return value * np.power(ratio, own["m"])
+        ratio = hold.initial_tension / hold.tension_ref_N
+        return value * np.power(np.where(ratio.real > 0.01, ratio, 0.01), own["m"])
 
 
 class Ageing(Effect):

@@ -43,6 +43,8 @@ class Amplitude:
     is_shape : bool
         True for a positive constant of the form (a time constant), sampled as a logarithm; it means nothing while
         the amplitude is neutral.
+    is_elongation : bool
+        True where the amplitude is an elongation of the whole wire, which grows with the length of the sample.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Amplitude:
     neutral: float
     prior: Any
     is_shape: bool = False
+    is_elongation: bool = False
 
 
 @dataclass
