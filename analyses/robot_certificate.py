@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.robot import cases
-from wirebayes.robot import draws, drift, inverse, schema
+from wirebayes.robot import draws, drift, inverse, proofs, schema
 from wirebayes.robot.certificate import certify
 from wirebayes.robot.enclosure import enclose
 
@@ -27,16 +27,16 @@ def shares(poses, rng):
             for make in (cases.commanded, cases.disturbed):
                 c = make(robot, law, poses, rng)
                 found = cases.solved(robot, c)
-                began, proofs = time.perf_counter(), []
+                began, tried = time.perf_counter(), []
                 for i in range(len(found.status)):
                     k1 = np.full(robot.legs, c.wires.theta["k1"][0, i])
                     lengths = c.zero_m[i], c.zero_m[i]
                     at = c.offset_m[i], found.position_m[i], found.rotation[i]
-                    proofs.append(certify(robot, law, (k1, k1), lengths, *at))
-                spent = 1e3 * (time.perf_counter() - began) / len(proofs)
-                proved = [p for p in proofs if p.proved]
+                    tried.append(certify(robot, law, (k1, k1), lengths, *at))
+                spent = 1e3 * (time.perf_counter() - began) / len(tried)
+                proved = [p for p in tried if p.proved]
                 print(
-                    f"{name:14s} {law:8s} {make.__name__:10s} {len(proofs):5d} {len(proved) / len(proofs):6.3f} "
+                    f"{name:14s} {law:8s} {make.__name__:10s} {len(tried):5d} {len(proved) / len(tried):6.3f} "
                     f"{spent:8.1f}  {max(p.radius_m.max() for p in proved):.1e}       "
                     f"{1e3 * np.median([p.unique_m for p in proved]):.2f}"
                 )
@@ -50,7 +50,8 @@ def enclosures(folder):
     k1 = float(line.parameters["k1"].mean())
     line = replace(line, parameters=dict(line.parameters) | {"k1": np.full(line.count, k1)})
     print(f"\nheight after 60 s with {folder.name}, stiffness known, mm from the command:")
-    print("sampled 90 % band of a shared draw; guaranteed for all lengths between those of the two quantiles")
+    print("sampled 90 % band of a shared draw; guaranteed for all lengths between those of the two quantiles,")
+    print("all wires together; and each wire on its own (share: how much of the band about its middle was proved)")
     for name in ("cogiro-desk", "linear-6", "linear-7", "segesta-8", "hangprinter-4"):
         robot = schema.read(name)
         wires = draws.for_robot(robot, line)
@@ -70,6 +71,10 @@ def enclosures(folder):
             f"  {name:14s} sampled {sampled.round(3)}  guaranteed {guaranteed.round(3)}  "
             f"proved {box.proved}, {box.proofs} proofs, {spent:.1f} s"
         )
+        own = proofs.enclosed(robot, wires, course, x, R)["band"]
+        if own["share"]:
+            print(f"  {'':14s} each on its own: {np.array([own['low_mm'][2], own['high_mm'][2]]).round(3)}, "
+                  f"share {own['share']:g}")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -58,6 +58,21 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
         for c in ("hooke_only", "creep_aware")
     )
     assert aware[-1] < 0.6 * hooke[-1]
+    assert {(r["loaded_before_s"], r["controller"]) for r in said["between_calibrations"]} == {
+        (loaded, controller) for loaded in (0.0, 3600.0) for controller in ("held_still", "creep_aware")
+    }
+    assert 0 < said["workspace"]["q05_drift_mm"] < said["workspace"]["q95_drift_mm"]
+    assert {path.stem for path in out[0].glob("*.png")} == {
+        "robot", "drift", "rotation", "pose-error", "error-budget", "workspace"
+    }  # fmt: skip
+    if said["certificate"]["proved"] is not None:
+        band = said["certificate"]["band"]
+        drifted = said["drift"][0]["displacement_mm"]["q50"][-1]
+        assert 0 < band["share"] <= 1
+        assert all(a < b < c for a, b, c in zip(band["low_mm"], drifted, band["high_mm"], strict=True))
+    assert main(["report", str(out[0])]) == 0
+    page = (out[0] / "report.html").read_text()
+    assert "Between calibrations" in page
     assert (out[0] / "robot.png").stat().st_size > 1000
 
 
@@ -78,6 +93,8 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path):
         (["linear-6", "--position", "1,2,nan"], "--position"),
         (["linear-6", "--times", "60,0"], "--times"),
         (["linear-6", "--times", "a"], "--times"),
+        (["linear-6", "--tolerance", "0"], "--tolerance"),
+        (["linear-6", "--tolerance-tilt", "nan"], "--tolerance-tilt"),
     ],
 )
 def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys, arguments, said):

@@ -157,4 +157,15 @@ def _equilibria(pose: dict[str, Any]) -> list[Block]:
     if not proof["proved"]:
         return [Text(f"{text} Interval arithmetic could not prove that the one shown is alone.")]
     alone = f"{number(1e3 * proof['alone_within_m'])} mm"
-    return [Text(f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose.")]
+    proved = f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose."
+    band = proof.get("band")
+    if not band or not band["share"]:
+        return [Text(proved)]
+    part = "all" if band["share"] == 1 else f"the middle {100 * band['share']:g} %"
+    axes = zip("xyz", band["low_mm"], band["high_mm"], strict=True)
+    box = ", ".join(f"{axis} {span(low, high)} mm" for axis, low, high in axes)
+    sure = (
+        f"With stiffness and creep of every wire on its own anywhere in {part} of their 90 % bands and the mean wire's "
+        f"joint values commanded, the platform is after {band['time_s']:g} s surely in this box about the pose: {box}."
+    )
+    return [Text(proved), Text(sure)]

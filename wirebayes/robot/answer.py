@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot import acting, claim, control, draws, drift, forward, inverse, shares
+from wirebayes.robot import acting, claim, control, draws, drift, forward, inverse, proofs, shares
 from wirebayes.robot import rotation as turning
 from wirebayes.robot.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.description import Robot
@@ -90,13 +90,14 @@ def answer(robot: Robot, line: WireDraws, asked: Question, other: WireDraws | No
     }
     content["forward"] = _round_trip(robot, shared, told, x, R)
     content["equilibria"] = _all_equilibria(robot, shared, told, x, rng)
-    content["certificate"] = _certificate(robot, shared, x, R)
+    content["certificate"] = proofs.alone(robot, shared, x, R)
     courses = {}
     content["drift"] = []
     for spread in SPREADS:
         wires = draws.for_robot(robot, line, spread, rng)
         courses[spread] = drift.from_command(robot, wires, x, R, asked.times_s)
         content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))
+    content["certificate"] |= proofs.enclosed(robot, shared, courses[0.0], x, R)
     content["claim"] = _claim(courses, x, asked)
     content["pose_error"] = acting.errors(robot, line, asked, rng, other)
     content["between_calibrations"] = acting.between_calibrations(robot, line, asked, rng)
@@ -154,23 +155,6 @@ def _all_equilibria(
             for p, v, t in zip(found.position_m, turning.vector(found.rotation), found.tension_N, strict=True)
         ],
     }
-
-
-def _certificate(robot: Robot, wires: Wires, x: Floats, R: Floats) -> dict[str, Any]:
-    """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed."""
-    from wirebayes.robot.certificate import certify
-
-    if wires.at("strain"):
-        return {"proved": None, "sentence": "Proofs know laws (1), (3) and (6) without further effects."}
-    mean = control.known(wires)
-    k1 = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
-    tau = inverse.tensions(robot, x[None], R[None])
-    here = inverse.commands(robot, mean, x[None], R[None], tau)
-    try:
-        proof = certify(robot, wires.law, (k1, k1), (here.zero_m[0], here.zero_m[0]), here.offset_m[0], x, R)
-    except ImportError:
-        return {"proved": None, "sentence": "python-flint is not installed (extra: certificate)."}
-    return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}
 
 
 def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:

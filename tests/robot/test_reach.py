@@ -1,0 +1,85 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from tests.robot import cases
+from wirebayes.robot import forward, rotation, schema
+from wirebayes.robot.reach import apart, reach
+from wirebayes.robot.wires import Wires
+
+pytest.importorskip("flint")
+
+
+def _case(name, law, make=cases.commanded, seed=0):
+    robot = schema.read(name)
+    c = make(robot, law, 6, np.random.default_rng(seed))
+    found = cases.solved(robot, c)
+    i = int(np.flatnonzero(found.found)[0])
+    k1 = np.full(robot.legs, c.wires.theta["k1"][0, i])
+    return robot, k1, c.zero_m[i], c.offset_m[i], found.position_m[i], found.rotation[i]
+
+
+def _poses(robot, law, k1, zero, offset, x, R):
+    """Forward solutions of many parameter sets, one a row."""
+    wires = Wires(law, "saturating", {"k1": k1.T}, np.full((robot.legs, 1), 1000.0))
+    found = forward.solve(robot, wires, zero, offset, x, R)
+    assert found.found.all()
+    return found
+
+
+@pytest.mark.parametrize("law", ["hooke", "modified"])
+@pytest.mark.parametrize("name", schema.shipped())
+def test_wires_that_vary_each_on_its_own_are_enclosed_tightly(name, law):
+    robot, k1, zero, offset, x, R = _case(name, law)
+    half_k1, half_zero = 1e-4 * k1, 1e-5 * zero
+    got = reach(robot, law, k1, zero, apart(half_k1, half_zero), offset, x, R)
+    assert got.proved
+    rng = np.random.default_rng(1)
+    corners = np.array(list(product((-1, 1), repeat=robot.legs)))
+    signs = rng.choice(corners, (2, 300))
+    found = _poses(robot, law, k1 + half_k1 * signs[0], zero + half_zero * signs[1], offset, x, R)
+    moved = np.abs(found.position_m - x).max(0)
+    assert (moved <= got.radius_m[:3]).all()
+    assert (got.radius_m[:3] < 2.5 * moved).all()
+    if robot.degrees == 6:
+        turn = rotation.vector(found.rotation @ R.T)
+        angle = np.linalg.norm(turn, axis=1, keepdims=True)
+        cayley = 2 * np.tan(0.5 * angle) * turn / angle
+        assert (robot.size_m * np.abs(cayley).max(0) <= got.radius_m[3:]).all()
+
+
+def test_wires_that_change_together_reach_less_far_than_each_on_its_own():
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    half = 3e-5 * zero
+    own = reach(robot, "hooke", k1, zero, apart(0 * k1, half), offset, x, R)
+    together = reach(robot, "hooke", k1, zero, (np.zeros((7, 1)), half[:, None]), offset, x, R)
+    assert own.proved and together.proved
+    share = np.linspace(-1, 1, 21)[:, None]
+    found = _poses(robot, "hooke", np.tile(k1, (21, 1)), zero + share * half, offset, x, R)
+    assert (np.abs(found.position_m - x).max(0) <= together.radius_m[:3]).all()
+    assert (together.radius_m[:3] < own.radius_m[:3]).all()
+
+
+def test_a_wire_that_may_go_slack_is_enclosed_or_refused():
+    proofs = 0
+    for seed in range(6):
+        robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke", cases.disturbed, seed)
+        half = 1e-4 * zero
+        got = reach(robot, "hooke", k1, zero, apart(0 * k1, half), offset, x, R)
+        if not got.proved:
+            continue
+        proofs += 1
+        signs = np.array(list(product((-1, 1), repeat=4)))
+        found = _poses(robot, "hooke", np.tile(k1, (16, 1)), zero + half * signs, offset, x, R)
+        assert (np.abs(found.position_m - x).max(0) <= got.radius_m[:3]).all()
+    assert proofs > 0
+
+
+def test_too_much_is_refused():
+    robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke")
+    assert not reach(robot, "hooke", k1, zero, apart(0.5 * k1, 0.01 * zero), offset, x, R).proved
+    assert not reach(robot, "hooke", k1, zero, apart(2.0 * k1, 0 * zero), offset, x, R).proved
+    # far from equilibrium there is nothing to prove
+    away = reach(robot, "hooke", k1, zero, apart(1e-6 * k1, 1e-7 * zero), offset, x + [0, 0, 0.01], R)
+    assert not away.proved or np.all(np.abs(away.centre_m - x) <= away.radius_m[:3])
