@@ -16,7 +16,7 @@ from wirebayes import __version__
 from wirebayes.bayes.fit import Fit
 from wirebayes.bayes.identifiability import identifiability, told
 from wirebayes.bayes.prior import Prior
-from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample
+from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.bayes.replicate import readings as replicate
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
@@ -156,7 +156,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         exponent = draws.pop(LENGTH_EXPONENT, None)
         if len(names) > 1:
             reference = float(np.exp(np.mean(np.log(lengths))))
-            draws["B"] = draws["B"] * (lengths[at] / reference) ** (1.0 if exponent is None else exponent)
+            draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
         here = constant["held"].values.astype(bool)
         protocol = Protocol(
             float(lengths[at]),
