@@ -156,6 +156,21 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
     assert np.abs(np.array(found["length_m"]["mean"]) - truth).mean() < 1.5e-3
     assert said["observability"]["of"] == 7
     assert len(said["next_positions_m"]) == 5
+    assert main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text()
+    assert f"{1e3 * found['length_m']['mean'][2]:.2f}" in page
+    assert "combinations of lengths" in page
+
+
+def test_the_documented_session_is_one():
+    from pathlib import Path
+
+    from wirebayes.robot import schema, session_file
+
+    file = Path(__file__).parents[2] / "docs" / "example" / "linear-7-session.csv"
+    session, readings = session_file.read(file, schema.read("linear-7"), 0.02, 1e-3)
+    assert session.read.tolist() == [False] + [True] * 8
+    assert len(readings) == 8 * 7
 
 
 @pytest.mark.parametrize(
@@ -166,6 +181,7 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
         (",30.0,", ",nan,", "line 2, column duration_s"),
         (",30.0,", ",", "line 2"),
         (",,,,,,,\n", ",1.0,,,,,,\n", "line 2"),
+        ("\n1,", "\n\nx,", "line 3, column hold"),  # an empty line counts
     ],
 )
 def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, said):
@@ -180,6 +196,21 @@ def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, ca
     assert said in line
     assert "\n" not in line
     assert not out.exists()
+
+
+def test_an_inclinometer_joins_in_and_is_checked(fitted, session_csv, tmp_path, capsys):
+    file, truth = session_csv
+    lines = file.read_text().splitlines()
+    read = [cell != "" for cell in (line.rsplit(",", 1)[1] for line in lines[1:])]
+    level = [lines[0] + ",normal_x,normal_y"]
+    level += [line + (",0.0,0.0" if here else ",,") for line, here in zip(lines[1:], read, strict=True)]
+    file.write_text("\n".join(level) + "\n")
+    out = tmp_path / "out"
+    assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 0
+    file.write_text("\n".join(level).replace(",0.0,0.0\n", ",0.0,1.5\n", 1) + "\n")
+    capsys.readouterr()
+    assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
+    assert "column normal_y: found '1.5'; expected a component of a unit vector" in capsys.readouterr().err
 
 
 def test_export_speaks_the_firmwares_units(fitted, tmp_path):

@@ -65,19 +65,19 @@ COMMANDS = {
         "wirebayes.cli.robot",
         "pose",
         "Pose of a robot on creeping wires: kinematics, drift and their uncertainty.",
-        "wirebayes pose data/robots/cogiro.toml --wires out/fit/roc-line-1m --output out/pose",
+        "wirebayes pose linear-7 --wires out/fit/roc-line-1m --output out/pose",
     ),
     "calibrate": Command(
         "wirebayes.cli.robot",
         "calibrate",
         "Zero-tension lengths of a robot's wires from readings along its poses.",
-        "wirebayes calibrate data/robots/cogiro.toml readings.csv --output out/calibrate",
+        "wirebayes calibrate linear-7 session.csv --wires out/fit/roc-line-1m --output out/calibrate",
     ),
     "export": Command(
         "wirebayes.cli.robot",
         "export",
         "A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.",
-        "wirebayes export data/robots/cogiro.toml --wires out/fit/roc-line-1m --output out/export",
+        "wirebayes export hangprinter-4 --wires out/fit/roc-line-1m --output out/export",
     ),
     "report": Command(
         "wirebayes.cli.report",

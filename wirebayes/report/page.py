@@ -20,6 +20,7 @@ _TELLERS = {
     "compare": "wirebayes.report.of_compare",
     "discover": "wirebayes.report.of_discover",
     "pose": "wirebayes.report.of_pose",
+    "calibrate": "wirebayes.report.of_calibrate",
 }
 
 

@@ -41,13 +41,15 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a UTF-8 text file") from None
-    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    lines = csv.reader(io.StringIO(text))
+    numbered = [(lines.line_num, row) for row in lines if row]
+    rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
     wanted = columns(robot, tilted)
     if not rows or rows[0] != wanted:
         found = ",".join(rows[0]) if rows else "nothing"
         raise InputError(f"{path}: line 1: found {found}; expected the header {','.join(wanted)}")
-    table = np.array([_row(path, line, row, wanted) for line, row in enumerate(rows[1:], 2)]).reshape(-1, len(wanted))
+    table = np.array([_row(path, line, row, wanted) for line, row in numbered[1:]]).reshape(-1, len(wanted))
     if not len(table):
         raise InputError(f"{path}: no holds; expected at least one row")
     w = robot.legs
@@ -56,7 +58,9 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
     read_here = np.isfinite(measured).all(1)
     half = ~read_here & np.isfinite(measured).any(1)
     if half.any():
-        raise InputError(f"{path}: line {int(np.argmax(half)) + 2}: some readings are empty; expected all or none")
+        raise InputError(
+            f"{path}: line {numbered[int(np.argmax(half)) + 1][0]}: some readings are empty; expected all or none"
+        )
     if not read_here.any():
         raise InputError(f"{path}: no row has tensions; expected at least one")
     turn = table[:, 4:7] if robot.degrees == 6 else np.tile(robot.home_rotation_rad, (len(table), 1))
@@ -82,10 +86,14 @@ def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]
             value = float(cell)
         except ValueError:
             value = np.nan
-        positive = name == "duration_s"
-        allowed = value > 0 if positive else value >= 0 if name.startswith("tension_") else True
+        allowed, kind = True, "a finite number"
+        if name == "duration_s":
+            allowed, kind = value > 0, "a number above 0"
+        elif name.startswith("tension_"):
+            allowed, kind = value >= 0, "a finite number of at least 0"
+        elif name in NORMAL:
+            allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
         if not np.isfinite(value) or not allowed:
-            kind = "a number above 0" if positive else "a finite number" + (" of at least 0" if optional else "")
             raise InputError(f"{path}: line {line}, column {name}: found {cell!r}; expected {kind}")
         out.append(value)
     return out
