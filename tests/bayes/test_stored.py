@@ -25,3 +25,14 @@ def test_what_is_read_back_predicts_as_the_joint_fit_does(sample, tmp_path):
     read = {name: values[:20] for name, values in stored.draws.items()}
     expected = simulate(here.protocol, joint.parameters(theta, here), here.model)
     assert simulate(stored.sample.protocol, read, stored.sample.model) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_sample_twice_as_long_moved_twice_as_far_reads_the_same():
+    """Creep and what flows beside it are strains of the whole wire."""
+    effects = [SecondRelaxation(), SteadyCreep()]
+    far = Bench("long", "line", 2000.0, displacements_mm=tuple(range(2, 26, 2)))
+    problem = draw([Bench("short", "line", 1000.0), far], Truth(effects=effects), seed=1).problem
+    short, long = (problem.parameters(problem.prior.rvs(5, np.random.default_rng(0)), s) for s in problem.samples)
+    long["preload"] = 2.0 * short["preload"]
+    one, two = (simulate(s.protocol, own, s.model) for s, own in zip(problem.samples, (short, long), strict=True))
+    assert two == pytest.approx(one, rel=1e-9)
