@@ -109,3 +109,17 @@ def test_shipped_robots_say_where_their_numbers_come_from():
         robot = schema.read(name)
         assert robot.name == name
         assert "github.com" in robot.source or "Representative, not a published" in robot.source
+
+
+def test_every_key_of_a_robots_file_is_documented():
+    import re
+    from pathlib import Path
+
+    root = Path(__file__).parents[2]
+    used = set()
+    for name in schema.shipped():
+        used |= set(re.findall(r"^(\w+) =", (root / "data" / "robots" / f"{name}.toml").read_text(), re.MULTILINE))
+    assert len(used) > 15
+    for page in (root / "data" / "robots" / "README.md", root / "docs" / "robot.rst"):
+        text = page.read_text()
+        assert [key for key in sorted(used | {"k1_N", "B_mm", "length_mm", "wire"}) if f"{key}" not in text] == []
