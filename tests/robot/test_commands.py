@@ -109,6 +109,11 @@ def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys
 def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
     assert "posterior.nc" in capsys.readouterr().err
+    deeper = tmp_path / "wire" / "final"
+    deeper.mkdir(parents=True)
+    (deeper / "posterior.nc").write_text("")
+    assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
+    assert f"expected one of {deeper}" in capsys.readouterr().err
     (tmp_path / "posterior.nc").write_text("not netcdf")
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
     assert "posterior.nc" in capsys.readouterr().err

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
 def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> "WireDraws":
     """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
     from wirebayes.bayes.result import load
+    from wirebayes.errors import InputError
 
+    below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
+    if below and not (folder / "posterior.nc").is_file():
+        raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
     return wire_draws(load(folder, experiment, own_effects), count)
 
 
