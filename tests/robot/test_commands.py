@@ -95,6 +95,7 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path):
         (["linear-6", "--times", "a"], "--times"),
         (["linear-6", "--tolerance", "0"], "--tolerance"),
         (["linear-6", "--tolerance-tilt", "nan"], "--tolerance-tilt"),
+        (["linear-6", "--specimen-spread", "0"], "--specimen-spread"),
     ],
 )
 def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys, arguments, said):

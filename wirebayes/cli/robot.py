@@ -14,6 +14,7 @@ Wires = Annotated[Path, typer.Option("--wires", metavar="FOLDER", help="A folder
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
 
 
+Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative, from wire to wire of one line.")]
 POSTERIOR = "posterior.nc"
 
 
@@ -28,6 +29,7 @@ def pose(
     tolerance_tilt: Annotated[
         float, typer.Option("--tolerance-tilt", metavar="DEG", help="Rotation that is allowed.")
     ] = 0.055,
+    spread: Spread = 0.05,
     told: Annotated[
         Path | None,
         typer.Option("--told", metavar="FOLDER", help="Another fit of the wire, told to one more controller."),
@@ -48,7 +50,7 @@ def pose(
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
     moments = rising_times(times)
-    _above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
+    _above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", spread))
     other = read_wires(told, draws, experiment, own_effects) if told else None
 
     from wirebayes.output import open_run, write_json
@@ -57,8 +59,9 @@ def pose(
     from wirebayes.robot.question import Question
     from wirebayes.robot.rotation import matrix
 
-    asked = Question(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), seed)
-    options = (experiment, position, rotation, times, tolerance, tolerance_tilt, told and _content(told / POSTERIOR))
+    asked = Question(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), spread, seed)
+    limits = (tolerance, tolerance_tilt, spread)
+    options = (experiment, position, rotation, times, *limits, told and _content(told / POSTERIOR))
     run = open_run(output, _configuration("pose", robot, wires, draws, seed, own_effects, *options))
     if run.state == "done":
         return
@@ -80,7 +83,7 @@ def calibrate(
     reference_sd: Annotated[
         float, typer.Option("--reference-sd", metavar="MM", help="How wrong the reference lengths may be.")
     ] = 5.0,
-    spread: Annotated[float, typer.Option("--specimen-spread", help="Relative, from wire to wire of one line.")] = 0.05,
+    spread: Spread = 0.05,
     draws: Draws = 1000,
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,

@@ -9,7 +9,7 @@ from wirebayes.robot import control, draws, inverse
 from wirebayes.robot.creep import HoldCreep, fresh
 from wirebayes.robot.description import Robot
 from wirebayes.robot.draws import WireDraws
-from wirebayes.robot.question import SPREADS, Question, band
+from wirebayes.robot.question import Question, band
 
 Floats = NDArray[np.float64]
 HISTORIES_S = (0.0, 3600.0)  # under load before the calibration: new wires, and an hour
@@ -41,7 +41,7 @@ def errors(
         less = draws.for_robot(robot, other)
         schedules["creep_aware_told_otherwise"] = control.creep_aware(robot, less, asked.position_m, asked.rotation)
     out = []
-    for spread in SPREADS:
+    for spread in asked.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for name, schedule in schedules.items():
             error = control.error(robot, wires, schedule, asked.position_m, asked.rotation, asked.times_s)
@@ -68,7 +68,7 @@ def between_calibrations(
     line = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
     load = np.repeat(inverse.tensions(robot, x[None], R[None]).T, line.count, 1)
     out: list[dict[str, Any]] = []
-    for spread in SPREADS:
+    for spread in asked.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for loaded_s in HISTORIES_S:
             state = fresh(robot.legs, line.count)

@@ -11,7 +11,7 @@ from wirebayes.robot import rotation as turning
 from wirebayes.robot.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.description import Robot
 from wirebayes.robot.draws import WireDraws
-from wirebayes.robot.question import SPREADS, Question, band
+from wirebayes.robot.question import Question, band
 from wirebayes.robot.wires import Wires
 
 Floats = NDArray[np.float64]
@@ -93,7 +93,7 @@ def answer(robot: Robot, line: WireDraws, asked: Question, other: WireDraws | No
     content["certificate"] = proofs.alone(robot, shared, x, R)
     courses = {}
     content["drift"] = []
-    for spread in SPREADS:
+    for spread in asked.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         courses[spread] = drift.from_command(robot, wires, x, R, asked.times_s)
         content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))

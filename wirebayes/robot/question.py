@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from wirebayes.robot.claim import DISTANCE_M, TILT_RAD
 
 Floats = NDArray[np.float64]
-SPREADS = (0.0, 0.05)
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 
 
@@ -25,6 +24,8 @@ class Question:
         Rising, the first zero.
     tolerance_m, tolerance_rad : float
         Of the pose, for the longest time between calibrations.
+    specimen_spread : float
+        Relative, of stiffness, creep amount and rate from wire to wire; answers are given for it and for wires alike.
     seed : int
     """
 
@@ -33,7 +34,13 @@ class Question:
     times_s: Floats
     tolerance_m: float = DISTANCE_M
     tolerance_rad: float = TILT_RAD
+    specimen_spread: float = 0.05
     seed: int = 0
+
+    @property
+    def spreads(self) -> tuple[float, float]:
+        """Wires alike, and wires that differ."""
+        return 0.0, self.specimen_spread
 
 
 def band(values: Floats) -> dict[str, Any]:
