@@ -62,7 +62,9 @@ def compare(robot, make, law, count, rng):
         there = max(there, back.max())
     slack = (found.tension_N == 0).any(1).sum()
     errors = np.array(errors)
-    return len(found.status), found.found.mean(), blind.found.mean(), slack, np.mean(rested), errors, there
+    told = found.found | (found.status == forward.NOT_HELD)  # a plate on two points in line is free, and said to be
+    free = int((found.status == forward.NOT_HELD).sum())
+    return len(found.status), told.mean(), blind.found.mean(), slack, np.mean(rested), errors, there, free
 
 
 def main():
@@ -71,21 +73,23 @@ def main():
     print("distances in m; 'blind' starts 2 cm off with no rotation known")
     print(f"{'robot':14s} {'law':8s} {'lengths':10s} cases solved  blind slack rested  median    largest   round trip")
     total, solved, slack, worst, trips = 0, 0.0, 0, 0.0, 0.0
-    over = 0
+    over, unheld = 0, 0
     for name in schema.shipped():
         robot = schema.read(name)
         for law in ("hooke", "modified"):
             for make in (cases.commanded, cases.disturbed):
-                n, ok, blind, loose, calm, errors, there = compare(robot, make, law, count, rng)
+                n, ok, blind, loose, calm, errors, there, free = compare(robot, make, law, count, rng)
                 total, solved, slack = total + n, solved + ok * n, slack + loose
                 worst, trips = max(worst, errors.max()), np.nanmax([trips, there])
                 over += int((errors > 1e-6).sum())
+                unheld += free
                 print(
                     f"{name:14s} {law:8s} {make.__name__:10s} {n:5d} {ok:6.3f} {blind:6.3f} {loose:5d} {calm:6.3f}  "
                     f"{np.median(errors):.1e}  {errors.max():.1e}  {there:.1e}"
                 )
     print(
-        f"{total} cases, {solved / total:.4f} solved, {slack} with slack wires, largest disagreement {worst:.1e} m "
+        f"{total} cases, {solved / total:.4f} solved or known not to be held ({unheld}), {slack} with slack wires, "
+        f"largest disagreement {worst:.1e} m "
         f"({over} above 1e-6), largest round-trip error {trips:.1e} m"
     )
 

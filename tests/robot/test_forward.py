@@ -106,6 +106,21 @@ def test_no_equilibrium_is_reported():
     assert (found.status == forward.NO_EQUILIBRIUM).all()
 
 
+def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
+    # Wires to two opposite corners only: nothing keeps the plate from turning about the line between them.
+    robot = schema.read("ipanema-1")
+    wires = Wires("hooke", "saturating", {"k1": np.array([[50000.0]])}, np.full((8, 1), 1000.0))
+    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    told = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
+    held = forward.solve(robot, wires, told.zero_m, told.offset_m, robot.home_m, np.eye(3))
+    assert held.found.all()
+    loose = told.zero_m + np.array([1.0, 0, 1, 0, 1, 0, 1, 0])
+    turned = rotation.matrix(np.array([[0.02, 0.01, 0.03]]))
+    found = forward.solve(robot, wires, loose, told.offset_m, robot.home_m + 0.01, turned)
+    assert found.status.tolist() == [forward.NOT_HELD]
+    assert found.residual_N[0] < 1e-6
+
+
 def test_several_equilibria_are_found_told_apart_and_ordered():
     robot = schema.read("cogiro-desk")
     c = cases.commanded(robot, "hooke", 1, np.random.default_rng(8))

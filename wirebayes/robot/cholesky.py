@@ -32,7 +32,7 @@ def solve(H: list[list[Floats]], right: Floats) -> tuple[Floats, NDArray[np.bool
         for k in range(j):
             pivot = pivot - L[j][k] * L[j][k]
         # A pivot lost to rounding counts as zero: the platform is free to move that way.
-        good = pivot > 1e-14 * np.abs(H[j][j])
+        good = pivot > 1e-12 * np.abs(H[j][j])
         positive &= good
         inv = 1.0 / np.sqrt(np.where(good, pivot, 1.0))
         inverse.append(inv)

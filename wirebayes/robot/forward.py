@@ -16,11 +16,12 @@ from wirebayes.robot.description import GRAVITY, Robot
 from wirebayes.robot.wires import Wires, energy, tension
 
 Floats = NDArray[np.float64]
-FOUND, NOT_CONVERGED, NO_EQUILIBRIUM = 0, 1, 2
+FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD = 0, 1, 2, 3
 STATUS = {
     FOUND: "stable equilibrium",
     NOT_CONVERGED: "not converged",
     NO_EQUILIBRIUM: "no equilibrium: the wires cannot carry the platform",
+    NOT_HELD: "in balance, but free to move or about to fall: no isolated stable pose",
 }
 _CHUNK, _QUICK = 2048, 7
 
@@ -36,7 +37,7 @@ class Equilibria:
     tension_N : (n, w) array
         Zero for slack wires.
     status : (n,) int array
-        `FOUND`, `NOT_CONVERGED` or `NO_EQUILIBRIUM`; poses of the last two mean nothing.
+        `FOUND`, `NOT_CONVERGED`, `NO_EQUILIBRIUM` or `NOT_HELD`; poses mean something where found only.
     iterations : (n,) int array
     residual_N : (n,) array
         Largest force left over (moments divided by the platform's size).
@@ -172,16 +173,19 @@ def _solve(
         tried, damping = damping, np.where(accept, calmer, np.maximum(1e-3, damping * 10))
         x, R = np.where(accept, new_x, x), np.where(accept, new_R, R)
         at = at.where(accept, new)
-        small = (length < 1e-9 * size) | (at.size <= floor)
-        done = accept & small & (tried == 0)
+        balanced = at.size <= floor
+        done = positive & (tried == 0) & (balanced | (accept & (length < 1e-9 * size)))
+        loose = balanced & ~positive & (tried == 0)
+        damping = np.where(balanced, 0.0, damping)  # so that the next step asks the bare stiffness
         lost = np.abs(x).max(0) > reach
         stuck = damping > 1e12
-        finished = done | lost | stuck
+        finished = done | lost | stuck | loose
         count[live] = iteration
         if finished.any():
             gone = live[finished]
             out_x[:, gone], out_R[..., gone], out_tau[:, gone] = x[:, finished], R[..., finished], at.tau[:, finished]
-            status[gone] = np.where(lost, NO_EQUILIBRIUM, np.where(done, FOUND, NOT_CONVERGED))[finished]
+            kinds = np.select([lost, done, loose], [NO_EQUILIBRIUM, FOUND, NOT_HELD], NOT_CONVERGED)
+            status[gone] = kinds[finished]
             left[gone] = at.size[finished]
             keep = np.flatnonzero(~finished)
             live, damping, floor, level, reach = live[keep], damping[keep], floor[keep], level[keep], reach[keep]
