@@ -140,7 +140,9 @@ def _tables_and_pictures(
     robot = section_4.rows(chains, seed)
     write_table(directory, "robot", robot)
     write_table(directory, "robot_mass", section_4.needed(chains))
-    section_4.draw(drawn, robot, published["pose_claim"]["centre_moves_less_than_mm"])
+    limit_mm = published["pose_claim"]["centre_moves_less_than_mm"]
+    section_4.draw(drawn, robot, limit_mm)
+    section_4.draw_poses(drawn, chains, limit_mm)
     section_4.draw_maps(drawn, chains)
     drawn.finish()
     report("tables and pictures", 3, 3)

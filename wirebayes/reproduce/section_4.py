@@ -7,15 +7,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.bayes.fit import seed_of
 from wirebayes.bayes.result import Stored
 from wirebayes.report.blocks import number
 from wirebayes.report.paper_figures import drifts
+from wirebayes.report.robot import scene
+from wirebayes.report.robot_lines import budgets, drifts_in_time
 from wirebayes.report.robot_space import workspace_map
 from wirebayes.reproduce.pictures import Gallery
-from wirebayes.robot import claim, draws, schema
+from wirebayes.robot import claim, draws, drift, schema, shares
 from wirebayes.robot.draws import WireDraws
+from wirebayes.robot.rotation import matrix
 
 Row = dict[str, Any]
 ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as the paper's; the second is redundant
@@ -23,6 +27,7 @@ ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as 
 CASES = ((0.0, 0.0), (0.05, 0.0), (0.05, 3600.0))
 _DRAWS, _GRID = 100, (3, 3, 2)
 MAPPED = "linear-7"
+_TIMES_S = np.array([1.0, 3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0])
 _MAP, _SIZES, _FEW = (7, 7, 3), (0.5, 1.0, 2.0), 40
 
 
@@ -78,6 +83,30 @@ def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
         low, high = (1e3 * f(np.nanmedian(found.distance_m, 1)) for f in (np.min, np.max))
         caption = f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace."
         gallery.add("robot", f"map-{wire}", figure, alt, caption)
+
+
+def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) -> None:
+    """The robot with its drift, the drift of every wire against time, and whose uncertainty makes it uncertain."""
+    robot = schema.read(MAPPED)
+    x, R = robot.home_m, matrix(robot.home_rotation_rad)
+    moved: dict[str, NDArray[np.float64]] = {}
+    budget: dict[str, dict[str, float]] = {}
+    for wire, stored in chains.items():
+        line = as_line(stored)
+        course = drift.from_command(robot, draws.for_robot(robot, line), x, R, _TIMES_S)
+        if not moved:
+            alt = f"{MAPPED} on new {wire} in three dimensions, and where creep takes its platform."
+            caption = "The drift is enlarged as the title says. Dotted: the wires after it."
+            gallery.add("robot", "scene", scene(robot, x, R, course), alt, caption)
+        distance = 1e3 * np.linalg.norm(course.position_m - x, axis=-1)
+        moved[wire] = np.where(course.found[:, None], distance, np.nan)
+        budget[wire] = shares.shares({name: line.parameters[name] for name in draws.CORE}, distance[:, -1])
+    alt = f"Distance of the platform of {MAPPED} from its pose while new wires of one line creep, for an hour."
+    caption = "New wires, the actuators still. Band: 90 % of the posterior draws; beyond 120 s extrapolated."
+    gallery.add("robot", "drift", drifts_in_time(moved, _TIMES_S, limit_mm, f"Robot {MAPPED}: drift"), alt, caption)
+    alt = f"Shares of the parameters in the variance of the drift of {MAPPED} after an hour, for each wire."
+    figure = budgets(budget, f"Robot {MAPPED}: where the doubt comes from")
+    gallery.add("robot", "budget", figure, alt, f"Of the drift after {_TIMES_S[-1]:g} s.")
 
 
 def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
