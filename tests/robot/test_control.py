@@ -95,6 +95,22 @@ def test_a_smaller_and_lighter_robot_is_the_same_robot():
     np.testing.assert_allclose(small, 0.5 * tau, rtol=1e-9)
 
 
+def test_the_largest_mass_is_where_the_claim_stops_to_hold():
+    robot, line = schema.read("linear-6"), _line(8)
+    mass = claim.largest_mass(robot, line, 1.0, steps=8)
+    assert 1e-3 < mass < 1.0
+
+    def holds(kilograms):
+        other = claim.scaled(robot, 1.0, kilograms)
+        wires = draws.for_robot(other, line, 0.05, np.random.default_rng(1))
+        out = claim.over_workspace(other, wires, claim.grid(other, (3, 3, 2)))
+        return np.mean(out.holds() >= 0.95) >= 0.95
+
+    assert holds(mass)
+    assert not holds(1.1 * mass)
+    assert claim.largest_mass(robot, line, 2.0, steps=8) < mass  # longer wires drift further
+
+
 def test_shares_find_who_makes_the_variance():
     rng = np.random.default_rng(0)
     a, b, c = rng.normal(size=(3, 4000))

@@ -83,3 +83,26 @@ def test_too_much_is_refused():
     # far from equilibrium there is nothing to prove
     away = reach(robot, "hooke", k1, zero, apart(1e-6 * k1, 1e-7 * zero), offset, x + [0, 0, 0.01], R)
     assert not away.proved or np.all(np.abs(away.centre_m - x) <= away.radius_m[:3])
+
+
+CURVED = [("linear-7", "modified"), ("hangprinter-4", "hooke"), ("robocrane", "hooke")]
+
+
+@pytest.mark.parametrize(("name", "law"), CURVED)
+def test_what_is_left_beside_the_line_is_bounded(name, law):
+    robot, k1, zero, offset, x, R = _case(name, law)
+    w = robot.legs
+    half = np.concatenate([1e-3 * k1, 1e-4 * zero])
+    got = reach(robot, law, k1, zero, apart(half[:w], half[w:]), offset, x, R)
+    assert got.proved
+
+    def poses(share):
+        values = np.concatenate([k1, zero]) + share * half
+        return _poses(robot, law, values[:, :w], values[:, w:], offset, x, R).position_m
+
+    small = 0.03
+    line = (poses(small * np.eye(2 * w)) - poses(-small * np.eye(2 * w))) / (2 * small)
+    corners = np.random.default_rng(3).choice([-1.0, 1.0], (200, 2 * w))
+    bent = np.abs(poses(corners) - (x + corners @ line)).max(0)
+    assert (bent <= got.beside_m[:3]).all()
+    assert (got.beside_m < got.radius_m - got.beside_m).all()  # the line is still the better part of the answer
