@@ -124,6 +124,7 @@ def sample(
     checkpoint: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
     found: Optimum | None = None,
+    near: Array | None = None,
 ) -> Chains:
     """Sample a posterior (see the module's policy).
 
@@ -138,12 +139,14 @@ def sample(
     progress : function of a share between 0 and 1
     found : Optimum, optional
         Modes already known, instead of a search.
+    near : (m, d) array, optional
+        Sampled coordinates that the search should climb from, too.
 
     Returns
     -------
     Chains
     """
-    state = _State.load(checkpoint) or _begin(target, seed, policy, found)
+    state = _State.load(checkpoint) or _begin(target, seed, policy, found, near)
     state.save(checkpoint)
     while not state.finished:
         if not state.frozen:
@@ -206,11 +209,11 @@ class _State:
             part.replace(path)
 
 
-def _begin(target: Target, seed: int, policy: Policy, found: Optimum | None) -> _State:
+def _begin(target: Target, seed: int, policy: Policy, found: Optimum | None, near: Array | None) -> _State:
     spawned = np.random.SeedSequence(seed).spawn(policy.ensembles + 1)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
-    found = found or modes(target, rng)
+    found = found or modes(target, rng, extra=near)
     proposal = mixtures.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
     positions, values, randoms = [], [], []
     for sequence in spawned[1:]:

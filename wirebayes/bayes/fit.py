@@ -1,7 +1,7 @@
 """One fit: a problem sampled to the policy's satisfaction, thinned to what is worth storing."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,7 @@ def fit(
     policy: Policy = DEFAULT,
     checkpoint: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
+    near: Mapping[str, float] | None = None,
 ) -> Fit:
     """Sample the posterior of a problem.
 
@@ -63,13 +64,18 @@ def fit(
     checkpoint : Path, optional
         See `wirebayes.bayes.ensemble.sample`.
     progress : function of a share between 0 and 1
+    near : mapping of name to value, optional
+        Parameters known to be good, where the search for modes looks too.
 
     Returns
     -------
     Fit
     """
     target = Target(problem)
-    chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress)
+    start = None
+    if near is not None and near.keys() >= set(problem.names):
+        start = target.coordinates.to_sampled(np.array([[near[name] for name in problem.names]]))
+    chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start)
     m, steps, walkers, d = chains.z.shape
     thin = max(1, steps * walkers // STORED_DRAWS)
     z = np.moveaxis(chains.z[:, thin - 1 :: thin], 2, 1)

@@ -32,6 +32,8 @@ class Job:
     law, history, likelihood, length_exponent
         See `wirebayes.bayes.problem.build`.
     provenance : dict
+    near : dict, optional
+        Parameters known to be good (see `wirebayes.bayes.fit.fit`).
     """
 
     folder: str
@@ -43,6 +45,7 @@ class Job:
     likelihood: Likelihood = "chain"
     length_exponent: Any = 1.0
     provenance: dict[str, Any] = field(default_factory=dict)
+    near: dict[str, float] | None = None
 
 
 def run(
@@ -84,7 +87,7 @@ def one(
                     likelihood=job.likelihood, length_exponent=job.length_exponent)  # fmt: skip
     own_seed = seed_of(seed, job.folder)
     checkpoint = folder / ".checkpoint"
-    result = fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress)
+    result = fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
     save(result, folder, job.provenance | {"seed": seed, "policy": vars(policy)}, seed=own_seed)
     checkpoint.unlink(missing_ok=True)
 

@@ -82,7 +82,8 @@ def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type
         provenance = {"data_sha256": e.data_hash}
         for model, effects in (("plain", ()), ("final", final_effects(findings, e))):
             keys = tuple(f.key for f in effects)
-            out.append(Job(f"{e.name}/{model}", (e,), keys, own_effects, law, history, "chain", 1.0, provenance))
+            near = findings.near[e.name] if model == "final" else None
+            out.append(Job(f"{e.name}/{model}", (e,), keys, own_effects, law, history, "chain", 1.0, provenance, near))
     return out
 
 

@@ -46,6 +46,13 @@ class Block:
     def names(self) -> tuple[str, ...]:
         return tuple(e.name for e in self.experiments)
 
+    def parameters(self, name: str) -> dict[str, float]:
+        """The best parameters, by the names they have where one of the experiments is fitted alone."""
+        theta = self.target.coordinates.to_natural(self.modes.z[:1])
+        sample = self.target.problem.samples[self.names.index(name)]
+        own = self.target.problem.parameters(theta, sample)
+        return {key: float(value[0]) for key, value in own.items()}
+
     @property
     def log_evidence(self) -> float:
         return float(self.modes.log_evidence.max())
@@ -57,10 +64,12 @@ def fitted(
     law: ElasticLaw,
     history: History,
     rng: np.random.Generator,
+    near: Array | None = None,
 ) -> Block:
-    """Fit a block from many starts."""
+    """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given."""
     target = Target(build(experiments, effects, law=law, history=history))
-    return Block(tuple(experiments), tuple(effects), law, history, target, modes(target, rng))
+    extra = None if near is None else target.coordinates.to_sampled(near[None])
+    return Block(tuple(experiments), tuple(effects), law, history, target, modes(target, rng, extra=extra))
 
 
 class Pinned:
@@ -97,6 +106,10 @@ class Pinned:
             return self.target(self._insert(points, amplitude[rows])) - self.log_flat
 
         return climb(density, start, iterations=40, tolerance=1e-2)
+
+    def natural(self, z: Array, amplitude: Array) -> Array:
+        """(n, d) parameters of all columns."""
+        return self.target.coordinates.to_natural(self._insert(z, amplitude))
 
     def _insert(self, z: Array, amplitude: Array) -> Array:
         return np.insert(z, self.column, amplitude / self.target.coordinates.scale[self.column], axis=1)

@@ -89,12 +89,7 @@ def choose(
         value = sum(r.log_bayes for r in refitted[form]) if form in refitted else linear[i][0]
         values.setdefault(form[0], {})[form[1:]] = value
     evidence = {name: _average(v, len(blocks)) for name, v in values.items()}
-    loose = flexible_log_bayes(scans)[:, 0]
-    unknown = (
-        float(loose[-1])
-        if len(blocks) == 1
-        else float(logsumexp([loose[-1] + np.log(0.5), *(loose[:-1] - np.log(2.0 * len(blocks)))]))
-    )
+    unknown = flexible_evidence(scans)
     winners = {}
     for name in evidence:
         own = {form: r for form, r in refitted.items() if form[0] == name}
@@ -102,6 +97,14 @@ def choose(
             winners[name] = max(own.values(), key=lambda r: sum(x.log_bayes for x in r))
     shares = probabilities({n: v for n, v in evidence.items() if n in winners}, unknown, UNKNOWN_WEIGHT)
     return Choice(evidence, unknown, winners, shares)
+
+
+def flexible_evidence(scans: Sequence[Scan]) -> float:
+    """Log Bayes factor of the flexible reference: on all blocks as likely as on one of them."""
+    loose = flexible_log_bayes(scans)[:, 0]
+    if len(scans) == 1:
+        return float(loose[-1])
+    return float(logsumexp([loose[-1] + np.log(0.5), *(loose[:-1] - np.log(2.0 * len(scans)))]))
 
 
 def _average(values: dict[tuple[str, tuple[int, ...], bool], float], blocks: int) -> float:

@@ -27,8 +27,12 @@ from wirebayes.wire.laws import ElasticLaw, History
 
 Array = NDArray[Any]
 ALPHA = 0.04
+ALPHA_AFTER = 0.03
 KEEP_ELPD = 4.0
-_MOST_EFFECTS = 3
+_MOST_EFFECTS = 2
+_NEAR, _MOST_COMPANY = 4.0, 2  # names this close to the best one are looked at again, so many
+_LEFT_OVER = 8.0  # the most that a second effect may explain of what one unknown form leaves over beside a name
+_RETESTS = 299
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,15 @@ class Findings:
         The content of ``discovery.json``.
     effects : dict of experiment name to tuple of Effect
         Of each experiment's final model.
+    near : dict of experiment name to dict
+        The final model's best parameters, by the names they have where the experiment is fitted alone.
     experiments : tuple of Experiment
         As given, gross errors struck out.
     """
 
     report: dict[str, Any]
     effects: dict[str, tuple[Effect, ...]]
+    near: dict[str, dict[str, float]]
     experiments: tuple[Experiment, ...]
 
 
@@ -150,6 +157,7 @@ def investigate(
     alike = power.similarity([_only(x, len(trials)) for x in expansions], trials, ratios)
     out: dict[str, Any] = {}
     effects: dict[str, tuple[Effect, ...]] = {}
+    near: dict[str, dict[str, float]] = {}
     for i, block in enumerate(plain):
         report("held-out holds", i, len(plain))
         affected = [a for a in accepted if i in a.blocks]
@@ -158,6 +166,7 @@ def investigate(
         checks = _held_out(block, final[i], verdict, choice, i, rng)
         for e, check in zip(block.experiments, checks, strict=True):
             effects[e.name] = final[i].effects
+            near[e.name] = final[i].parameters(e.name)
             sample = block.target.problem.samples[block.names.index(e.name)]
             line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
             residual = (sample.readings - line.tension)[sample.protocol.mask]
@@ -167,7 +176,7 @@ def investigate(
                 "gross_errors": [g for g in struck if g["experiment"] == e.name],
             }
     report("held-out holds", len(plain), len(plain))
-    return Findings({"version": 1, "experiments": out}, effects, tuple(e for b in plain for e in b.experiments))
+    return Findings({"version": 1, "experiments": out}, effects, near, tuple(e for b in plain for e in b.experiments))
 
 
 def final_effects(findings: Findings, experiment: Experiment) -> tuple[Effect, ...]:
@@ -222,11 +231,9 @@ def _decide(
     plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator
 ) -> tuple[str, list[_Accepted], list[Block], Choice]:
     """Verdict, accepted effects in order, final blocks, and the choice as revised by pairs of effects."""
-    if choice.best == "unknown":
-        choice = _try_pairs(plain, choice, settings, rng)
+    choice = _with_company(plain, choice, settings, rng)
     if choice.best == "unknown":
         return "unknown", [], plain, choice
-    verdict = "named" if choice.set == [choice.best] else "ambiguous"
     blocks, accepted = _add(plain, choice, choice.best, settings, rng)
     done = [accepted]
     while len(done) < _MOST_EFFECTS:
@@ -249,30 +256,62 @@ def _decide(
         if gain <= KEEP_ELPD:
             break
         blocks, done = more, [*done, extra]
-    return verdict, done, blocks, choice
+    choice = _retested(blocks, choice, settings, rng)
+    if choice.best == "unknown":
+        return "unknown", [], plain, choice
+    return "named" if choice.set == [choice.best] else "ambiguous", done, blocks, choice
 
 
-def _try_pairs(plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator) -> Choice:
-    """Whether two named effects together explain what one cannot: then the first of them is named after all.
+def _with_company(plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator) -> Choice:
+    """The likeliest names once more, each together with a second effect, and together with the flexible reference.
 
-    A pair has prior odds of a tenth to one effect, shared by all pairs.
+    A pair has prior odds of a tenth to one effect, shared by all second effects, and counts for the name. A name that
+    needs the flexible reference beside it is only like what is missing: that counts for *unknown*. So does a small
+    second effect, twice as much as for a pair: what a name leaves over of a form like it is small, a second effect of
+    its own need not be.
     """
-    names = sorted(choice.winners, key=lambda n: -choice.log_bayes[n])[:3]
-    odds = np.log(0.1) - np.log(max(len(choice.winners), 1))
-    evidence = dict(choice.log_bayes)
+    names = sorted(choice.winners, key=lambda n: -choice.log_bayes[n])
+    names = [n for n in names if choice.log_bayes[n] > choice.log_bayes[names[0]] - _NEAR][:_MOST_COMPANY]
+    odds = np.log(0.1) - np.log(len(settings.kinds))
+    evidence, unknown = dict(choice.log_bayes), choice.unknown
     for name in names:
         blocks, _ = _add(plain, choice, name, settings, rng)
         trials, candidates = screen.candidate_probes(blocks, settings.kinds)
-        if not candidates:
-            continue
         scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+        beside = choose.flexible_evidence(scans) + np.log(0.5 / len(names))
+        unknown = float(np.logaddexp(unknown, choice.log_bayes[name] + beside))
+        if max((float(screen.log_bayes(c, scans)[0][0]) for c in candidates), default=0.0) + odds < -_NEAR:
+            continue
         further = choose.choose(blocks, trials, candidates, scans)
-        if further.winners:
-            evidence[name] = float(
-                np.logaddexp(evidence[name], evidence[name] + odds + max(further.log_bayes[n] for n in further.winners))
-            )
-    shares = probabilities({n: evidence[n] for n in choice.winners}, choice.unknown, UNKNOWN_WEIGHT)
-    return replace(choice, log_bayes=evidence, shares=shares)
+        pair = max((further.log_bayes[n] for n in further.winners), default=-np.inf)
+        evidence[name] = float(np.logaddexp(evidence[name], choice.log_bayes[name] + odds + pair))
+        alike = choice.log_bayes[name] + odds + np.log(2.0) + min(pair, _LEFT_OVER)
+        unknown = float(np.logaddexp(unknown, alike))
+    return _weighed(replace(choice, log_bayes=evidence, unknown=unknown))
+
+
+def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator) -> Choice:
+    """The global test again, with what was accepted inside: a name that leaves too much over gives way to *unknown*.
+
+    At `ALPHA_AFTER` both are as likely; below it the odds grow as p to the power -0.8, the density that p has where
+    more is missing than was added.
+    """
+    trials, candidates = screen.candidate_probes(blocks, settings.kinds)
+    if not candidates:
+        return choice
+    scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+    nulls = [screen.replicated(b, trials, _RETESTS, rng) for b in blocks]
+    p = screen.global_test(candidates, scans, nulls).p
+    if p > ALPHA_AFTER:
+        return choice
+    against = choice.log_bayes[choice.best] - 0.8 * np.log(p / ALPHA_AFTER)
+    return _weighed(replace(choice, unknown=float(np.logaddexp(choice.unknown, against))))
+
+
+def _weighed(choice: Choice) -> Choice:
+    """The probabilities of a choice whose evidence has changed."""
+    shares = probabilities({n: choice.log_bayes[n] for n in choice.winners}, choice.unknown, UNKNOWN_WEIGHT)
+    return replace(choice, shares=shares)
 
 
 def _add(
@@ -282,7 +321,9 @@ def _add(
     out, effects = list(blocks), {}
     for b, r in choice.amplitudes(name).items():
         effects[b] = r.effect
-        out[b] = fitted(blocks[b].experiments, (*blocks[b].effects, r.effect), settings.law, settings.history, rng)
+        near = r.theta[r.blocks.index(b)]
+        every = (*blocks[b].effects, r.effect)
+        out[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near)
     return out, _Accepted(name, tuple(effects), effects)
 
 
@@ -389,7 +430,7 @@ def _held_out(
             for _ in block.experiments
         ]
     plain = gap.held_out(block.experiments, train, (), block, rng)
-    better = plain if not final.effects else gap.held_out(block.experiments, train, final.effects, block, rng)
+    better = plain if not final.effects else gap.held_out(block.experiments, train, final.effects, final, rng)
     shrinks, loho = False, None
     if final.effects:
         difference = gap.leave_one_hold_out(final, rng) - gap.leave_one_hold_out(block, rng)

@@ -73,12 +73,12 @@ def held_out(
         Recorded holds to train on, each.
     effects : sequence of Effect
     block : Block
-        Says which laws.
+        Says which laws, and where to look first if it has these effects.
     rng : numpy Generator
     """
-    trained = fitted(
-        [e.train(k) for e, k in zip(experiments, train, strict=True)], effects, block.law, block.history, rng
-    )
+    first = [e.train(k) for e, k in zip(experiments, train, strict=True)]
+    near = block.target.coordinates.to_natural(block.modes.z[:1])[0] if block.effects == tuple(effects) else None
+    trained = fitted(first, effects, block.law, block.history, rng, near)
     theta = quick.draws(trained.target, trained.modes, rng, 500)
     whole = build(experiments, effects, law=block.law, history=block.history)
     # The training readings' reference tension belongs to the parameters.

@@ -34,6 +34,8 @@ class Refit:
         Against the same blocks without it.
     amplitude, sd : float
         Best amplitude and its standard deviation.
+    theta : tuple of (d,) arrays
+        All parameters there, a block.
     """
 
     effect: Effect
@@ -41,6 +43,7 @@ class Refit:
     log_bayes: float
     amplitude: float
     sd: float
+    theta: tuple[Array, ...]
 
 
 def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_delta: float, guess: float) -> Refit:
@@ -100,9 +103,9 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
     best = int(np.argmax(value))
     sd = _width(grid, value, best, per_delta)
     span = LARGEST if one_sided else 2.0 * LARGEST
-    return Refit(
-        effect, tuple(which), float(value[best] + 0.5 * np.log(2 * np.pi) - np.log(span)), float(grid[best]), sd
-    )
+    log_bayes = float(value[best] + 0.5 * np.log(2 * np.pi) - np.log(span))
+    theta = tuple(p.natural(e[best][None], grid[best : best + 1])[0] for p, e in zip(pinned, ends, strict=True))
+    return Refit(effect, tuple(which), log_bayes, float(grid[best]), sd, theta)
 
 
 def _width(grid: Array, value: Array, best: int, fallback: float) -> float:
