@@ -9,6 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from malformed import CASES, message, write
 
 from wirebayes import __version__
+from wirebayes.effects import CATALOGUE
 
 project = "wirebayes"
 author = "The wirebayes developers"
@@ -35,6 +36,19 @@ def _table_of_mistakes(_app: object) -> None:
     target.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def _table_of_effects(_app: object) -> None:
+    lines = [".. list-table::", "   :header-rows: 1", "   :widths: 22 12 16 50", ""]
+    lines += ["   * - name", "     - belongs to", "     - amplitude", "     - what it says"]
+    for name, kind in CATALOGUE.items():
+        amplitude = kind.amplitudes[0]
+        lines += [f"   * - ``{name}``", f"     - {kind.scope}"]
+        lines += [f"     - ``{amplitude.name}`` ({amplitude.unit})", f"     - {kind.sentence}"]
+    target = Path(__file__).parent / "generated" / "effects.rst"
+    target.parent.mkdir(exist_ok=True)
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def setup(app: object) -> None:
     """Called by Sphinx."""
     app.connect("builder-inited", _table_of_mistakes)  # type: ignore[attr-defined]
+    app.connect("builder-inited", _table_of_effects)  # type: ignore[attr-defined]
