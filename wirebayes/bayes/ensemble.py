@@ -6,7 +6,9 @@ below the others' (stuck in a far mode of no weight) are set back to draws of th
 Rounds grow longer while the proposal leaves out a tail that walkers have found. Then the proposal is frozen and draws
 are kept, block by block, until for every parameter
 
-- the effective sample size from the autocorrelation time is at least `Policy.ess`, and
+- the effective sample size from the autocorrelation time is at least `Policy.ess`,
+- the kept steps span the five autocorrelation times that its estimate sums over (about 1,000 walkers are averaged in
+  it, so that its error is then below a tenth), and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`,
 
 or until `Policy.most_steps`: then the result says *not converged*, and why.
@@ -332,7 +334,7 @@ def _look(target: Target, state: _State, policy: Policy) -> None:
     state.autocorrelation = autocorrelation_steps(values)
     state.ess = values.shape[0] * steps * values.shape[2] / state.autocorrelation
     state.r_hat = nested_r_hat(values)
-    long_enough = steps >= 10.0 * state.autocorrelation.max()
+    long_enough = steps >= _WINDOW * state.autocorrelation.max()
     if long_enough and (state.ess >= policy.ess).all() and (state.r_hat <= policy.r_hat).all():
         state.finished, state.converged = True, True
         least, most = float(state.ess.min()), float(state.r_hat.max())
@@ -366,7 +368,7 @@ def autocorrelation_steps(values: Array) -> Array:
             out[k] = np.inf
             continue
         times = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-        window = np.flatnonzero(np.arange(steps) >= 5.0 * times)
+        window = np.flatnonzero(np.arange(steps) >= _WINDOW * times)
         out[k] = max(times[window[0] if len(window) else -1], 1.0)
     return out
 
@@ -385,6 +387,7 @@ def describe(policy: Policy) -> dict[str, Any]:
     return asdict(policy)
 
 
+_WINDOW = 5.0  # Sokal's: autocorrelations are summed over so many autocorrelation times
 _OVERDISPERSED = 1.7
 _GOOD_ACCEPTANCE = 0.25
 _EXPLORATION = 0.4  # the same in burn-in, whose draws should reach the tails for the proposal to learn them
