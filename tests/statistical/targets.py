@@ -16,21 +16,22 @@ class Analytic:
         self.log_density, self.mean, self.second = log_density, mean, second
         self.evaluations = 0
         same = lambda x: x  # noqa: E731
-        self.coordinates = SimpleNamespace(to_sampled=same, to_natural=same, log_columns=np.zeros(D, bool))
-        start = lambda n, rng: rng.normal(0.0, spread, (n, D))  # noqa: E731
-        self.problem = SimpleNamespace(prior=SimpleNamespace(rvs=start), names=tuple(f"x{i}" for i in range(D)))
+        d = len(mean)
+        self.coordinates = SimpleNamespace(to_sampled=same, to_natural=same, log_columns=np.zeros(d, bool))
+        start = lambda n, rng: rng.normal(0.0, spread, (n, d))  # noqa: E731
+        self.problem = SimpleNamespace(prior=SimpleNamespace(rvs=start), names=tuple(f"x{i}" for i in range(d)))
 
     def __call__(self, z, readings=None):
         self.evaluations += len(z)
         return np.atleast_1d(self.log_density(z))  # scipy makes a number of one row
 
 
-def gaussian():
+def gaussian(d=D):
     """Correlated, standard deviations from 0.03 to 1."""
     rng = np.random.default_rng(8)
-    basis, _ = np.linalg.qr(rng.normal(size=(D, D)))
-    covariance = basis @ np.diag(np.geomspace(1e-3, 1.0, D)) @ basis.T
-    mean = rng.normal(size=D)
+    basis, _ = np.linalg.qr(rng.normal(size=(d, d)))
+    covariance = basis @ np.diag(np.geomspace(1e-3, 1.0, d)) @ basis.T
+    mean = rng.normal(size=d)
     density = stats.multivariate_normal(mean, covariance).logpdf
     return Analytic(density, mean, np.diag(covariance) + mean**2)
 

@@ -49,6 +49,17 @@ def test_moments_are_right_over_many_runs_with_the_policy_s_own_walkers(name):
     assert 0.6 < ratio < 1.5
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("d", [12, 18, 24])
+def test_moments_are_right_in_as_many_dimensions_as_samples_fitted_together_have(d):
+    """Two samples of one material have 12 parameters, six have 24, partial pooling of two has 18."""
+    policy = Policy(ess=2000.0, block=40, most_steps=800)
+    t, ratio = worst(lambda: gaussian(d), policy)
+    print(f"{d} dimensions: largest |t| {t:.2f}, spread over promised {ratio:.2f}")
+    assert t < LIMIT
+    assert 0.6 < ratio < 1.7
+
+
 class _ForgetsTheProposal(moves.IndependenceMove):
     """Metropolis without Hastings: takes the proposal for symmetric."""
 
@@ -73,7 +84,7 @@ def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
         kept(target, state, policy)
 
     monkeypatch.setattr(ensemble, "_kept_block", wrong)
-    t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "block": 2, "most_steps": 24}))
+    t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "block": 2, "most_steps": 24, "ess": 1e9}))
     assert t > LIMIT
 
 
