@@ -11,7 +11,7 @@ import numpy as np
 
 from wirebayes.bayes.fit import fit, seed_of
 from wirebayes.discrepancy.candidates import BASE, Candidate, candidates, effects_of, problem_of
-from wirebayes.discrepancy.loho import loho
+from wirebayes.discrepancy.loho import LARGEST_K, loho
 from wirebayes.effects import catalogue
 from wirebayes.experiment import select
 from wirebayes.paper import experiments
@@ -24,8 +24,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--experiment", default="roc-line-1.71m")
     experiment = select(experiments(), parser.parse_args().experiment)[0]
-    print(f"{experiment.name}: model, elpd by importance sampling (refits where Pareto k > 0.7), by refitting all, "
-          "difference, largest difference of a hold, holds refitted by the diagnostic")  # fmt: skip
+    print(f"{experiment.name}: model, elpd by importance sampling (refits where Pareto k > {LARGEST_K}), "
+          "by refitting all, difference, largest difference of a hold, holds refitted by the diagnostic")  # fmt: skip
     fast, exact = {}, {}
     known = catalogue()
     for candidate in candidates(experiment, Candidate(BASE, "", ""), known, MODELS):
