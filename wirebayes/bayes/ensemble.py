@@ -390,6 +390,6 @@ def describe(policy: Policy) -> dict[str, Any]:
 _WINDOW = 5.0  # Sokal's: autocorrelations are summed over so many autocorrelation times
 _OVERDISPERSED = 1.7
 _GOOD_ACCEPTANCE = 0.25
-_EXPLORATION = 0.4  # the same in burn-in, whose draws should reach the tails for the proposal to learn them
 _EVOLUTION = 0.1  # share of steps that do not trust the proposal
+_EXPLORATION = 0.4  # the same in burn-in, whose draws should reach the tails for the proposal to learn them
 _SAFETY = 0.1  # share of the proposal that does not trust its fit

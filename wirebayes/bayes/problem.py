@@ -238,8 +238,8 @@ def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float,
 
     The creep amount grows as the ratio to the power `exponent`, an effect's elongation as the ratio itself.
     """
-    grown = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_elongation}
-    return {n: v * (ratio**exponent if n == "B" else ratio if n in grown else 1.0) for n, v in own.items()}
+    grown = [c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_elongation]
+    return {**own, "B": own["B"] * ratio**exponent, **{name: own[name] * ratio for name in grown}}
 
 
 def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:

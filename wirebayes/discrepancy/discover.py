@@ -237,10 +237,9 @@ def _decide(
     blocks, accepted = _add(plain, choice, choice.best, settings, rng)
     done = [accepted]
     while len(done) < _MOST_EFFECTS:
-        trials, candidates = screen.candidate_probes(blocks, settings.kinds)
+        trials, candidates, scans = _scanned(blocks, settings)
         if not candidates:
             break
-        scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
         if max(float(screen.log_bayes(c, scans)[0][0]) for c in candidates) < KEEP_ELPD - 2.0:
             break
         further = choose.choose(blocks, trials, candidates, scans)
@@ -276,8 +275,7 @@ def _with_company(plain: list[Block], choice: Choice, settings: Settings, rng: n
     evidence, unknown = dict(choice.log_bayes), choice.unknown
     for name in names:
         blocks, _ = _add(plain, choice, name, settings, rng)
-        trials, candidates = screen.candidate_probes(blocks, settings.kinds)
-        scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+        trials, candidates, scans = _scanned(blocks, settings)
         beside = choose.flexible_evidence(scans) + np.log(0.5 / len(names))
         unknown = float(np.logaddexp(unknown, choice.log_bayes[name] + beside))
         if max((float(screen.log_bayes(c, scans)[0][0]) for c in candidates), default=0.0) + odds < -_NEAR:
@@ -296,16 +294,21 @@ def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.r
     At `ALPHA_AFTER` both are as likely; below it the odds grow as p to the power -0.8, the density that p has where
     more is missing than was added.
     """
-    trials, candidates = screen.candidate_probes(blocks, settings.kinds)
+    trials, candidates, scans = _scanned(blocks, settings)
     if not candidates:
         return choice
-    scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
     nulls = [screen.replicated(b, trials, _RETESTS, rng) for b in blocks]
     p = screen.global_test(candidates, scans, nulls).p
     if p > ALPHA_AFTER:
         return choice
     against = choice.log_bayes[choice.best] - 0.8 * np.log(p / ALPHA_AFTER)
     return _weighed(replace(choice, unknown=float(np.logaddexp(choice.unknown, against))))
+
+
+def _scanned(blocks: list[Block], settings: Settings) -> tuple[list[Probe], list[Candidate], list[Scan]]:
+    """What could be added to fitted blocks, and its linear scan on each."""
+    trials, candidates = screen.candidate_probes(blocks, settings.kinds)
+    return trials, candidates, [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
 
 
 def _weighed(choice: Choice) -> Choice:
