@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import fit, seed_of
 from wirebayes.bayes.noise import chain, reading_variance
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import MATERIAL, Problem
 from wirebayes.output import write_json
 from wirebayes.simulate import Bench, Simulated, Truth, draw

@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import fit, seed_of
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import Problem, build
 from wirebayes.bayes.replicate import readings

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wirebayes.bayes.ensemble import autocorrelation_steps, nested_r_hat
+from wirebayes.bayes.convergence import autocorrelation_steps, nested_r_hat
 
 WANTED = 20_000
 R_HAT = 1.01

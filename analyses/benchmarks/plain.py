@@ -7,8 +7,9 @@ import numpy as np
 
 from analyses.benchmarks.measure import Costs, judged, looked_at
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.ensemble import Policy, sample
+from wirebayes.bayes.ensemble import sample
 from wirebayes.bayes.optimum import modes
+from wirebayes.bayes.policy import Policy
 
 
 def ours(problem, seed, seconds, wanted=20_000):

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.bayes.calibration import one
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import seed_of
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import Problem, build, with_readings
 from wirebayes.bayes.replicate import readings
 from wirebayes.simulate import PAPER_TIMES_S, Bench
@@ -48,7 +48,7 @@ class Study:
         return {
             "study": self.name, "index": index, "share_below": ranked.share_below, "truth": ranked.truth,
             "converged": chains.converged, "why": chains.why, "steps": int(chains.z.shape[1]),
-            "acceptance": chains.acceptance, "learned": chains.learned, "modes": chains.modes, "stuck": chains.stuck,
+            "acceptance": chains.acceptance, "learned": chains.learned, "modes": chains.modes,
             "redrawn": ranked.redrawn,
         }  # fmt: skip
 

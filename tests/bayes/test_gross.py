@@ -11,9 +11,9 @@ from scipy.special import logsumexp
 from tests.bayes.dense import columns, jacobian, log_density
 from tests.wire.protocols import PLAIN, parameters, protocol
 from wirebayes.bayes import gross, noise
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import fit
 from wirebayes.bayes.gross import with_gross_errors
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build, with_readings
 from wirebayes.errors import InputError
 from wirebayes.simulate import Bench, Truth, draw

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from wirebayes.bayes import result
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import fit
+from wirebayes.bayes.policy import Policy
 from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
 from wirebayes.simulate import Bench, Truth, draw
 from wirebayes.wire.staircase import simulate
 
-HASTY = Policy(walkers=64, rounds=1, round_steps=2, most_rounds=1, block=2, most_steps=2)
+HASTY = Policy(walkers=64, rounds=2, round_steps=8, most_rounds=2, block=4, most_steps=4)
 BENCHES = [Bench("short", "line", 800.0), Bench("long", "line", 1700.0)]
 
 

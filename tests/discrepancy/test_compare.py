@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wirebayes import cli
-from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build
 from wirebayes.discrepancy import compare
 from wirebayes.discrepancy.candidates import BASE, Candidate, candidates, effects_of, problem_of

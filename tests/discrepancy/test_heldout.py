@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import Fit, fit
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build
 from wirebayes.discrepancy.heldout import held_out, pit_band, train_counts, two_thirds
 from wirebayes.experiment import Experiment

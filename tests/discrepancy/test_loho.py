@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import Fit, fit
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build
 from wirebayes.discrepancy.loho import LeftOut, difference, loho, without_hold
 from wirebayes.paper import experiments

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from wirebayes import cli
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import fit
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build
 from wirebayes.bayes.result import save
 from wirebayes.paper import FOLDER, experiments

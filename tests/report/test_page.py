@@ -10,8 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from wirebayes import paper
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.jobs import Job, run
+from wirebayes.bayes.policy import Policy
 from wirebayes.cli import main
 from wirebayes.report.blocks import Page, Picture, Pictures, Section, Table, Text, drawn, number, span, svg, unit_text
 from wirebayes.report.page import render, write

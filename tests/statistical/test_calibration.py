@@ -6,7 +6,7 @@ import pytest
 from analyses.calibration.__main__ import run, shares
 from analyses.calibration.study import BROKEN, STUDIES, Study
 from wirebayes.bayes import calibration
-from wirebayes.bayes.ensemble import Policy
+from wirebayes.bayes.policy import Policy
 
 pytestmark = pytest.mark.statistical
 

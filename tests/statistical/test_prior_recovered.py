@@ -5,8 +5,8 @@ import pytest
 from scipy import stats
 
 from wirebayes.bayes.coordinates import Coordinates
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import fit
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import Problem, build
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.simulate import Bench, Truth, draw

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.bayes.coordinates import Coordinates
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import Fit, fit, seed_of
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import Problem, with_readings
 from wirebayes.bayes.replicate import readings
 

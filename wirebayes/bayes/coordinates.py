@@ -8,6 +8,9 @@ Positive parameters become logarithms, others count in standard deviations of th
   creep is linear in B, so G needs no B and one pass along the holds.
 
 The map is triangular and its last two steps have unit Jacobian.
+
+What bend and what funnel remain, a proposal learns (`wirebayes.bayes.straighten`), for which the columns have an order:
+errors before what they blur, the shape of the creep before its amount and the stiffness.
 """
 
 from dataclasses import dataclass
@@ -19,6 +22,8 @@ from numpy.typing import NDArray
 from wirebayes.bayes.problem import MATERIAL, Problem, Sample
 
 Array = NDArray[Any]
+_FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
+_LAST = ("k1", "B")
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,7 @@ class Coordinates:
                 for n, log in zip(names, self.log_columns, strict=True)
             ]
         )
+        self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
         self.ridges = []
         for mark in dict.fromkeys(_mark(problem, s.material) for s in problem.samples):
             sample = next(s for s in problem.samples if _mark(problem, s.material) == mark)
@@ -112,6 +118,11 @@ class Coordinates:
         with np.errstate(all="ignore"):
             creep = ridge.log_creep(U, k2, N) + np.log(k1) - ridge.log_length
         return creep, self._hazard(theta, ridge)
+
+
+def _rank(name: str) -> int:
+    kind = name.split("[")[0]
+    return _FIRST.index(kind) - len(_FIRST) if kind in _FIRST else int(kind in _LAST)
 
 
 def _ridge(where: dict[str, int], fixed: dict[str, float], sample: Sample, likelihood: str) -> _Ridge:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes import ensemble
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.ensemble import DEFAULT, Chains, Policy
+from wirebayes.bayes.ensemble import Chains
+from wirebayes.bayes.policy import DEFAULT, Policy
 from wirebayes.bayes.problem import Problem
 
 Array = NDArray[Any]

@@ -8,8 +8,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from wirebayes.bayes.ensemble import DEFAULT, Policy
 from wirebayes.bayes.fit import fit, seed_of
+from wirebayes.bayes.policy import DEFAULT, Policy
 from wirebayes.bayes.problem import Likelihood, build
 from wirebayes.effects import catalogue, named
 from wirebayes.experiment import Experiment

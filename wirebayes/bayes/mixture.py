@@ -9,16 +9,16 @@ from scipy.special import gammaln, logsumexp
 
 Array = NDArray[Any]
 DEGREES = 10.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
-_ENOUGH = 8000  # points that settle a mixture in a handful of dimensions; more only take time
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """Weights ``(k,)``, centres ``(k, d)`` and lower Cholesky factors ``(k, d, d)`` of the scales."""
+    """Weights ``(k,)``, centres ``(k, d)``, lower Cholesky factors ``(k, d, d)`` of the scales, degrees of freedom."""
 
     weights: Array
     centres: Array
     factors: Array
+    degrees: float = DEGREES
 
     def log_density(self, x: Array) -> Array:
         """(n,) log density of points (n, d)."""
@@ -28,14 +28,16 @@ class Mixture:
         """(n, d) draws; `rng` is a numpy RandomState or Generator."""
         d = self.centres.shape[1]
         which = rng.choice(len(self.weights), size=n, p=self.weights)
-        stretch = np.sqrt(DEGREES / rng.chisquare(DEGREES, size=n))
+        stretch = np.sqrt(self.degrees / rng.chisquare(self.degrees, size=n))
         return self.centres[which] + stretch[:, None] * np.einsum(
             "nij,nj->ni", self.factors[which], rng.standard_normal((n, d))
         )
 
     def _parts(self, x: Array) -> Array:
         """(k, n) log density of each component."""
-        return np.array([_log_t(_distance(x, c, f), f) for c, f in zip(self.centres, self.factors, strict=True)])
+        return np.array(
+            [_log_t(_distance(x, c, f), f, self.degrees) for c, f in zip(self.centres, self.factors, strict=True)]
+        )
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:
@@ -44,58 +46,45 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
     return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
 
 
-def blend(main: Mixture, safety: Mixture, share: float) -> Mixture:
-    """Both together, `share` of the weight on the second."""
-    return Mixture(
-        np.concatenate([(1.0 - share) * main.weights, share * safety.weights]),
-        np.concatenate([main.centres, safety.centres]),
-        np.concatenate([main.factors, safety.factors]),
-    )
-
-
-def wider(mixture: Mixture, factor: float) -> Mixture:
-    """The same with all scales stretched."""
-    return Mixture(mixture.weights, mixture.centres, mixture.factors * factor)
-
-
-def fit(x: Array, rng: np.random.Generator, *, most: int = 8) -> Mixture:
+def fit(x: Array, rng: np.random.Generator, *, most: int = 8, degrees: float = DEGREES) -> Mixture:
     """The mixture of as many components, up to `most`, as points (n, d) can hold apart."""
-    x = x[:: 1 + len(x) // _ENOUGH]
     for k in range(most, 0, -1):
         try:
-            return _em(x, k, rng)
+            return _em(x, k, degrees, rng)
         except np.linalg.LinAlgError:
             continue
     raise np.linalg.LinAlgError("the points do not span their space")
 
 
-def _em(x: Array, k: int, rng: np.random.Generator, iterations: int = 60) -> Mixture:
+def _em(x: Array, k: int, degrees: float, rng: np.random.Generator, iterations: int = 60) -> Mixture:
     n, d = x.shape
-    covariance = np.cov(x.T).reshape(d, d)
-    ridge = 1e-9 * np.diag(np.diag(covariance))
-    root = np.linalg.cholesky(covariance + ridge)
+    covariance = np.cov(x.T).reshape(d, d) + 1e-9 * np.diag(x.var(axis=0))
+    root = np.linalg.cholesky(covariance)
     centres = x[spread_rows(np.linalg.solve(root, x.T).T, k, rng)]
-    mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(root[None], k, axis=0))
+    if len(centres) < k:
+        raise np.linalg.LinAlgError("fewer different points than components")
+    mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(root[None], k, axis=0), degrees)
     last = -np.inf
     for _ in range(iterations):
         distances = np.array([_distance(x, c, f) for c, f in zip(mixture.centres, mixture.factors, strict=True)])
-        logs = np.array([_log_t(q, f) for q, f in zip(distances, mixture.factors, strict=True)])
+        logs = np.array([_log_t(q, f, degrees) for q, f in zip(distances, mixture.factors, strict=True)])
         logs += np.log(mixture.weights)[:, None]
         total = logsumexp(logs, axis=0)
         share = np.exp(logs - total)
         # A component that holds too few points for its own covariance takes the others with it: stop there.
         if (share.sum(axis=1) < 3.0 * d).any():
             raise np.linalg.LinAlgError("empty component")
-        heavy = share * (DEGREES + d) / (DEGREES + distances)
+        heavy = share * (degrees + d) / (degrees + distances)
         new_centres = np.einsum("kn,nd->kd", heavy, x) / heavy.sum(axis=1, keepdims=True)
         factors = []
         for i in range(k):
             deviation = x - new_centres[i]
-            scale = (heavy[i][:, None] * deviation).T @ deviation / share[i].sum()
-            factors.append(np.linalg.cholesky(scale + ridge))
-        mixture = Mixture(share.sum(axis=1) / n, new_centres, np.array(factors))
+            # a walker that stayed repeats its point: without some of the whole heap, a component shrinks onto that
+            scale = (heavy[i][:, None] * deviation).T @ deviation + _OF_THE_WHOLE * covariance
+            factors.append(np.linalg.cholesky(scale / (share[i].sum() + _OF_THE_WHOLE)))
+        mixture = Mixture(share.sum(axis=1) / n, new_centres, np.array(factors), degrees)
         log_likelihood = float(total.sum())
-        if log_likelihood - last < 1e-4 * n:
+        if log_likelihood - last < 1e-3 * n:
             break
         last = log_likelihood
     return mixture
@@ -117,7 +106,10 @@ def _distance(x: Array, centre: Array, factor: Array) -> Array:
     return np.einsum("nd,nd->n", y, y)
 
 
-def _log_t(distance: Array, factor: Array) -> Array:
+def _log_t(distance: Array, factor: Array, degrees: float) -> Array:
     d = len(factor)
-    constant = gammaln(0.5 * (DEGREES + d)) - gammaln(0.5 * DEGREES) - 0.5 * d * np.log(DEGREES * np.pi)
-    return constant - np.log(np.diag(factor)).sum() - 0.5 * (DEGREES + d) * np.log1p(distance / DEGREES)
+    constant = gammaln(0.5 * (degrees + d)) - gammaln(0.5 * degrees) - 0.5 * d * np.log(degrees * np.pi)
+    return constant - np.log(np.diag(factor)).sum() - 0.5 * (degrees + d) * np.log1p(distance / degrees)
+
+
+_OF_THE_WHOLE = 3.0  # points' worth of the covariance of all points in that of every component

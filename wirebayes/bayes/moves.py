@@ -5,6 +5,7 @@ from typing import Any
 from emcee.moves import MHMove
 
 from wirebayes.bayes.mixture import Mixture
+from wirebayes.bayes.proposal import Proposal
 
 
 class IndependenceMove(MHMove):  # type: ignore[misc]
@@ -15,10 +16,10 @@ class IndependenceMove(MHMove):  # type: ignore[misc]
     wherever p/q is bounded. Adapting q during kept draws would void the argument: fit it to the burn-in, then freeze.
     """
 
-    def __init__(self, mixture: Mixture) -> None:
-        self.mixture = mixture
+    def __init__(self, proposal: Mixture | Proposal) -> None:
+        self.proposal = proposal
         super().__init__(self._propose)
 
     def _propose(self, x: Any, random: Any) -> tuple[Any, Any]:
-        y = self.mixture.rvs(len(x), random)
-        return y, self.mixture.log_density(x) - self.mixture.log_density(y)
+        y = self.proposal.rvs(len(x), random)
+        return y, self.proposal.log_density(x) - self.proposal.log_density(y)

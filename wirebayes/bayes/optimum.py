@@ -4,7 +4,7 @@ Every row is an optimisation of its own; rows may also have readings of their ow
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,11 @@ from wirebayes.bayes.mixture import spread_rows
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
-_POPULATION = 800
-_MOVES = 2
+_ROUNDS = 4  # of climbs from places that no mode explains
+_LOOKED, _STRANGE = 1600, 200  # places asked whether a mode explains them; the most that are asked again
+_ON_THE_WAY = np.array([0.25, 0.5, 0.75])
+_WARM_STEPS = 4  # the last ones of the cooling
+_LEAST_SAG = 1.0  # nats
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 
@@ -139,57 +142,121 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     return gradient, hessian
 
 
-def modes(
-    target: Target, rng: np.random.Generator, *, draws: int = 2000, starts: int = 24, extra: Array | None = None
-) -> Optimum:
-    """The distinct modes of a posterior, best first: good ones among many prior draws, each climbed.
+def modes(target: Target, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
+    """The distinct modes of a posterior, best first (see `search`)."""
+    return search(target, rng, extra=extra).modes
 
-    Half of the starts are the best draws, which may all lie about one mode; the others come from a population of draws
-    that was cooled to the posterior and so holds every mode that had weight on the way. `extra` are further starts
-    ``(m, d)`` in sampled coordinates.
+
+@dataclass(frozen=True)
+class Search:
+    """What a search found.
+
+    Attributes
+    ----------
+    modes : Optimum
+        The distinct modes, best first.
+    warm, cold : (n, d) arrays
+        Rough draws of the density to some power below one, and of the density itself.
+    """
+
+    modes: Optimum
+    warm: Array
+    cold: Array
+
+
+def search(
+    target: Target, rng: np.random.Generator, *, draws: int = 800, starts: int = 12, extra: Array | None = None
+) -> Search:
+    """Look for the modes of a posterior: good ones among many prior draws, each climbed.
+
+    A population of prior draws is cooled to the posterior. Half of the starts are spread over all places it passed:
+    where it ends, a mode of less weight may have died out, but on the way it lived. The others are chosen among passed
+    places that belong to the hill of no mode found by then, as long as there are any.
+
+    Parameters
+    ----------
+    target : Target
+    rng : numpy Generator
+    draws : int
+        Of the prior.
+    starts : int
+        The most climbs.
+    extra : (m, d) array, optional
+        Further starts, in sampled coordinates.
     """
     z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
     value = target(z)
-    best = z[np.argsort(-value)[: starts // 2]]
-    cooled = _cooled(target, z[:_POPULATION], value[:_POPULATION], rng)
-    width = cooled.std(axis=0)
-    spread = spread_rows(cooled / np.where(width > 0, width, 1.0), starts - len(best), rng)
-    best = np.vstack([best, cooled[spread]])
-    start = best if extra is None else np.vstack([extra, best])
-    found = climb(lambda points, rows: target(points), start)
-    order = np.argsort(-found.log_density)
+    best = np.argsort(-value)[: starts // 8]
+    passed, height = _cooled(target, z, value, rng)
+    width = passed.std(axis=0)
+    spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - len(best), rng)
+    start = np.vstack([passed[spread], z[best], np.empty((0, z.shape[1])) if extra is None else extra])
+    found = _distinct([climb(lambda points, rows: target(points), start)])
+    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
+    warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
+    passed, height = passed[looked], height[looked]
+    for _ in range(_ROUNDS):
+        sag = _sag(target, passed, height, found)
+        strange = rng.permutation(np.flatnonzero(sag > _LEAST_SAG))[:_STRANGE]
+        if not len(strange):
+            break
+        passed, height, sag = passed[strange], height[strange], sag[strange]
+        chosen = rng.choice(len(sag), min(len(sag), starts // 2 // _ROUNDS), replace=False, p=sag / sag.sum())
+        found = _distinct([found, climb(lambda points, rows: target(points), passed[chosen])])
+    return Search(found, warm, cold)
+
+
+def _sag(target: Target, z: Array, height: Array, found: Optimum) -> Array:
+    """(n,) how far the density between (n, d) places and the mode best seen from there lies below the straight line.
+
+    Within one hill it lies above.
+    """
+    least = np.full(len(z), 1e3)
+    for mode, top in zip(found.z, found.log_density, strict=True):
+        between = z[:, None] + _ON_THE_WAY[:, None] * (mode - z)[:, None]
+        line = height[:, None] + _ON_THE_WAY * (top - height)[:, None]
+        least = np.minimum(least, (line - target(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1))
+    return least
+
+
+def _distinct(found: Sequence[Optimum]) -> Optimum:
+    """The rows that no better one is near, none hopelessly below the best; best first."""
+    every = Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
+    order = np.argsort(-every.log_density)
     keep: list[int] = []
     for i in order:
-        if not np.isfinite(found.log_density[i]) or found.log_density[i] < found.log_density[order[0]] - 30.0:
+        if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - 30.0:
             continue
-        apart = [(found.z[i] - found.z[k]) @ found.curvature[k] @ (found.z[i] - found.z[k]) for k in keep]
+        apart = [(every.z[i] - every.z[k]) @ every.curvature[k] @ (every.z[i] - every.z[k]) for k in keep]
         if all(distance > 4.0 for distance in apart):
             keep.append(int(i))
-    return Optimum(found.z[keep], found.log_density[keep], found.curvature[keep], found.converged[keep])
+    return Optimum(every.z[keep], every.log_density[keep], every.curvature[keep], every.converged[keep])
 
 
-def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> Array:
-    """(m, d) rows from the density to a power that grows from 0 to 1: an annealed start, near enough to find modes.
+def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Places (n, d) and their log densities (n,), from the density to powers that grow from 0 to 1, all together.
 
-    Each step of the power halves the effective number of rows and moves them by differential evolution.
+    Each step of the power halves the effective number of rows and moves them by differential evolution: near enough to
+    the modes to find them.
     """
     m, d = z.shape
     value = np.where(np.isfinite(value), value, -1e300)
-    power = 0.0
+    power, way, height = 0.0, [], []
     while power < 1.0:
         step = _next_step(value, 1.0 - power)
         power += step
         weight = np.exp(step * (value - value.max()))
-        kept = rng.choice(m, m, p=weight / weight.sum())
+        kept = np.searchsorted(np.cumsum(weight) / weight.sum(), (np.arange(m) + rng.uniform()) / m).clip(max=m - 1)
         z, value = z[kept], value[kept]
-        for _ in range(_MOVES):
-            one, other = rng.integers(m, size=(2, m))
-            moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)
-            tried = target(moved)
-            taken = np.log(rng.uniform(size=m)) < power * (tried - value)
-            z = np.where(taken[:, None], moved, z)
-            value = np.where(taken, tried, value)
-    return z
+        one, other = rng.integers(m, size=(2, m))
+        moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)
+        tried = target(moved)
+        taken = np.log(rng.uniform(size=m)) < power * (tried - value)
+        z = np.where(taken[:, None], moved, z)
+        value = np.where(taken, tried, value)
+        way.append(z)
+        height.append(value)
+    return np.concatenate(way), np.concatenate(height)
 
 
 def _next_step(value: Array, most: float) -> float:

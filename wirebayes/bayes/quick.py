@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.ensemble import Policy, sample
+from wirebayes.bayes.ensemble import sample
 from wirebayes.bayes.optimum import Optimum
+from wirebayes.bayes.policy import Policy
 
 Array = NDArray[Any]
 _SHORT = Policy(ensembles=2, walkers=128, rounds=3, round_steps=16, most_rounds=5, tail=np.inf, block=24, most_steps=24)

@@ -378,5 +378,4 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
         "acceptance": chains.acceptance,
         "learned_move": chains.learned,
         "modes_found": chains.modes,
-        "walkers_set_back": chains.stuck,
     }

@@ -69,7 +69,7 @@ def fitted(
     """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given."""
     target = Target(build(experiments, effects, law=law, history=history))
     extra = None if near is None else target.coordinates.to_sampled(near[None])
-    return Block(tuple(experiments), tuple(effects), law, history, target, modes(target, rng, extra=extra))
+    return Block(tuple(experiments), tuple(effects), law, history, target, modes(target, rng, extra))
 
 
 class Pinned:

@@ -126,7 +126,7 @@ def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence
     evidence = []
     for variant in variants:
         target = Target(problem_of(candidate, training, [variant]))
-        found = modes(target, np.random.default_rng(seed), draws=1000, starts=12)
+        found = modes(target, np.random.default_rng(seed))
         evidence.append(np.where(found.converged, found.log_evidence, -np.inf).max())
     return variants[int(np.argmax(evidence))]
 

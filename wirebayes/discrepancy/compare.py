@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import Fit, fit, seed_of
+from wirebayes.bayes.policy import Policy
 from wirebayes.discrepancy.candidates import Candidate, effects_of, problem_of
 from wirebayes.discrepancy.heldout import HeldOut, Scores, held_out, two_thirds
 from wirebayes.discrepancy.loho import loho

@@ -15,8 +15,8 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from wirebayes.bayes.ensemble import Policy
 from wirebayes.bayes.fit import Fit, fit, seed_of
+from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import Problem
 
 Array = NDArray[np.float64]

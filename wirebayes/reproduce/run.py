@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes import __version__, paper
-from wirebayes.bayes.ensemble import Policy, describe
 from wirebayes.bayes.fit import seed_of
 from wirebayes.bayes.jobs import Job
 from wirebayes.bayes.jobs import run as run_jobs
+from wirebayes.bayes.policy import Policy, describe
 from wirebayes.bayes.problem import Likelihood, build
 from wirebayes.bayes.result import Stored, load
 from wirebayes.experiment import Experiment

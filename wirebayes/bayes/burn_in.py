@@ -1,0 +1,151 @@
+"""Burn-in: from a search for modes to a proposal worth freezing, and walkers in their places.
+
+The search's cooled population gives the first proposal. Then, round by round, the proposal is fitted to weighted draws
+of itself, which also tell how good it is: the acceptance it would have, and how far the log of posterior over proposal,
+at its 99.9 % quantile over the posterior, lies above its median. While hardly a draw would be accepted, walkers of the
+density to the power of a half look further: a warm density has the same places and lower walls between them.
+
+Walkers are placed by weight at last, so that none is left in a far mode of no weight.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.bayes import mixture, proposal
+from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.mixture import Mixture
+from wirebayes.bayes.optimum import Optimum, search
+from wirebayes.bayes.policy import Policy
+from wirebayes.bayes.proposal import Proposal
+from wirebayes.bayes.walkers import State, advance
+
+Array = NDArray[Any]
+
+
+def begin(target: Target, seed: int, policy: Policy, found: Optimum | None, near: Array | None) -> State:
+    spawned = np.random.SeedSequence(seed).spawn(policy.ensembles + 1)
+    rng = np.random.default_rng(spawned[0])
+    before = target.evaluations
+    seen = None
+    if found is None:
+        searched = search(target, rng, extra=near)
+        found, seen = searched.modes, (searched.warm, searched.cold)
+    known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
+    randoms = [np.random.RandomState(np.random.MT19937(sequence)) for sequence in spawned[1:]]
+    drawn = [_finite_draws(target, known, _walking(target, policy), random) for random in randoms]
+    # Burn-in walks them all as one ensemble: a batch costs little more than one of its parts.
+    positions, values = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
+    states = [random.get_state() for random in randoms]
+    state = State([positions], [values], states, known, known, rng, len(found.z), target.evaluations - before)
+    if seen is not None and _fit(target, state, policy, *seen):
+        state.acceptance, state.seen = 1.0, None  # to be believed until draws tell better
+    return state
+
+
+def one_round(target: Target, state: State, policy: Policy) -> None:
+    """Learn from a walk, as long as the proposal is not to be trusted, then from weighted draws of the proposal."""
+    state.round += 1
+    if state.acceptance < _USEFUL:
+        _fit(target, state, policy, *_resampled_twice(*_walked(target, state, policy), state.generator))
+    z, value, base = _drawn(target, state, policy)
+    weight = value - base
+    typical = weight[_resampled(weight, len(weight), state.generator)]
+    state.acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
+    if state.acceptance >= _USEFUL:
+        _fit(target, state, policy, *_resampled_twice(z, value, base, state.generator))
+    middle, high = np.quantile(typical, [0.5, 0.999])
+    settled = state.acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
+    if state.round >= policy.rounds and settled or state.round >= policy.most_rounds:
+        state.frozen, state.learned = True, state.acceptance > policy.acceptance
+        _place(state, policy, *((z, value, base) if state.learned or state.walk is None else state.walk))
+        state.walk = state.seen = None
+        # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
+        steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
+        for i in range(policy.ensembles):
+            advance(target, state, i, steps)
+        state.kept_z = [[] for _ in range(policy.ensembles)]
+        state.kept_log_density = [[] for _ in range(policy.ensembles)]
+
+
+def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
+    """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
+    again = min(state.walks, len(_WARM) - 1)
+    state.walks += 1
+    steps = policy.round_steps * policy.walkers // _walking(target, policy) * 2**again
+    sampler, _ = advance(target, state, 0, steps, _WARM[again])
+    walked = sampler.get_log_prob(discard=steps // 2, flat=True)
+    state.walk = sampler.get_chain(discard=steps // 2, flat=True), walked / _WARM[again], walked
+    return state.walk
+
+
+def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
+    """Draws of the proposal: places (n, d), their log densities and those of the proposal."""
+    z = state.proposal.rvs(policy.round_steps * policy.walkers * policy.ensembles, state.generator)
+    before = target.evaluations
+    value = target(z)
+    state.evaluations += target.evaluations - before
+    good = np.isfinite(value)
+    return z[good], value[good], state.proposal.log_density(z[good])
+
+
+def _fit(target: Target, state: State, policy: Policy, hot: Array, cold: Array) -> bool:
+    """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
+    before, state.seen = state.seen, (hot, cold)
+    if before is not None:
+        hot, cold = np.vstack([before[0], hot]), np.vstack([before[1], cold])
+    try:
+        order = target.coordinates.order
+        state.proposal = proposal.fit(hot, cold, state.start, order, state.generator, most=policy.components)
+    except np.linalg.LinAlgError:
+        return False  # too few distinct points yet: keep the proposal that made them
+    return True
+
+
+def _resampled_twice(z: Array, value: Array, base: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Draws of the warm density and of the density, from places whose log density of being there is `base`."""
+    hot, cold = (z[_resampled(power * value - base, len(z), rng)] for power in (_HOT, 1.0))
+    return hot, cold
+
+
+def _place(state: State, policy: Policy, z: Array, value: Array, base: Array) -> None:
+    """Start every ensemble from a share of the places of its own."""
+    state.positions, state.values = [], []
+    for i in range(policy.ensembles):
+        own, height = z[i :: policy.ensembles], value[i :: policy.ensembles]
+        chosen = _resampled(height - base[i :: policy.ensembles], policy.walkers, state.generator)
+        state.positions.append(own[chosen])
+        state.values.append(height[chosen])
+
+
+def _walking(target: Target, policy: Policy) -> int:
+    """Walkers of an ensemble in burn-in: few, for the same number of evaluations takes them further."""
+    return min(policy.walkers, max(policy.walkers // 8, 2 * len(target.problem.names) + 2))
+
+
+def _resampled(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """(n,) rows drawn by weight, systematically, in random order; no row counts for more than the root of all rows."""
+    weight = np.exp(log_weight - log_weight.max())
+    shares = np.cumsum(np.minimum(weight, np.sqrt(len(weight)) * weight.mean()))
+    chosen = np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n)
+    return rng.permutation(np.minimum(chosen, len(log_weight) - 1))
+
+
+def _finite_draws(target: Target, known: Mixture | Proposal, n: int, random: Any) -> tuple[Array, Array]:
+    """Draws of a proposal where the density is above zero, and its logarithm there."""
+    drawn, values = np.empty((0, len(target.problem.names))), np.empty(0)
+    while len(drawn) < n:
+        z = known.rvs(n, random)
+        value = target(z)
+        good = np.isfinite(value)
+        drawn, values = np.vstack([drawn, z[good]]), np.concatenate([values, value[good]])
+    return drawn[:n], values[:n]
+
+
+_OVERDISPERSED = 1.7
+_WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the longer the more often it has to
+_HOT = 0.6  # power of the density that the wide part of the proposal is fitted to
+_USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
+_GOOD_ACCEPTANCE = 0.25
+_LONGEST_SETTLING = 12

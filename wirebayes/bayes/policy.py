@@ -1,0 +1,54 @@
+"""What is asked of a chain before its draws are believed."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Policy:
+    """What is asked of a chain before its draws are believed.
+
+    Attributes
+    ----------
+    ensembles, walkers : int
+        Independent ensembles, and walkers in each.
+    ess : float
+        Effective draws wanted of every parameter, all ensembles together.
+    r_hat : float
+        Largest nested R-hat allowed.
+    rounds, most_rounds : int
+        Burn-in: at least so many fits of the proposal; more, up to the second number, while too few of its draws would
+        be accepted or it leaves out a tail.
+    round_steps : int
+        A round takes as many draws as so many steps of all walkers.
+    tail : float
+        A proposal leaves out a tail when the log of posterior over proposal, at its 99.9 % quantile over the posterior,
+        lies this far above its median: walkers that reach such places stay there for very long.
+    components : int
+        The most components of the proposal.
+    acceptance : float
+        Below this share after burn-in, the learned move gives way to differential evolution alone.
+    block, most_steps : int
+        Kept steps before the first look at the stop rule, which says how many to add; the most of them.
+    """
+
+    ensembles: int = 4
+    walkers: int = 256
+    ess: float = 4000.0
+    r_hat: float = 1.01
+    rounds: int = 3
+    round_steps: int = 8
+    most_rounds: int = 6
+    tail: float = 3.0
+    acceptance: float = 0.05
+    components: int = 6
+    block: int = 16
+    most_steps: int = 4000
+
+
+DEFAULT = Policy()
+
+
+def describe(policy: Policy) -> dict[str, Any]:
+    """The policy as plain values, for provenance."""
+    return asdict(policy)

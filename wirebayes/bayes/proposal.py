@@ -1,0 +1,88 @@
+"""What the learned move draws from: mixtures in straightened coordinates, one as things are, and the start's.
+
+The close part resembles the posterior. Two wide ones, fitted to the posterior to a power, keep the ratio of posterior
+over proposal in bounds in the tails: along bends the straightened one, where the straightening goes astray the plain
+one. The start's keeps small modes in reach.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.bayes import mixture, straighten
+from wirebayes.bayes.mixture import Mixture
+from wirebayes.bayes.straighten import Straight
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A weighted sum of densities that can be drawn from.
+
+    Attributes
+    ----------
+    shares : tuple of float
+        Of the close part, the wide one, the plain one and the start's.
+    straight : Straight
+    close, wide, plain, start : Mixture
+        The first two of straightened points.
+    """
+
+    shares: tuple[float, float, float, float]
+    straight: Straight
+    close: Mixture
+    wide: Mixture
+    plain: Mixture
+    start: Mixture
+
+    def log_density(self, x: Array) -> Array:
+        """(n,) log density of points (n, d)."""
+        u, jacobian = self.straight.forward(x)
+        straightened = [part.log_density(u) + jacobian for part in (self.close, self.wide)]
+        parts = [*straightened, self.plain.log_density(x), self.start.log_density(x)]
+        return np.asarray(logsumexp(np.array(parts) + np.log(self.shares)[:, None], axis=0))
+
+    def rvs(self, n: int, rng: Any) -> Array:
+        """(n, d) draws; `rng` is a numpy RandomState or Generator."""
+        counts = rng.multinomial(n, self.shares)
+        straightened = np.concatenate([self.close.rvs(counts[0], rng), self.wide.rvs(counts[1], rng)])
+        as_they_are = [self.plain.rvs(counts[2], rng), self.start.rvs(counts[3], rng)]
+        return np.concatenate([self.straight.inverse(straightened), *as_they_are])[rng.permutation(n)]
+
+
+def fit(
+    hot: Array, cold: Array, start: Mixture, order: NDArray[np.int64], rng: np.random.Generator, *, most: int
+) -> Proposal:
+    """The proposal learned from the burn-in.
+
+    Parameters
+    ----------
+    hot, cold : (n, d) arrays
+        Points of the posterior to a power below one, which reach its tails, and of the posterior itself.
+    start : Mixture
+        What was known before any walk.
+    order : (d,) array of int
+        In which coordinates are straightened (see `wirebayes.bayes.straighten`).
+    rng : numpy Generator
+    most : int
+        The most components of either mixture.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the points do not span their space.
+    """
+    hot, cold = hot[:: 1 + len(hot) // _ENOUGH], cold[:: 1 + len(cold) // _ENOUGH]
+    straight = straighten.fit(cold, order)
+    (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
+    close = mixture.fit(near, rng, most=most, degrees=_LIGHT)
+    return Proposal(_SHARES, straight, close, mixture.fit(far, rng, most=most), mixture.fit(hot, rng, most=most), start)
+
+
+_ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time
+_LIGHT = 40.0  # degrees of freedom where the wide mixtures look after the tails
+_SHARES = (0.75, 0.1, 0.1, 0.05)

@@ -1,0 +1,138 @@
+"""A map that straightens a cloud of points: each coordinate less its mean, over its scale, given those before it.
+
+The mean is a quadratic and the logarithm of the scale a linear function of the coordinates before: a ridge that bends
+and a funnel (a setting error that widens everything it allows) become nearly a round heap. The map is triangular, so
+its Jacobian is the product of the scales, and it has an inverse whatever its coefficients. Beyond the points it was
+fitted to, quadratics go on as straight lines and scales stay at what they were on the border.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Coefficients, the columns taken in an order of their own.
+
+    Attributes
+    ----------
+    order : (d,) array of int
+    centre, scale : (d,) arrays
+        Of the points fitted, in the map's own order.
+    low, high : (d,) arrays
+        The range of the standardised points.
+    constant : (d,) array
+    linear : (d, d) array, strictly lower triangular
+    quadratic : (d, d, d) array
+        ``quadratic[j]``, symmetric, is the second derivative of j's mean by the coordinates before it.
+    log_scale : (d, d + 1) array
+        A constant and what multiplies the coordinates before.
+    least, most : (d,) arrays
+        The range of the logarithm of the scale.
+    """
+
+    order: NDArray[np.int64]
+    centre: Array
+    scale: Array
+    low: Array
+    high: Array
+    constant: Array
+    linear: Array
+    quadratic: Array
+    log_scale: Array
+    least: Array
+    most: Array
+
+    def forward(self, x: Array) -> tuple[Array, Array]:
+        """(n, d) straightened points and the (n,) logarithm of the map's Jacobian, of points (n, d)."""
+        v = (x[:, self.order] - self.centre) / self.scale
+        n, d = v.shape
+        held = np.clip(v, self.low, self.high)
+        slope = (held @ self.quadratic.transpose(1, 0, 2).reshape(d, d * d)).reshape(n, d, d)
+        mean = self.constant + v @ self.linear.T + np.einsum("njk,nk->nj", slope, v - 0.5 * held)
+        log_scale = np.clip(self.log_scale[:, 0] + v @ self.log_scale[:, 1:].T, self.least, self.most)
+        return (v - mean) * np.exp(-log_scale), -log_scale.sum(axis=1) - np.log(self.scale).sum()
+
+    def inverse(self, u: Array) -> Array:
+        """(n, d) points of straightened ones."""
+        v, held = np.zeros_like(u), np.zeros_like(u)
+        for j in range(u.shape[1]):
+            before, inside = v[:, :j], held[:, :j]
+            mean = self.constant[j] + before @ self.linear[j, :j]
+            mean += np.einsum("nk,nk->n", inside @ self.quadratic[j, :j, :j], before - 0.5 * inside)
+            log_scale = self.log_scale[j, 0] + before @ self.log_scale[j, 1 : j + 1]
+            v[:, j] = mean + u[:, j] * np.exp(np.clip(log_scale, self.least[j], self.most[j]))
+            held[:, j] = np.clip(v[:, j], self.low[j], self.high[j])
+        x = np.empty_like(v)
+        x[:, self.order] = v * self.scale + self.centre
+        return x
+
+
+def fit(x: Array, order: NDArray[np.int64]) -> Straight:
+    """The map that straightens points (n, d): weighted regressions, coordinate by coordinate.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the points do not span their space.
+    """
+    x = x[:, order]
+    n, d = x.shape
+    centre, scale = x.mean(axis=0), x.std(axis=0)
+    if not (scale > 0).all():
+        raise np.linalg.LinAlgError("the points do not span their space")
+    v = (x - centre) / scale
+    constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
+    clear = _CLEAR * np.sqrt(n / len(np.unique(x[:, 0])))  # rows that repeat know no more
+    bends = d**3 / 6.0 < n / _POINTS_A_TERM
+    spread = np.zeros((n, d))
+    for j in range(d):
+        lines = np.column_stack([np.ones(n), v[:, :j]])
+        one, other = np.triu_indices(j if bends else 0)
+        terms = np.column_stack([lines, v[:, one] * v[:, other]])
+        _, _, t = _regress(terms, lines, v[:, j])
+        # Far out a bend that is only noise throws everything aside: none without evidence.
+        kept = np.abs(t[j + 1 :]) > clear
+        one, other = one[kept], other[kept]
+        terms = terms[:, np.concatenate([np.ones(j + 1, bool), kept])]
+        of_mean, of_scale, _ = _regress(terms, lines, v[:, j])
+        constant[j], linear[j, :j] = of_mean[0], of_mean[1 : j + 1]
+        np.add.at(quadratic[j], (one, other), of_mean[j + 1 :])
+        np.add.at(quadratic[j], (other, one), of_mean[j + 1 :])
+        log_scale[j, : j + 1] = of_scale
+        spread[:, j] = lines @ of_scale
+    return Straight(
+        order, centre, scale, v.min(axis=0), v.max(axis=0), constant, linear, quadratic, log_scale,
+        spread.min(axis=0), spread.max(axis=0),
+    )  # fmt: skip
+
+
+def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Coefficients of the mean and of the log scale of y, each fitted in turn given the other; the mean's t values."""
+    n = len(y)
+    of_scale, weight = np.zeros(lines.shape[1]), np.ones(n)
+    bend = _RIDGE * n * np.eye(terms.shape[1])
+    information = 2.0 * lines.T @ lines + _RIDGE * n * np.eye(lines.shape[1])
+    for _ in range(_ALTERNATIONS):
+        weighted = terms * weight[:, None]
+        of_mean = np.linalg.solve(weighted.T @ terms + bend, weighted.T @ y)
+        # a point far out says where the scale grows, but no single one decides
+        square = np.minimum((y - terms @ of_mean) ** 2 * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0)), 9.0)
+        of_scale = of_scale + np.linalg.solve(information, lines.T @ (square - 1.0))
+        weight = np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0))
+        weight /= weight.mean()
+    weighted = terms * weight[:, None]
+    inverse = np.linalg.inv(weighted.T @ terms + bend)
+    variance = (weight * (y - terms @ of_mean) ** 2).mean()
+    return of_mean, of_scale, of_mean / np.sqrt(variance * np.diag(inverse))
+
+
+_POINTS_A_TERM = 20
+_RIDGE = 1e-3
+_CLEAR = 4.0  # standard errors
+_ALTERNATIONS = 6
