@@ -1,0 +1,73 @@
+"""The map that straightens, what is drawn through it, and the search for modes behind it."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.statistical.targets import two_modes
+from wirebayes.bayes import mixture, optimum, proposal, straighten
+
+
+def crescent(n, rng):
+    """x2 bends with the square of x0 and is the wider, the larger x1."""
+    x = rng.normal(size=(n, 3))
+    x[:, 2] = 2.0 + x[:, 0] ** 2 + np.exp(0.4 * x[:, 1]) * x[:, 2]
+    return x
+
+
+@pytest.fixture(scope="module")
+def points():
+    return crescent(6000, np.random.default_rng(1))
+
+
+def test_a_crescent_becomes_a_heap_within_the_points_and_beyond(points):
+    straight = straighten.fit(points, np.arange(3))
+    u, _ = straight.forward(crescent(6000, np.random.default_rng(2)))
+    assert np.abs(np.cov(u.T) - np.eye(3)).max() < 0.1
+    assert abs(np.corrcoef(u[:, 2], points[:, 0] ** 2)[0, 1]) < 0.05
+    far = np.array([[4.5, 0.0, 2.0 + 4.5**2]])
+    assert abs(straight.forward(far)[0][0, 2]) < 2.0
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 0, 1]])
+def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
+    straight = straighten.fit(points, np.array(order))
+    x = np.vstack([points[:20], 3.0 * points[:20]])
+    u, jacobian = straight.forward(x)
+    assert straight.inverse(u) == pytest.approx(x, rel=1e-9, abs=1e-9)
+    h = 1e-6
+    moved = [(straight.forward(x + h * e)[0] - straight.forward(x - h * e)[0]) / (2 * h) for e in np.eye(3)]
+    assert np.linalg.slogdet(np.moveaxis(moved, 0, 2))[1] == pytest.approx(jacobian, abs=1e-4)
+
+
+def test_a_cloud_without_bends_gets_none():
+    straight = straighten.fit(np.random.default_rng(3).normal(size=(4000, 6)), np.arange(6))
+    assert not straight.quadratic.any()
+
+
+def test_points_that_do_not_span_their_space_are_refused():
+    with pytest.raises(np.linalg.LinAlgError):
+        straighten.fit(np.ones((100, 2)), np.arange(2))
+
+
+def test_the_density_of_a_proposal_is_that_of_its_draws(points):
+    """The mean of 1/q over draws of q inside a box is the box's volume."""
+    rng = np.random.default_rng(4)
+    start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
+    q = proposal.fit(points, points, start, np.arange(3), rng, most=3)
+    x = q.rvs(200000, rng)
+    inside = (np.abs(x - [0.0, 0.0, 2.5]) < [1.0, 1.0, 1.0]).all(axis=1)
+    weight = inside * np.exp(-q.log_density(x))
+    assert weight.mean() == pytest.approx(8.0, abs=5 * weight.std() / np.sqrt(len(x)))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mode_that_died_out_on_the_way_is_still_found(seed):
+    found = optimum.modes(two_modes(), np.random.default_rng(seed))
+    assert sorted(found.z[:, 0].round(3)) == [0.0, 10.0]
+
+
+def test_degrees_of_freedom_reach_the_density():
+    x = np.array([[3.0], [0.5]])
+    light = mixture.Mixture(np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1)), 40.0)
+    assert light.log_density(x) == pytest.approx(stats.t(40.0).logpdf(x[:, 0]))
