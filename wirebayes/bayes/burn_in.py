@@ -24,14 +24,17 @@ from wirebayes.bayes.walkers import State, advance
 Array = NDArray[Any]
 
 
-def begin(target: Target, seed: int, policy: Policy, found: Optimum | None, near: Array | None) -> State:
+def begin(
+    target: Target, seed: int, policy: Policy, found: Optimum | None, near: Array | None, rough: Array | None
+) -> State:
+    """Search where nothing is known, and learn a first proposal from rough draws; see `wirebayes.bayes.ensemble`."""
     spawned = np.random.SeedSequence(seed).spawn(policy.ensembles + 1)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
-    seen = None
+    seen = None if rough is None else (rough, rough)
     if found is None:
         searched = search(target, rng, extra=near)
-        found, seen = searched.modes, (searched.warm, searched.cold)
+        found, seen = searched.modes, seen or (searched.warm, searched.cold)
     known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
     randoms = [np.random.RandomState(np.random.MT19937(sequence)) for sequence in spawned[1:]]
     drawn = [_finite_draws(target, known, _walking(target, policy), random) for random in randoms]

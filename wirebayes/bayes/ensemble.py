@@ -76,6 +76,7 @@ def sample(
     progress: Callable[[float], None] = lambda share: None,
     found: Optimum | None = None,
     near: Array | None = None,
+    rough: Array | None = None,
 ) -> Chains:
     """Sample a posterior (see the module's policy).
 
@@ -92,12 +93,14 @@ def sample(
         Modes already known, instead of a search.
     near : (m, d) array, optional
         Sampled coordinates that the search should climb from, too.
+    rough : (n, d) array, optional
+        Sampled coordinates of draws from nearly this posterior: what the first proposal is learned from.
 
     Returns
     -------
     Chains
     """
-    state = State.load(checkpoint) or burn_in.begin(target, seed, policy, found, near)
+    state = State.load(checkpoint) or burn_in.begin(target, seed, policy, found, near, rough)
     state.save(checkpoint)
     while not state.finished:
         if not state.frozen:

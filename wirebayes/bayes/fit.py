@@ -54,6 +54,7 @@ def fit(
     checkpoint: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
     near: Mapping[str, float] | None = None,
+    rough: Array | None = None,
 ) -> Fit:
     """Sample the posterior of a problem.
 
@@ -67,6 +68,8 @@ def fit(
     progress : function of a share between 0 and 1
     near : mapping of name to value, optional
         Parameters known to be good, where the search for modes looks too.
+    rough : (n, d) array, optional
+        Natural parameters drawn from nearly this posterior, which save burn-in a part of its work.
 
     Returns
     -------
@@ -76,7 +79,8 @@ def fit(
     start = None
     if near is not None and near.keys() >= set(problem.names):
         start = target.coordinates.to_sampled(np.array([[near[name] for name in problem.names]]))
-    chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start)
+    cloud = None if rough is None else target.coordinates.to_sampled(rough)
+    chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud)
     m, steps, walkers, d = chains.z.shape
     thin = max(1, steps * walkers // STORED_DRAWS)
     z = np.moveaxis(chains.z[:, thin - 1 :: thin], 2, 1)

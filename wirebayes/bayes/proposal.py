@@ -69,7 +69,7 @@ def fit(
         In which coordinates are straightened (see `wirebayes.bayes.straighten`).
     rng : numpy Generator
     most : int
-        The most components of either mixture.
+        The most components of the close mixture; the wide ones, which need not resemble anything, have half as many.
 
     Raises
     ------
@@ -80,7 +80,8 @@ def fit(
     straight = straighten.fit(cold, order)
     (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
     close = mixture.fit(near, rng, most=most, degrees=_LIGHT)
-    return Proposal(_SHARES, straight, close, mixture.fit(far, rng, most=most), mixture.fit(hot, rng, most=most), start)
+    wide, plain = (mixture.fit(points[::2], rng, most=most // 2) for points in (far, hot))
+    return Proposal(_SHARES, straight, close, wide, plain, start)
 
 
 _ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time

@@ -116,7 +116,8 @@ def loho(
         log_weight, k[i] = _statistics.psislw(log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
         if exact or not k[i] <= LARGEST_K:
-            without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy)
+            own = seed_of(seed, "without", str(s), str(j))
+            without = fit(without_hold(problem, s, j), own, policy=policy, rough=theta)
             log_p = problem.leave_one_hold_out(thinned(without.flat))[s][j]
             elpd[i], refitted[i] = logsumexp(log_p) - np.log(len(log_p)), True
             converged &= without.chains.converged
