@@ -163,16 +163,13 @@ def investigate(
         affected = [a for a in accepted if i in a.blocks]
         common = _common(verdict, choice, affected, plain, final[i], i, test, where[i], alike)
         common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
-        checks = _held_out(block, final[i], verdict, choice, i, rng)
+        checks = _held_out(block, final[i], verdict, rng)
         for e, check in zip(block.experiments, checks, strict=True):
             effects[e.name] = final[i].effects
             near[e.name] = final[i].parameters(e.name)
-            sample = block.target.problem.samples[block.names.index(e.name)]
-            line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
-            residual = (sample.readings - line.tension)[sample.protocol.mask]
             out[e.name] = common | {
                 "held_out": check,
-                "residual_rms_N": float(np.sqrt((residual**2).mean())),
+                "residual_rms_N": _left_over(block, e.name),
                 "gross_errors": [g for g in struck if g["experiment"] == e.name],
             }
     report("held-out holds", len(plain), len(plain))
@@ -183,10 +180,7 @@ def final_effects(findings: Findings, experiment: Experiment) -> tuple[Effect, .
     """The effects of an experiment's final model; the flexible discrepancy where what is missing has no name."""
     report = findings.report["experiments"][experiment.name]
     if report["verdict"] == "unknown":
-        durations = [h.duration_s for h in experiment.recorded_holds]
-        return (
-            Discrepancy(len(experiment.holds), float(report["residual_rms_N"]), float(np.median(durations)) or 1.0),
-        )
+        return (_discrepancy(experiment, float(report["residual_rms_N"])),)
     # An event stays with its experiment, an amplitude needs holds that can show it.
     return tuple(e for e in findings.effects[experiment.name] if getattr(e, "test", "") in ("", experiment.name))
 
@@ -415,9 +409,7 @@ def _outlook(
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
 
 
-def _held_out(
-    block: Block, final: Block, verdict: str, choice: Choice | None, i: int, rng: np.random.Generator
-) -> list[dict[str, Any]]:
+def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Plain and final model on the last third of the holds, and by leaving out one hold at a time."""
     train = [gap.last_third(e) for e in block.experiments]
     if not all(train):
@@ -433,10 +425,17 @@ def _held_out(
             for _ in block.experiments
         ]
     plain = gap.held_out(block.experiments, train, (), block, rng)
-    better = plain if not final.effects else gap.held_out(block.experiments, train, final.effects, final, rng)
+    better, whole = plain, list[Block]()
+    if verdict == "unknown":
+        better, whole = [], [_unnamed(block, e, rng) for e in block.experiments]
+        for e, k in zip(block.experiments, train, strict=True):
+            better += gap.held_out([e], [k], _unnamed(block, e.train(k), rng).effects, block, rng)
+    elif final.effects:
+        better, whole = gap.held_out(block.experiments, train, final.effects, final, rng), [final]
     shrinks, loho = False, None
-    if final.effects:
-        difference = gap.leave_one_hold_out(final, rng) - gap.leave_one_hold_out(block, rng)
+    if whole:
+        each = np.concatenate([gap.leave_one_hold_out(b, rng) for b in whole])
+        difference = each - gap.leave_one_hold_out(block, rng)
         se = float(difference.std(ddof=1) * np.sqrt(len(difference)))
         loho = {"elpd_difference": float(difference.sum()), "elpd_difference_se": se}
         shrinks = bool(difference.sum() > KEEP_ELPD and difference.sum() > 2 * se)
@@ -449,11 +448,30 @@ def _held_out(
             "final": {"rmse_N": b.rmse_N, "elpd": float(b.elpd.sum()), "coverage_90": b.inside,
                       "elpd_difference_se": float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None},
             "floor_N": float(np.sqrt(b.floor)),
-            "gap_closed": gap.gap_closed(a, b) if final.effects else None,
+            "gap_closed": gap.gap_closed(a, b) if whole else None,
             "leave_one_hold_out": loho,
             "shrinks": shrinks,
         })  # fmt: skip
     return out
+
+
+def _unnamed(block: Block, experiment: Experiment, rng: np.random.Generator) -> Block:
+    """An experiment fitted alone with a discrepancy as large as what the plain model leaves over in it."""
+    plain = fitted([experiment], (), block.law, block.history, rng)
+    return fitted([experiment], [_discrepancy(experiment, _left_over(plain, experiment.name))],
+                  block.law, block.history, rng)  # fmt: skip
+
+
+def _discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
+    durations = [h.duration_s for h in experiment.recorded_holds]
+    return Discrepancy(len(experiment.holds), size_N, float(np.median(durations)) or 1.0)
+
+
+def _left_over(block: Block, name: str) -> float:
+    """Root mean square of what the best parameters leave over in an experiment's readings, N."""
+    sample = block.target.problem.samples[block.names.index(name)]
+    line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
+    return float(np.sqrt((((sample.readings - line.tension)[sample.protocol.mask]) ** 2).mean()))
 
 
 def _only(x: Expansion, m: int) -> Expansion:
