@@ -15,24 +15,17 @@ from wirebayes.bayes.policy import Policy
 def ours(problem, seed, seconds, wanted=20_000):
     """A fit as a user gets it, asked for `wanted` effective draws."""
     costs, target = Costs(), Target(problem)
-    with costs.part("start"):
-        rng = np.random.default_rng(seed)
-        found = modes(target, rng)
-    before = target.evaluations
-    # burn-in alone: the same seed and policy go the same way up to the first kept block
+    # search and burn-in alone: the same seed and policy go the same way up to the first kept block
     with costs.part("burn"):
-        short = sample(target, seed, Policy(most_steps=1, block=1), found=found)
+        sample(target, seed, Policy(most_steps=2, block=2))
     with costs.part("both"):
-        chains = sample(target, seed, Policy(ess=wanted), found=found)
+        chains = sample(target, seed, Policy(ess=wanted))
     for book in (costs.cpu, costs.wall):
         book["sample"] = max(book.pop("both") - book["burn"], 1e-9)
-    del short
     z = chains.z
     theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1])).reshape(z.shape)
     values = looked_at(problem, theta)
-    return judged(
-        costs, values, evaluations=chains.evaluations + before, kept_evaluations=chains.kept_evaluations
-    ), values
+    return judged(costs, values, evaluations=chains.evaluations, kept_evaluations=chains.kept_evaluations), values
 
 
 def stretch(problem, seed, seconds, natural=True, walkers=128):

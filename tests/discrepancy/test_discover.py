@@ -71,6 +71,15 @@ def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
     assert bare["verdict"] != "nothing-missing" and "toe" not in bare["probabilities"]
 
 
+def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_path: Path) -> None:
+    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
+    found = answer(experiments, kinds={name: CATALOGUE[name] for name in ("steady_creep", "sensor_drift")})
+    assert found["verdict"] == "unknown" and found["best"] == "unknown" and found["accepted"] == []
+    held = found["held_out"]
+    assert held["final"]["rmse_N"] < held["plain"]["rmse_N"] and held["gap_closed"] > 0
+    assert held["leave_one_hold_out"]["elpd_difference"] > 4
+
+
 def test_a_slip_names_its_hold(tmp_path: Path) -> None:
     found = answer(made(tmp_path, [Bench()], {"grip_slip.w": 0.15}, [named("grip_slip@7")]))
     assert found["best"] == "grip_slip" and found["amplitudes"]["grip_slip"]["hold"] == 7
