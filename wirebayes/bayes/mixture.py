@@ -1,11 +1,12 @@
 """A mixture of multivariate Student-t distributions: density, draws, and its fit by expectation-maximisation."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 Array = NDArray[Any]
 DEGREES = 10.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
@@ -22,7 +23,7 @@ class Mixture:
 
     def log_density(self, x: Array) -> Array:
         """(n,) log density of points (n, d)."""
-        return np.asarray(logsumexp(self._parts(x) + np.log(self.weights)[:, None], axis=0))
+        return log_sum(self._log_parts(self._distances(x)))
 
     def rvs(self, n: int, rng: Any) -> Array:
         """(n, d) draws; `rng` is a numpy RandomState or Generator."""
@@ -33,11 +34,25 @@ class Mixture:
             "nij,nj->ni", self.factors[which], rng.standard_normal((n, d))
         )
 
-    def _parts(self, x: Array) -> Array:
-        """(k, n) log density of each component."""
-        return np.array(
-            [_log_t(_distance(x, c, f), f, self.degrees) for c, f in zip(self.centres, self.factors, strict=True)]
-        )
+    @cached_property
+    def _whitening(self) -> tuple[Array, Array]:
+        """What all components' whitened points are made of, in one product: (d, k d) and (k d,)."""
+        inverse = np.linalg.inv(self.factors)
+        middle = np.einsum("kij,kj->ki", inverse, self.centres)
+        return np.ascontiguousarray(inverse.transpose(2, 0, 1).reshape(len(inverse[0]), -1)), middle.ravel()
+
+    def _distances(self, x: Array) -> Array:
+        """(k, n) squared Mahalanobis distances."""
+        (k, d), (product, middle) = self.centres.shape, self._whitening
+        y = (x @ product - middle).reshape(len(x), k, d)
+        return np.einsum("nkd,nkd->kn", y, y)
+
+    def _log_parts(self, distances: Array) -> Array:
+        """(k, n) log of weight times density of each component."""
+        d, nu = self.centres.shape[1], self.degrees
+        constant = gammaln(0.5 * (nu + d)) - gammaln(0.5 * nu) - 0.5 * d * np.log(nu * np.pi)
+        constant = constant + np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
+        return np.asarray(constant[:, None] - 0.5 * (nu + d) * np.log1p(distances / nu))
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:
@@ -58,36 +73,36 @@ def fit(x: Array, rng: np.random.Generator, *, most: int = 8, degrees: float = D
 
 def _em(x: Array, k: int, degrees: float, rng: np.random.Generator, iterations: int = 60) -> Mixture:
     n, d = x.shape
-    covariance = np.cov(x.T).reshape(d, d) + 1e-9 * np.diag(x.var(axis=0))
-    root = np.linalg.cholesky(covariance)
-    centres = x[spread_rows(np.linalg.solve(root, x.T).T, k, rng)]
+    middle = x.mean(axis=0)
+    root = np.linalg.cholesky(np.cov(x.T).reshape(d, d) + 1e-9 * np.diag(x.var(axis=0)))
+    x = np.linalg.solve(root, (x - middle).T).T
+    centres = x[spread_rows(x, k, rng)]
     if len(centres) < k:
         raise np.linalg.LinAlgError("fewer different points than components")
-    mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(root[None], k, axis=0), degrees)
+    squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
+    mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0), degrees)
     last = -np.inf
     for _ in range(iterations):
-        distances = np.array([_distance(x, c, f) for c, f in zip(mixture.centres, mixture.factors, strict=True)])
-        logs = np.array([_log_t(q, f, degrees) for q, f in zip(distances, mixture.factors, strict=True)])
-        logs += np.log(mixture.weights)[:, None]
-        total = logsumexp(logs, axis=0)
+        distances = mixture._distances(x)
+        logs = mixture._log_parts(distances)
+        total = log_sum(logs)
         share = np.exp(logs - total)
         # A component that holds too few points for its own covariance takes the others with it: stop there.
         if (share.sum(axis=1) < 3.0 * d).any():
             raise np.linalg.LinAlgError("empty component")
         heavy = share * (degrees + d) / (degrees + distances)
-        new_centres = np.einsum("kn,nd->kd", heavy, x) / heavy.sum(axis=1, keepdims=True)
-        factors = []
-        for i in range(k):
-            deviation = x - new_centres[i]
-            # a walker that stayed repeats its point: without some of the whole heap, a component shrinks onto that
-            scale = (heavy[i][:, None] * deviation).T @ deviation + _OF_THE_WHOLE * covariance
-            factors.append(np.linalg.cholesky(scale / (share[i].sum() + _OF_THE_WHOLE)))
-        mixture = Mixture(share.sum(axis=1) / n, new_centres, np.array(factors), degrees)
+        mass = heavy.sum(axis=1)
+        centres = (heavy @ x) / mass[:, None]
+        scale = (heavy @ squares).reshape(k, d, d) - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
+        # a walker that stayed repeats its point: without some of the whole heap, a component shrinks onto that
+        scale += _OF_THE_WHOLE * np.eye(d)
+        factors = np.linalg.cholesky(scale / (share.sum(axis=1) + _OF_THE_WHOLE)[:, None, None])
+        mixture = Mixture(share.sum(axis=1) / n, centres, factors, degrees)
         log_likelihood = float(total.sum())
         if log_likelihood - last < 1e-3 * n:
             break
         last = log_likelihood
-    return mixture
+    return Mixture(mixture.weights, middle + mixture.centres @ root.T, root @ mixture.factors, degrees)
 
 
 def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
@@ -100,16 +115,10 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
     return chosen
 
 
-def _distance(x: Array, centre: Array, factor: Array) -> Array:
-    """(n,) squared Mahalanobis distance; numpy's inverse of a small triangle beats a solve of many columns."""
-    y = (x - centre) @ np.linalg.inv(factor).T
-    return np.einsum("nd,nd->n", y, y)
-
-
-def _log_t(distance: Array, factor: Array, degrees: float) -> Array:
-    d = len(factor)
-    constant = gammaln(0.5 * (degrees + d)) - gammaln(0.5 * degrees) - 0.5 * d * np.log(degrees * np.pi)
-    return constant - np.log(np.diag(factor)).sum() - 0.5 * (degrees + d) * np.log1p(distance / degrees)
+def log_sum(logs: Array) -> Array:
+    """(n,) log of the sum of (k, n) exponentials; scipy's spends most of its time on cases that do not occur here."""
+    top = logs.max(axis=0)
+    return np.asarray(top + np.log(np.exp(logs - top).sum(axis=0)))
 
 
 _OF_THE_WHOLE = 3.0  # points' worth of the covariance of all points in that of every component

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from wirebayes.bayes import mixture, straighten
 from wirebayes.bayes.mixture import Mixture
@@ -44,7 +43,7 @@ class Proposal:
         u, jacobian = self.straight.forward(x)
         straightened = [part.log_density(u) + jacobian for part in (self.close, self.wide)]
         parts = [*straightened, self.plain.log_density(x), self.start.log_density(x)]
-        return np.asarray(logsumexp(np.array(parts) + np.log(self.shares)[:, None], axis=0))
+        return mixture.log_sum(np.array(parts) + np.log(self.shares)[:, None])
 
     def rvs(self, n: int, rng: Any) -> Array:
         """(n, d) draws; `rng` is a numpy RandomState or Generator."""
