@@ -24,6 +24,7 @@ from wirebayes.bayes.problem import MATERIAL, Problem, Sample
 Array = NDArray[Any]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
+_NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
 
 
 @dataclass(frozen=True)
@@ -150,10 +151,19 @@ class Target:
         self.problem, self.coordinates = problem, Coordinates(problem)
         self.log_prior = problem.prior.log_density()
         self.evaluations = 0
+        self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
 
     def __call__(self, z: Array, readings: Any = None) -> Array:
         """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""
         self.evaluations += len(z)
+        if len(z) <= self._rows:
+            return self._values(z, readings)
+        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
+        return np.concatenate(
+            [self._values(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
+        )
+
+    def _values(self, z: Array, readings: Any) -> Array:
         theta = self.coordinates.to_natural(z)
         with np.errstate(all="ignore"):
             value = self.log_prior(theta) + self.coordinates.log_jacobian(theta)
