@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wirebayes import __version__
 from wirebayes.bayes.fit import Fit
-from wirebayes.bayes.identifiability import identifiability, told
+from wirebayes.bayes.identifiability import extrapolation, identifiability, told
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.bayes.replicate import readings as replicate
@@ -370,6 +370,7 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
         "parameters": parameters,
         "derived": {"tension_N": tension, **quantities},
         "identifiability": told(identifiability(fit)),
+        "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).told(),
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,
         "autocorrelation_steps": float(chains.autocorrelation_steps.max()),

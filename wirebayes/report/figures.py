@@ -177,3 +177,30 @@ def residuals(
     axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
     legend_below(figure, axes, 3 if paper_N is None else 2)
     return figure
+
+
+def creep_ahead(told: Mapping[str, Any], title: str) -> Figure:
+    """Creep under a constant tension against time: 90 % bands with the prior, with it counted half, and without data.
+
+    Parameters
+    ----------
+    told : mapping
+        ``extrapolation`` of a ``summary.json``.
+    """
+    figure, axes = panel("time under constant tension, s", "creep, mm", f"{title}, {told['tension_N']:g} N")
+    prior, weaker, posterior = (told[f"{name}_mm"] for name in ("prior", "weaker_prior", "posterior"))
+    axes.fill_between(told["time_s"], prior["q05"], prior["q95"], color=QUIET, alpha=0.45, lw=0, label="prior alone")
+    axes.fill_between(told["time_s"], posterior["q05"], posterior["q95"], color=CHAIN, alpha=0.45, lw=0,
+                      label="posterior, 90 %")  # fmt: skip
+    axes.plot(told["time_s"], posterior["q50"], color=CHAIN, lw=1.2)
+    for end, label in (("q05", "prior counted half"), ("q95", None)):
+        axes.plot(told["time_s"], weaker[end], color=HOLD, lw=1, ls="--", label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for t, word in ((3600.0, "1 h"), (86400.0, "1 day")):
+        axes.axvline(t, color=INK, lw=0.5, alpha=0.4)
+        axes.annotate(word, (t, 1.0), xycoords=("data", "axes fraction"), ha="right", va="top", fontsize=8, color=INK,
+                      xytext=(-2, -2), textcoords="offset points")  # fmt: skip
+    logarithmic(axes, "y")
+    legend_below(figure, axes, 3)
+    return figure

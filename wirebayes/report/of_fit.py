@@ -74,7 +74,12 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     named = figures.marginals(draws, prior, sample.model.effects)
     told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
     blocks.append(Pictures(told, small=True))
+    taught = [t["sentence"] for t in summary["identifiability"].values()]
+    blocks.append(Columns([Points("What the data taught", taught)]))
     blocks.append(_derived(summary["derived"]))
+    ahead = summary["extrapolation"]
+    alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior counted half, prior alone."
+    blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, ahead["sentence"])]))
     blocks.append(Text(_sampled(summary)))
     return Section(sample.name, blocks)
 
