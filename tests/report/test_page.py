@@ -163,7 +163,8 @@ def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     page = read(write(fitted))
     assert "8 holds and 1 not recorded, 40 readings." in page.words
     assert "Tensions from 1.21 to 15.92 N." in page.words
-    assert len(page.images) == 2 * 2 + 8 + 6
+    assert len(page.images) == 2 * 3 + 8 + 6
+    assert "What the data taught" in page.words and "Creep after 24 h at" in page.words
     sections = re.split("What is known well", page.words)[1:]
     known = [re.split("What is not", section)[0] for section in sections]
     loose = [re.split("What is not", section)[1].split("parameter")[0] for section in sections]
