@@ -6,7 +6,6 @@ once, a column of one sample is ``preload[sample]`` and one of a material ``k1[m
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -144,10 +143,6 @@ class Problem:
             noise.reading_variance(own["sensor_sd"], sample.resolution_N),
             own["setting_sd"],
         )
-
-    @cached_property
-    def sample_names(self) -> tuple[str, ...]:
-        return tuple(sample.name for sample in self.samples)
 
 
 def build(
