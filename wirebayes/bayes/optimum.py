@@ -17,7 +17,7 @@ Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
 _ROUNDS = 4  # of climbs from places that no mode explains
-_LOOKED, _STRANGE = 1600, 200  # places asked whether a mode explains them; the most that are asked again
+_STRANGE = 200  # the most places that are asked more than once whether a mode explains them
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _WARM_STEPS = 4  # the last ones of the cooling
 _LEAST_SAG = 1.0  # nats
@@ -192,7 +192,7 @@ def search(
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - len(best), rng)
     start = np.vstack([passed[spread], z[best], np.empty((0, z.shape[1])) if extra is None else extra])
     found = _distinct([climb(lambda points, rows: target(points), start)])
-    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
+    looked = rng.choice(len(passed), min(2 * draws, len(passed)), replace=False)
     warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
     passed, height = passed[looked], height[looked]
     for _ in range(_ROUNDS):
