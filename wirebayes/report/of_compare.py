@@ -1,5 +1,6 @@
 """The page of ``wirebayes compare``: models side by side on readings they have not seen."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
     rows = table["models"]
     good = [r for r in rows if r.get("failed") is None]
-    blocks: list[Block] = [Text(r["meaning"], strong=True) for r in good[:1] if r.get("meaning")]
+    blocks: list[Block] = [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
     if (folder / name).is_dir() and (pictures := pictures_in(folder / name)):
         blocks.append(Pictures(pictures))
     header = ["model", "weight", f"elpd − {table['base']}", "standard error", "held out: rms, N"]
@@ -28,9 +29,14 @@ def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
         difference, held = r.get("difference") or {}, r.get("held_out") or {}
         errors = (number((held.get(way) or {}).get("rmse_N"), 2) for way in ("free", "given_first"))
         scores = (number(difference.get(key), 2) for key in ("elpd", "se"))
-        lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, r.get("meaning") or ""])
+        lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _brief(r.get("meaning") or "")])
     blocks.append(Table(header, lines, "Best first. A weight is the model's share in the best mixture of predictions."))
     failed = [[r["name"], str(r["failed"])] for r in rows if r.get("failed") is not None]
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))
     return Section(name, blocks)
+
+
+def _brief(meaning: str) -> str:
+    """What follows the figures, which have columns of their own."""
+    return re.split("[:;] ", meaning, maxsplit=1)[-1]
