@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.bayes.dense import columns, conditional, jacobian, log_density, normal
@@ -37,6 +37,8 @@ models = st.builds(Model, st.sampled_from(["hooke", "modified"]), st.sampled_fro
 @settings(max_examples=100, deadline=None)
 def test_the_chain_is_the_dense_normal(p, theta, errors, model, resolution, seed):
     theta = theta | errors
+    # at the brink of slackness the creep's derivative by the tension has no bound, and neither number means anything
+    assume(linearise(p, columns(theta), model).tension[p.mask].min() > 1e-3)
     y = measured(p, theta, model, seed)
     r, covariance, _ = normal(p, theta, model, y, resolution)
     expected = log_density(r, covariance)
