@@ -33,8 +33,7 @@ def begin(
     before = target.evaluations
     seen = None if rough is None else (rough, rough)
     if found is None:
-        # rough draws know the modes of nearly this posterior: what a change could have added is left to find
-        searched = search(target, rng, extra=near, **({} if rough is None else {"draws": 300, "starts": 8}))
+        searched = search(target, rng, extra=near)
         found, seen = searched.modes, seen or (searched.warm, searched.cold)
     known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
     randoms = [np.random.RandomState(np.random.MT19937(sequence)) for sequence in spawned[1:]]
