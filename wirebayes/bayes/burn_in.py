@@ -3,7 +3,7 @@
 The search's cooled population gives the first proposal. Then, round by round, the proposal is fitted to weighted draws
 of itself, which also tell how good it is: the acceptance it would have, and how far the log of posterior over proposal,
 at its 99.9 % quantile over the posterior, lies above its median. While hardly a draw would be accepted, walkers of the
-density to the power of a half look further: a warm density has the same places and lower walls between them.
+density to a power below one look further: a warm density has the same places and lower walls between them.
 
 Walkers are placed by weight at last, so that none is left in a far mode of no weight.
 """
@@ -18,7 +18,6 @@ from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.mixture import Mixture
 from wirebayes.bayes.optimum import Optimum, search
 from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.proposal import Proposal
 from wirebayes.bayes.walkers import State, advance
 
 Array = NDArray[Any]
@@ -130,13 +129,12 @@ def _walking(target: Target, policy: Policy) -> int:
 def _resampled(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """(n,) rows drawn by weight, systematically, in random order; no row counts for more than the root of all rows."""
     weight = np.exp(log_weight - log_weight.max())
-    shares = np.cumsum(np.minimum(weight, np.sqrt(len(weight)) * weight.mean()))
-    chosen = np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n)
-    return rng.permutation(np.minimum(chosen, len(log_weight) - 1))
+    weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
+    return rng.permutation(mixture.rows_by_weight(weight, n, rng))
 
 
-def _finite_draws(target: Target, known: Mixture | Proposal, n: int, random: Any) -> tuple[Array, Array]:
-    """Draws of a proposal where the density is above zero, and its logarithm there."""
+def _finite_draws(target: Target, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:
+    """Draws of a mixture where the density is above zero, and its logarithm there."""
     drawn, values = np.empty((0, len(target.problem.names))), np.empty(0)
     while len(drawn) < n:
         z = known.rvs(n, random)

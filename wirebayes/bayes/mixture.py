@@ -115,6 +115,12 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
     return chosen
 
 
+def rows_by_weight(weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """(n,) rows drawn in proportion to (m,) weights, systematically, in their order."""
+    shares = np.cumsum(weight)
+    return np.minimum(np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n), len(weight) - 1)
+
+
 def log_sum(logs: Array) -> Array:
     """(n,) log of the sum of (k, n) exponentials; scipy's spends most of its time on cases that do not occur here."""
     top = logs.max(axis=0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.mixture import spread_rows
+from wirebayes.bayes.mixture import rows_by_weight, spread_rows
 
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
@@ -246,7 +246,7 @@ def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) ->
         step = _next_step(value, 1.0 - power)
         power += step
         weight = np.exp(step * (value - value.max()))
-        kept = np.searchsorted(np.cumsum(weight) / weight.sum(), (np.arange(m) + rng.uniform()) / m).clip(max=m - 1)
+        kept = rows_by_weight(weight, m, rng)
         z, value = z[kept], value[kept]
         one, other = rng.integers(m, size=(2, m))
         moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)

@@ -427,9 +427,10 @@ def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator
     plain = gap.held_out(block.experiments, train, (), block, rng)
     better, whole = plain, list[Block]()
     if verdict == "unknown":
-        better, whole = [], [_unnamed(block, e, rng) for e in block.experiments]
+        better = []
         for e, k in zip(block.experiments, train, strict=True):
-            better += gap.held_out([e], [k], _unnamed(block, e.train(k), rng).effects, block, rng)
+            whole.append(fitted([e], [_unnamed(block, e, rng)], block.law, block.history, rng))
+            better += gap.held_out([e], [k], [_unnamed(block, e.train(k), rng)], block, rng)
     elif final.effects:
         better, whole = gap.held_out(block.experiments, train, final.effects, final, rng), [final]
     shrinks, loho = False, None
@@ -455,11 +456,10 @@ def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator
     return out
 
 
-def _unnamed(block: Block, experiment: Experiment, rng: np.random.Generator) -> Block:
-    """An experiment fitted alone with a discrepancy as large as what the plain model leaves over in it."""
+def _unnamed(block: Block, experiment: Experiment, rng: np.random.Generator) -> Discrepancy:
+    """A discrepancy as large as what the plain model, fitted to the experiment alone, leaves over in it."""
     plain = fitted([experiment], (), block.law, block.history, rng)
-    return fitted([experiment], [_discrepancy(experiment, _left_over(plain, experiment.name))],
-                  block.law, block.history, rng)  # fmt: skip
+    return _discrepancy(experiment, _left_over(plain, experiment.name))
 
 
 def _discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
