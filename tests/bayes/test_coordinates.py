@@ -1,5 +1,7 @@
 """The sampled coordinates: back and forth, volume, and that the target is the posterior in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -15,6 +17,7 @@ PROBLEMS = {
     "chain": draw([Bench()], Truth({"k1": 800.0}), seed=1).problem,
     "additive": draw([Bench()], Truth({"k1": 800.0}, history="additive"), seed=1).problem,
     "effects": draw([Bench()], Truth(effects=(named("second_relaxation"), named("grip_slip@5"))), seed=2).problem,
+    "edges": draw([Bench()], Truth(effects=(named("permanent_creep"), named("creep_threshold"))), seed=4).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "slack": build([Bench().experiment()]),  # every reading zero
     "hold": build([Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 10.0)).experiment()], likelihood="hold"),
@@ -53,12 +56,26 @@ def test_the_target_is_prior_likelihood_and_volume():
 
 
 def test_outside_the_prior_the_density_is_zero():
-    made = draw([Bench()], Truth(effects=(named("toe"),)), seed=2)
-    target = Target(made.problem)
-    z = target.coordinates.to_sampled(made.theta)
-    assert np.isfinite(target(z))[0]
-    z[0, made.problem.names.index("toe.c")] = -1.0
-    assert target(z)[0] == -np.inf
+    made = draw([Bench()], Truth({"k1": 800.0}), seed=2)
+    narrow = made.problem.prior.distributions | {"U": stats.uniform(0.4, 0.2)}
+    target = Target(replace(made.problem, prior=replace(made.problem.prior, distributions=narrow)))
+    theta = np.repeat(made.theta, 2, axis=0)
+    theta[:, made.problem.names.index("U")] = 0.5, 0.7
+    assert np.isfinite(target(target.coordinates.to_sampled(theta))).tolist() == [True, False]
+
+
+def test_amplitudes_with_an_edge_are_standard_normal_under_their_prior():
+    problem = PROBLEMS["edges"]
+    columns = [problem.names.index(name) for name in ("permanent_creep.psi", "creep_threshold.tau_c")]
+    coordinates = Coordinates(problem)
+    theta = problem.prior.rvs(2000, np.random.default_rng(5))
+    z = coordinates.to_sampled(theta)
+    for column in columns:
+        assert stats.kstest(z[:, column], "norm").pvalue > 1e-3
+    theta[:2, columns] = [[0.0, 0.0], [1.0, 40.0]]  # on the edge, and far out in the half-normal of 2 N
+    z = coordinates.to_sampled(theta[:2])
+    assert np.isfinite(z).all()
+    assert coordinates.to_natural(z)[:, columns] == pytest.approx(theta[:2, columns], rel=1e-8, abs=1e-7)
 
 
 def test_a_prior_that_allows_negative_values_is_sampled_as_it_is():

@@ -16,6 +16,7 @@ from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 Array = NDArray[Any]
+_FLAT = 1e9  # standard deviation of a prior that no amplitude feels
 
 
 @dataclass(frozen=True)
@@ -82,9 +83,9 @@ class Pinned:
     def __init__(self, block: Block, effect: Effect) -> None:
         problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
         self.column = _column(problem, effect)
-        free = problem.prior.distributions | {problem.names[self.column]: stats.uniform(-0.5e9, 1e9)}
+        free = problem.prior.distributions | {problem.names[self.column]: stats.norm(0.0, _FLAT)}
         self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
-        self.log_flat = float(np.log(self.target.coordinates.scale[self.column]) - np.log(1e9))
+        self.log_flat = float(stats.norm.logpdf(0.0))
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:

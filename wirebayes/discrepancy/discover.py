@@ -325,16 +325,15 @@ def _add(
 
 
 def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
-    """Amplitude in the final model, by its normal approximation."""
+    """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
     main = effect.amplitudes[0]
     target, best = final.target, final.modes
     column = next(i for i, name in enumerate(target.problem.names) if name.split("[")[0] == effect.columns()[0])
-    mean = float(target.coordinates.to_natural(best.z[:1])[0, column])
-    sd = float(np.sqrt(best.covariance[0, column, column]) * target.coordinates.scale[column])
-    low, high = (float(v) for v in main.prior.support())
+    z = np.repeat(best.z[:1], 3, axis=0)
+    z[:, column] += np.array([-1.645, 0.0, 1.645]) * np.sqrt(best.covariance[0, column, column])
+    low, mean, high = map(float, target.coordinates.to_natural(z)[:, column])
     hold = effect.hold if isinstance(effect, EventEffect) else None
-    interval = {"q05": max(mean - 1.645 * sd, low), "q95": min(mean + 1.645 * sd, high)}
-    return {"mean": mean, **interval, "unit": main.unit, "hold": hold}
+    return {"mean": mean, "q05": low, "q95": high, "unit": main.unit, "hold": hold}
 
 
 def _common(
