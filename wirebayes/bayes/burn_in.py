@@ -41,7 +41,7 @@ def begin(
     positions, values = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     states = [random.get_state() for random in randoms]
     state = State([positions], [values], states, known, known, rng, len(found.z), target.evaluations - before)
-    if seen is not None and _fit(target, state, policy, *seen):
+    if seen is not None and _fit(target, state, policy, *seen, sure=False):
         state.acceptance, state.seen = 1.0, None  # to be believed until draws tell better
     return state
 
@@ -92,14 +92,18 @@ def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, 
     return z[good], value[good], state.proposal.log_density(z[good])
 
 
-def _fit(target: Target, state: State, policy: Policy, hot: Array, cold: Array) -> bool:
-    """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
+def _fit(target: Target, state: State, policy: Policy, hot: Array, cold: Array, sure: bool = True) -> bool:
+    """Fit the proposal to draws of the warm density and of the density, and to those of the round before.
+
+    Rough draws, of which nothing is sure, share the work evenly with what was known before any walk.
+    """
     before, state.seen = state.seen, (hot, cold)
     if before is not None:
         hot, cold = np.vstack([before[0], hot]), np.vstack([before[1], cold])
     try:
         order = target.coordinates.order
-        state.proposal = proposal.fit(hot, cold, state.start, order, state.generator, most=policy.components)
+        shares = proposal.SHARES if sure else proposal.ROUGH_SHARES
+        state.proposal = proposal.fit(hot, cold, state.start, order, state.generator, shares, most=policy.components)
     except np.linalg.LinAlgError:
         return False  # too few distinct points yet: keep the proposal that made them
     return True
@@ -146,7 +150,7 @@ def _finite_draws(target: Target, known: Mixture, n: int, random: Any) -> tuple[
 
 _OVERDISPERSED = 1.7
 _WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the longer the more often it has to
-_HOT = 0.6  # power of the density that the wide part of the proposal is fitted to
+_HOT = 0.4  # power of the density that the wide part of the proposal is fitted to
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
 _GOOD_ACCEPTANCE = 0.25
-_LONGEST_SETTLING = 12
+_LONGEST_SETTLING = 8

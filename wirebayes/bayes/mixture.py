@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 Array = NDArray[Any]
-DEGREES = 10.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
+DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ class Search:
 
 
 def search(
-    target: Target, rng: np.random.Generator, *, draws: int = 800, starts: int = 12, extra: Array | None = None
+    target: Target, rng: np.random.Generator, *, draws: int = 800, starts: int = 8, extra: Array | None = None
 ) -> Search:
     """Look for the modes of a posterior: good ones among many prior draws, each climbed.
 
@@ -192,7 +192,7 @@ def search(
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - len(best), rng)
     start = np.vstack([passed[spread], z[best], np.empty((0, z.shape[1])) if extra is None else extra])
     found = _distinct([climb(lambda points, rows: target(points), start)])
-    looked = rng.choice(len(passed), min(2 * draws, len(passed)), replace=False)
+    looked = rng.choice(len(passed), min(draws, len(passed)), replace=False)
     warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
     passed, height = passed[looked], height[looked]
     for _ in range(_ROUNDS):

@@ -37,7 +37,7 @@ class Policy:
     ess: float = 4000.0
     r_hat: float = 1.01
     rounds: int = 3
-    round_steps: int = 8
+    round_steps: int = 6
     most_rounds: int = 6
     tail: float = 3.0
     acceptance: float = 0.05

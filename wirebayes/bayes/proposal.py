@@ -16,6 +16,8 @@ from wirebayes.bayes.mixture import Mixture
 from wirebayes.bayes.straighten import Straight
 
 Array = NDArray[Any]
+SHARES = (0.8, 0.08, 0.08, 0.04)  # of the close part, the wide one, the plain one and the start's
+ROUGH_SHARES = (0.3, 0.1, 0.1, 0.5)  # while nothing but the start is sure
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,14 @@ class Proposal:
 
 
 def fit(
-    hot: Array, cold: Array, start: Mixture, order: NDArray[np.int64], rng: np.random.Generator, *, most: int
+    hot: Array,
+    cold: Array,
+    start: Mixture,
+    order: NDArray[np.int64],
+    rng: np.random.Generator,
+    shares: tuple[float, float, float, float],
+    *,
+    most: int,
 ) -> Proposal:
     """The proposal learned from the burn-in.
 
@@ -67,6 +76,8 @@ def fit(
     order : (d,) array of int
         In which coordinates are straightened (see `wirebayes.bayes.straighten`).
     rng : numpy Generator
+    shares : tuple of float
+        Of the four parts.
     most : int
         The most components of the close mixture; the wide ones, which need not resemble anything, have half as many.
 
@@ -80,9 +91,8 @@ def fit(
     (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
     close = mixture.fit(near, rng, most=most, degrees=_LIGHT)
     wide, plain = (mixture.fit(points[::2], rng, most=most // 2) for points in (far, hot))
-    return Proposal(_SHARES, straight, close, wide, plain, start)
+    return Proposal(shares, straight, close, wide, plain, start)
 
 
 _ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time
 _LIGHT = 40.0  # degrees of freedom where the wide mixtures look after the tails
-_SHARES = (0.75, 0.1, 0.1, 0.05)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.mixture import Mixture
-from wirebayes.bayes.moves import IndependenceMove
+from wirebayes.bayes.moves import IndependenceMove, StraightEvolutionMove
 from wirebayes.bayes.proposal import Proposal
 
 Array = NDArray[Any]
@@ -105,7 +105,8 @@ def _moves(state: State) -> list[tuple[Any, float]]:
     if not state.learned:
         return evolution
     share = _EVOLUTION if state.frozen else _EXPLORATION
-    return [(IndependenceMove(state.proposal), 1.0 - share), (evolution[0][0], share)]
+    walk = StraightEvolutionMove(state.proposal.straight) if isinstance(state.proposal, Proposal) else evolution[0][0]
+    return [(IndependenceMove(state.proposal), 1.0 - share), (walk, share)]
 
 
 _EVOLUTION = 0.1  # share of steps that do not trust the proposal
