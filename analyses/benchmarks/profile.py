@@ -1,0 +1,104 @@
+"""Where the time goes: the whole of `reproduce`, one `discover`, one fit, by the module whose own lines take it.
+
+    python -m analyses.benchmarks.profile --output out/benchmarks
+
+Worker processes are replaced by calls in this one, so that every second is seen. A function of a library counts for
+the module of the package that calls it. Shares matter; the seconds are longer than without the profiler.
+"""
+
+import argparse
+import cProfile
+import pstats
+import tempfile
+from collections import defaultdict
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from unittest.mock import patch
+
+import wirebayes
+from wirebayes.bayes import jobs
+from wirebayes.bayes.fit import fit
+from wirebayes.bayes.problem import build
+from wirebayes.discrepancy.discover import discover
+from wirebayes.output import write_json
+from wirebayes.paper import experiments
+from wirebayes.reproduce import run
+
+HOME = str(Path(wirebayes.__file__).parent)
+SHOWN = 12
+
+
+class Here(Executor):
+    """An executor that does the work at once, in this process."""
+
+    def __init__(self, *args, **kwargs):
+        pass
+
+    def submit(self, fn, *args, **kwargs):
+        future = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def reproduce():
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        patch.object(jobs, "ProcessPoolExecutor", Here),
+        patch.object(run, "ProcessPoolExecutor", Here),
+    ):
+        run.reproduce(Path(folder) / "out")
+
+
+WORK = {
+    "one fit": lambda: fit(build(experiments()[:1]), 0),
+    "one discover": lambda: discover(experiments()[:1]),
+    "reproduce": reproduce,
+}
+
+
+def shares(profile):
+    """Share of the time by module of the package, libraries counted for the module that calls them."""
+    stats = pstats.Stats(profile).stats
+    own = {f: row[2] for f, row in stats.items()}
+    callers = {f: {c: row[3] for c, row in entry[4].items()} for f, entry in stats.items()}
+    spent = defaultdict(float)
+
+    def charge(function, seconds, depth):
+        if function[0].startswith(HOME):
+            spent[str(Path(function[0]).relative_to(HOME).with_suffix(""))] += seconds
+            return
+        over = callers[function]
+        whole = sum(over.values())
+        if depth == 0 or not whole:
+            spent[f"({Path(function[0]).parent.name or 'python'})"] += seconds
+            return
+        for caller, share in over.items():
+            if share:
+                charge(caller, seconds * share / whole, depth - 1)
+
+    for function, seconds in own.items():
+        if seconds > 1e-4:
+            charge(function, seconds, 12)
+    whole = sum(spent.values())
+    return {k: v / whole for k, v in sorted(spent.items(), key=lambda item: -item[1])}, whole
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    out = {}
+    for name, work in WORK.items():
+        profile = cProfile.Profile()
+        profile.runcall(work)
+        by_module, seconds = shares(profile)
+        out[name] = {"seconds_with_profiler": seconds, "shares": by_module}
+        print(f"\n{name}: {seconds:.1f} s with the profiler")
+        for module, share in list(by_module.items())[:SHOWN]:
+            print(f"  {module:32s} {share:6.1%}", flush=True)
+    write_json(options.output / "profile.json", out)
+
+
+if __name__ == "__main__":
+    main()
