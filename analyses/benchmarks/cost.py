@@ -1,4 +1,5 @@
-"""What a likelihood evaluation costs: against readings, holds, experiments and effects; memory; its share of a fit.
+"""What a likelihood evaluation costs: against readings, holds, experiments and effects; memory; its share of a fit; and
+how many effective draws it gives on the paper's wires.
 
     python -m analyses.benchmarks.cost --output out/benchmarks
 
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analyses.benchmarks.plain import ours
 from wirebayes.bayes import coordinates
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.fit import fit
@@ -21,7 +23,7 @@ from wirebayes.experiment import Experiment, Hold
 from wirebayes.output import write_json
 from wirebayes.paper import experiments
 
-BATCH, REPEATS = 256, 7
+BATCH, REPEATS, SEEDS = 256, 7, 5
 
 
 def staircase(holds, readings, name="made"):
@@ -94,6 +96,12 @@ def share_in_likelihood(problem, seed):
             "sampler": 1.0 - spent["target"] / whole}  # fmt: skip
 
 
+def draws(problem):
+    """Effective draws per likelihood evaluation for 20,000 of them: of the kept ones, and of all; over seeds."""
+    runs = [ours(problem, seed, 0.0)[0] for seed in range(SEEDS)]
+    return {key: [r[key] for r in runs] for key in ("ess_per_kept_evaluation", "ess_per_evaluation")}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
@@ -120,6 +128,13 @@ def main():
     for likelihood in ("chain", "hold"):
         out["share"][likelihood] = share = share_in_likelihood(build([wire], likelihood=likelihood), 0)
         print(f"  {wire.name}, {likelihood}: " + ", ".join(f"{k} {v:.2f}" for k, v in share.items()), flush=True)
+    print("\neffective draws per evaluation: after burn-in, and all counted (least, median, largest of the seeds)")
+    out["draws"] = {}
+    for experiment in experiments():
+        for likelihood in ("chain", "hold"):
+            found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(build([experiment], likelihood=likelihood))
+            told = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
+            print(f"  {experiment.name + ', ' + likelihood:24s} {told[0]}    {told[1]}", flush=True)
     write_json(options.output / "cost.json", out)
 
 

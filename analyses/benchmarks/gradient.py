@@ -222,7 +222,14 @@ def nutpie_run(problem, seed, seconds, natural=True):
     while True:
         fresh = Costs()
         with fresh.part("sample"):
-            tree = nutpie.sample(compiled, draws=draws, tune=400, chains=CHAINS, cores=1, seed=seed, progress_bar=False)
+            running = nutpie.sample(
+                compiled, draws=draws, tune=400, chains=CHAINS, cores=1, seed=seed, progress_bar=False, blocking=False
+            )
+            try:
+                tree = running.wait(timeout=2.0 * seconds)
+            except TimeoutError:
+                running.cancel()
+                raise TimeoutError(f"650 steps of four chains were not done in {2.0 * seconds:.0f} s") from None
         if fresh.cpu["sample"] > 0.4 * seconds or draws > 50_000:
             break
         draws *= 4

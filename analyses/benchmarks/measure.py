@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wirebayes.bayes.convergence import autocorrelation_steps, nested_r_hat
+from wirebayes.bayes.convergence import WINDOW, autocorrelation_steps, nested_r_hat
 
 WANTED = 20_000
 R_HAT = 1.01
@@ -50,7 +50,7 @@ def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergence
 
             ess = np.maximum(ess, [arviz_stats.ess(values[:, :, 0, k], method="bulk") for k in range(values.shape[-1])])
         r_hat = float(_r_hat(values).max())
-        steps_enough = values.shape[1] >= 10.0 * values.shape[0] * values.shape[1] * values.shape[2] / ess.min()
+        steps_enough = values.shape[1] >= WINDOW * values.shape[0] * values.shape[1] * values.shape[2] / ess.min()
         converged = r_hat <= R_HAT and divergences == 0 and bool(steps_enough or values.shape[2] == 1)
         out |= {"ess": float(ess.min()), "r_hat": r_hat, "converged": converged}
     else:

@@ -99,7 +99,7 @@ def _em(x: Array, k: int, degrees: float, rng: np.random.Generator, iterations: 
         factors = np.linalg.cholesky(scale / (share.sum(axis=1) + _OF_THE_WHOLE)[:, None, None])
         mixture = Mixture(share.sum(axis=1) / n, centres, factors, degrees)
         log_likelihood = float(total.sum())
-        if log_likelihood - last < 1e-3 * n:
+        if log_likelihood - last < 4e-3 * n:
             break
         last = log_likelihood
     return Mixture(mixture.weights, middle + mixture.centres @ root.T, root @ mixture.factors, degrees)
