@@ -2,10 +2,10 @@
 
 The mean is a quadratic and the logarithm of the scale a linear function of the coordinates before: a ridge that bends
 and a funnel (a setting error that widens everything it allows) become nearly a round heap. What is left, coordinate by
-coordinate, is made normal by a sinh-arcsinh map, which knows skewness and tails: an exponent U whose lower end the data
-hardly bound, say. The whole is triangular, so its Jacobian is the product of the slopes, and it has an inverse whatever
-its coefficients. Beyond the points it was fitted to, quadratics go on as straight lines and scales stay at what they
-were on the border.
+coordinate, is made even by a sinh-arcsinh map, which knows skewness: of an exponent U whose lower end the data hardly
+bound, say. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The whole is triangular,
+so its Jacobian is the product of the slopes, and it has an inverse whatever its coefficients. Beyond the points it was
+fitted to, quadratics go on as straight lines and scales stay at what they were on the border.
 
 References
 ----------
@@ -42,8 +42,8 @@ class Straight:
         A constant and what multiplies the coordinates before.
     least, most : (d,) arrays
         The range of the logarithm of the scale.
-    shape : (4, d) array
-        Location, scale, skewness and tail weight of what is left.
+    shape : (3, d) array
+        Location, scale and skewness of what is left.
     """
 
     order: NDArray[np.int64]
@@ -72,8 +72,8 @@ class Straight:
 
     def inverse(self, u: Array) -> Array:
         """(n, d) points of straightened ones."""
-        location, width, skewness, weight = self.shape
-        u = location + width * np.sinh((np.arcsinh(u) + skewness) / weight)
+        location, width, skewness = self.shape
+        u = location + width * np.sinh(np.arcsinh(u) + skewness)
         v, held = np.zeros_like(u), np.zeros_like(u)
         for j in range(u.shape[1]):
             before, inside = v[:, :j], held[:, :j]
@@ -128,25 +128,25 @@ def fit(x: Array, order: NDArray[np.int64]) -> Straight:
 
 
 def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
-    """What is normal where x has this shape, and the logarithms of the slopes."""
-    location, width, skewness, weight = shape
+    """What is even where x has this shape, and the logarithms of the slopes."""
+    location, width, skewness = shape
     w = (x - location) / width
-    inner = weight * np.arcsinh(w) - skewness
-    return np.sinh(inner), np.log(weight / width * np.cosh(inner)) - 0.5 * np.log1p(w * w)
+    inner = np.arcsinh(w) - skewness
+    return np.sinh(inner), np.log(np.cosh(inner) / width) - 0.5 * np.log1p(w * w)
 
 
 def _shape(x: Array) -> Array:
-    """(4,) shape of points (n,), by which their quantiles come nearest to those of a normal."""
+    """(3,) shape of points (n,), by which their quantiles come nearest to those of a normal."""
     quantiles = np.quantile(x, ndtr(_SCORES))
 
     def off(shape: Array) -> Array:
-        location, log_width, skewness, log_weight = shape
-        told, _ = _normal(quantiles, np.array([location, np.exp(log_width), skewness, np.exp(log_weight)]))
-        return np.append(told - _SCORES, _RESERVE * shape[2:])
+        location, log_width, skewness = shape
+        told, _ = _normal(quantiles, np.array([location, np.exp(log_width), skewness]))
+        return np.append(told - _SCORES, _RESERVE * skewness)
 
     spread = max(float(x.std()), 1e-12)
-    found = least_squares(off, [x.mean(), np.log(spread), 0.0, 0.0], bounds=([-9, -9, -2, -1], [9, 9, 2, 1])).x
-    return np.array([found[0], np.exp(found[1]), found[2], np.exp(found[3])])
+    found = least_squares(off, [x.mean(), np.log(spread), 0.0], bounds=([-9, -9, -2], [9, 9, 2])).x
+    return np.array([found[0], np.exp(found[1]), found[2]])
 
 
 def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]:
