@@ -33,6 +33,7 @@ benchmark: .venv/test.stamp
 	$(BIN)/python analyses/robot_speed.py
 	$(BIN)/python analyses/robot_agreement.py
 	$(BIN)/python -m analyses.benchmarks.cost --output out/benchmarks
+	$(BIN)/python -m analyses.benchmarks.profile --output out/benchmarks
 	test -x .venv-benchmark/bin/python || $(PYTHON) -m venv .venv-benchmark
 	.venv-benchmark/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[benchmark]"
 	.venv-benchmark/bin/python -m analyses.benchmarks --output out/benchmarks

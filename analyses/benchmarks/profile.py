@@ -59,26 +59,27 @@ WORK = {
 def shares(profile):
     """Share of the time by module of the package, libraries counted for the module that calls them."""
     stats = pstats.Stats(profile).stats
-    own = {f: row[2] for f, row in stats.items()}
-    callers = {f: {c: row[3] for c, row in entry[4].items()} for f, entry in stats.items()}
-    spent = defaultdict(float)
+    known = {}
 
-    def charge(function, seconds, depth):
+    def owners(function):
+        """Modules of the package that a function works for, with their shares."""
         if function[0].startswith(HOME):
-            spent[str(Path(function[0]).relative_to(HOME).with_suffix(""))] += seconds
-            return
-        over = callers[function]
-        whole = sum(over.values())
-        if depth == 0 or not whole:
-            spent[f"({Path(function[0]).parent.name or 'python'})"] += seconds
-            return
-        for caller, share in over.items():
-            if share:
-                charge(caller, seconds * share / whole, depth - 1)
+            return {str(Path(function[0]).relative_to(HOME).with_suffix("")): 1.0}
+        if function not in known:
+            known[function] = {}  # a function that calls itself by way of others adds nothing on the way back
+            over = {caller: row[3] for caller, row in stats[function][4].items() if row[3]}
+            total = defaultdict(float)
+            for caller, seconds in over.items():
+                for module, share in owners(caller).items():
+                    total[module] += share * seconds
+            whole = sum(total.values())
+            known[function] = {k: v / whole for k, v in total.items()} if whole else {"(not the package)": 1.0}
+        return known[function]
 
-    for function, seconds in own.items():
-        if seconds > 1e-4:
-            charge(function, seconds, 12)
+    spent = defaultdict(float)
+    for function, row in stats.items():
+        for module, share in owners(function).items():
+            spent[module] += share * row[2]
     whole = sum(spent.values())
     return {k: v / whole for k, v in sorted(spent.items(), key=lambda item: -item[1])}, whole
 
