@@ -11,7 +11,7 @@ from wirebayes.bayes.fit import fit
 from wirebayes.bayes.problem import build
 from wirebayes.paper import experiments
 
-SEEDS = range(100, 104)
+SEEDS = range(100, 112)
 
 
 def main() -> None:

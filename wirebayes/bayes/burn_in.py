@@ -41,7 +41,7 @@ def begin(
     positions, values = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
     states = [random.get_state() for random in randoms]
     state = State([positions], [values], states, known, known, rng, len(found.z), target.evaluations - before)
-    if seen is not None and _fit(target, state, policy, *seen, sure=False):
+    if seen is not None and _fit(target, state, policy, *seen, proposal.ROUGH_SHARES):
         state.acceptance, state.seen = 1.0, None  # to be believed until draws tell better
     return state
 
@@ -92,17 +92,20 @@ def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, 
     return z[good], value[good], state.proposal.log_density(z[good])
 
 
-def _fit(target: Target, state: State, policy: Policy, hot: Array, cold: Array, sure: bool = True) -> bool:
-    """Fit the proposal to draws of the warm density and of the density, and to those of the round before.
-
-    Rough draws, of which nothing is sure, share the work evenly with what was known before any walk.
-    """
+def _fit(
+    target: Target,
+    state: State,
+    policy: Policy,
+    hot: Array,
+    cold: Array,
+    shares: tuple[float, float, float, float] = proposal.SHARES,
+) -> bool:
+    """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
     before, state.seen = state.seen, (hot, cold)
     if before is not None:
         hot, cold = np.vstack([before[0], hot]), np.vstack([before[1], cold])
     try:
         order = target.coordinates.order
-        shares = proposal.SHARES if sure else proposal.ROUGH_SHARES
         state.proposal = proposal.fit(hot, cold, state.start, order, state.generator, shares, most=policy.components)
     except np.linalg.LinAlgError:
         return False  # too few distinct points yet: keep the proposal that made them

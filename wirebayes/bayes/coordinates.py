@@ -20,13 +20,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
+from wirebayes.bayes.edges import edge
 from wirebayes.bayes.problem import MATERIAL, Problem, Sample
 
 Array = NDArray[Any]
-_HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
-_NEAREST = 1e-9  # share of the prior between an edge and a value on it
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
 _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
@@ -59,53 +57,6 @@ class _Ridge:
         return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
 
-@dataclass(frozen=True)
-class _HalfNormal:
-    """Scores that are standard normal where the value is half-normal."""
-
-    sd: float
-
-    def score(self, value: Array) -> Array:
-        u = value / (self.sd * np.sqrt(2.0))
-        # each half from its own tail, where it keeps its digits; the edge itself would lie at minus infinity
-        return np.where(u < 0.5, ndtri(np.maximum(erf(u), _NEAREST)), -ndtri(erfc(np.maximum(u, 0.5))))
-
-    def value(self, score: Array) -> Array:
-        u = np.where(score < 0.0, erfinv(ndtr(np.minimum(score, 0.0))), erfcinv(ndtr(-np.maximum(score, 0.0))))
-        return np.asarray(self.sd * np.sqrt(2.0) * u)
-
-    def log_slope(self, value: Array) -> Array:
-        z, u = self.score(value), value / self.sd
-        return np.asarray(np.log(0.5 * self.sd) + 0.5 * (u * u - z * z))
-
-
-@dataclass(frozen=True)
-class _Uniform:
-    """Scores that are standard normal where the value is uniform."""
-
-    low: float
-    width: float
-
-    def score(self, value: Array) -> Array:
-        return np.asarray(ndtri(np.clip((value - self.low) / self.width, _NEAREST, 1.0 - _NEAREST)))
-
-    def value(self, score: Array) -> Array:
-        return np.asarray(self.low + self.width * ndtr(score))
-
-    def log_slope(self, value: Array) -> Array:
-        z = self.score(value)
-        return np.asarray(np.log(self.width) - _HALF_LOG_2PI - 0.5 * z * z)
-
-
-def _edge(distribution: Any) -> _HalfNormal | _Uniform | None:
-    """The map of a distribution that ends at an edge; none for the others, and where the edge is not at zero."""
-    kind = distribution.dist.name
-    _, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
-    if kind == "halfnorm" and loc == 0.0:
-        return _HalfNormal(float(scale))
-    return _Uniform(float(loc), float(scale)) if kind == "uniform" else None
-
-
 class Coordinates:
     """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``."""
 
@@ -114,7 +65,7 @@ class Coordinates:
         self.problem = problem
         self.log_columns = np.array([name in problem.prior.logarithmic for name in names])
         free = [(i, d) for i, d in enumerate(problem.prior.distributions.values()) if not self.log_columns[i]]
-        self.edges = {i: edge for i, d in free if (edge := _edge(d)) is not None}
+        self.edges = {i: found for i, d in free if (found := edge(d)) is not None}
         self.scale = np.ones(len(names))
         for i, distribution in free:
             if i not in self.edges:
@@ -136,8 +87,8 @@ class Coordinates:
         """Sampled coordinates of natural parameters."""
         z = theta / self.scale
         z[:, self.log_columns] = np.log(theta[:, self.log_columns])
-        for i, edge in self.edges.items():
-            z[:, i] = edge.score(theta[:, i])
+        for i, at in self.edges.items():
+            z[:, i] = at.score(theta[:, i])
         for ridge in self.ridges:
             creep, hazard = self._shifts(theta, ridge)
             if "k2" in ridge.where:
@@ -149,8 +100,8 @@ class Coordinates:
     def to_natural(self, z: Array) -> Array:
         """Natural parameters of sampled coordinates."""
         theta = z * self.scale
-        for i, edge in self.edges.items():
-            theta[:, i] = edge.value(z[:, i])
+        for i, at in self.edges.items():
+            theta[:, i] = at.value(z[:, i])
         with np.errstate(over="ignore"):
             theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
             for ridge in self.ridges:
@@ -163,8 +114,8 @@ class Coordinates:
     def log_jacobian(self, theta: Array) -> Array:
         """(n,) log |d natural / d sampled|."""
         total = np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum()
-        for i, edge in self.edges.items():
-            total = total + edge.log_slope(theta[:, i])
+        for i, at in self.edges.items():
+            total = total + at.log_slope(theta[:, i])
         return np.asarray(total)
 
     def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:

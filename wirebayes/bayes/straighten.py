@@ -137,16 +137,16 @@ def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
 
 def _shape(x: Array) -> Array:
     """(3,) shape of points (n,), by which their quantiles come nearest to those of a normal."""
-    quantiles = np.quantile(x, ndtr(_SCORES))
+    middle, spread = x.mean(), max(float(x.std()), 1e-12)
+    quantiles = (np.quantile(x, ndtr(_SCORES)) - middle) / spread
 
     def off(shape: Array) -> Array:
         location, log_width, skewness = shape
         told, _ = _normal(quantiles, np.array([location, np.exp(log_width), skewness]))
         return np.append(told - _SCORES, _RESERVE * skewness)
 
-    spread = max(float(x.std()), 1e-12)
-    found = least_squares(off, [x.mean(), np.log(spread), 0.0], bounds=([-9, -9, -2], [9, 9, 2])).x
-    return np.array([found[0], np.exp(found[1]), found[2]])
+    location, log_width, skewness = least_squares(off, np.zeros(3), bounds=([-9, -9, -2], [9, 9, 2])).x
+    return np.array([middle + spread * location, spread * np.exp(log_width), skewness])
 
 
 def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]:

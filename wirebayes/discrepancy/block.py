@@ -16,7 +16,8 @@ from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 Array = NDArray[Any]
-_FLAT = 1e9  # standard deviation of a prior that no amplitude feels
+_FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
+_LOG_FLAT = float(stats.norm.logpdf(0.0))
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,8 @@ class Pinned:
     def __init__(self, block: Block, effect: Effect) -> None:
         problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
         self.column = _column(problem, effect)
-        free = problem.prior.distributions | {problem.names[self.column]: stats.norm(0.0, _FLAT)}
+        free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
         self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
-        self.log_flat = float(stats.norm.logpdf(0.0))
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:
@@ -104,7 +104,7 @@ class Pinned:
         """Climb every row with its own amplitude."""
 
         def density(points: Array, rows: Array) -> Array:
-            return self.target(self._insert(points, amplitude[rows])) - self.log_flat
+            return self.target(self._insert(points, amplitude[rows])) - _LOG_FLAT
 
         return climb(density, start, iterations=40, tolerance=1e-2)
 
