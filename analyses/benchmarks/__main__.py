@@ -8,12 +8,11 @@ run anew beside each peer, so that a busy machine slows both.
 """
 
 import argparse
-from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 
-from analyses.benchmarks import gradient, measure, model, plain
+from analyses.benchmarks import asked, gradient, measure, model, plain
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.optimum import modes
 from wirebayes.bayes.problem import build
@@ -49,7 +48,6 @@ def check(problem, seed):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
     parser.add_argument(
         "--minutes", type=float, default=10.0, help="of processor time to sample for each peer, at most"
     )
@@ -57,8 +55,7 @@ def main():
     parser.add_argument("--likelihoods", nargs="*", default=["chain", "hold"])
     parser.add_argument("--peers", nargs="*", help="words that the names of wanted peers begin with")
     parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
+    options = asked(parser)
     cases = []
     for experiment in experiments():
         if options.wires and experiment.name not in options.wires:

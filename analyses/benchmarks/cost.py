@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analyses.benchmarks import asked
 from analyses.benchmarks.plain import ours
 from wirebayes.bayes import coordinates
 from wirebayes.bayes.coordinates import Target
@@ -103,10 +104,7 @@ def draws(problem):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
-    options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
+    options = asked(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
     out = {}
     sizes = [5, 15, 50, 150, 500]
     out["readings"] = growth("readings a hold", sizes, [build([staircase(12, r)]) for r in sizes])

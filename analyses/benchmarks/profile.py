@@ -16,6 +16,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import wirebayes
+from analyses.benchmarks import asked
 from wirebayes.bayes import jobs
 from wirebayes.bayes.fit import fit
 from wirebayes.bayes.problem import build
@@ -85,10 +86,7 @@ def shares(profile):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=Path("out/benchmarks"))
-    options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
+    options = asked(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
     out = {}
     for name, work in WORK.items():
         profile = cProfile.Profile()
