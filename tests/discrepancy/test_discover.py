@@ -53,7 +53,7 @@ def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
         block = fitted(made(folder, [Bench(resolution_N=0.01)], {}, [], seed), (), "hooke", "saturating", rng)
         trials, candidates = screen.candidate_probes([block], CATALOGUE)
         data = expansion.scan(expansion.expand(block.target, block.modes.z[:1], trials))
-        values.append(screen.global_test(candidates, [data], [screen.replicated(block, trials, 99, rng)]).p)
+        values.append(screen.global_test(candidates, [data], [screen.replicated(block, trials, 99, rng).scan]).p)
     assert sum(p <= 0.08 for p in values) <= 5
     assert 0.3 < np.mean(values) < 0.7  # the mean of 24 uniforms has a standard deviation of 0.06
 

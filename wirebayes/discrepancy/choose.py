@@ -1,6 +1,6 @@
 """From screened candidates to names: refit those that stand a chance, add up their evidence, weigh against unknown."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,20 +54,26 @@ class Choice:
 
 
 def choose(
-    blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]
+    blocks: Sequence[Block],
+    trials: Sequence[Probe],
+    candidates: Sequence[Candidate],
+    scans: Sequence[Scan],
+    further: Mapping[Candidate, float] = {},
 ) -> Choice:
-    """Evidence of every name, refitted where it matters."""
+    """Evidence of every name, refitted where the scan, or the look from further out, gives it a chance."""
     linear = [tuple(float(v[0]) for v in log_bayes(c, scans)) for c in candidates]
     forms: dict[tuple[str, str, tuple[int, ...], bool], int] = {}
+    promise: dict[tuple[str, str, tuple[int, ...], bool], float] = {}
     for i, c in enumerate(candidates):
         effect = trials[c.probe].effect
         form = (c.name, effect.key, c.blocks, c.shared)
+        promise[form] = max(promise.get(form, -np.inf), linear[i][0], further.get(c, -np.inf))
         if form not in forms or linear[i][0] > linear[forms[form]][0]:
             forms[form] = i
-    ranked = sorted(forms.items(), key=lambda item: -linear[item[1]][0])
-    top = linear[ranked[0][1]][0]
+    ranked = sorted(forms.items(), key=lambda item: -promise[item[0]])
+    top = promise[ranked[0][0]]
     refitted: dict[tuple[str, str, tuple[int, ...], bool], list[Refit]] = {}
-    near = [f for f, i in ranked if linear[i][0] >= top - _MARGIN - _SHARE * max(top, 0.0)][:_MOST]
+    near = [f for f, _ in ranked if promise[f] >= top - _MARGIN - _SHARE * max(top, 0.0)][:_MOST]
     names = {name for name, *_ in near}
     for form, i in ranked:
         # A name that stands a chance is refitted in its other forms too: the scan may have taken the wrong one.

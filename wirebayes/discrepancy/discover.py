@@ -17,6 +17,7 @@ from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.discrepancy.choose import UNKNOWN_WEIGHT, Choice
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
 from wirebayes.discrepancy.naming import probabilities
+from wirebayes.discrepancy.outward import outward
 from wirebayes.discrepancy.screen import Candidate, GlobalTest
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
@@ -27,6 +28,7 @@ from wirebayes.wire.laws import ElasticLaw, History
 
 Array = NDArray[Any]
 ALPHA = 0.04
+PLAIN_TO_SEE = 0.002  # p of the linear scan at which no look from further out could change the verdict
 ALPHA_AFTER = 0.03
 KEEP_ELPD = 4.0
 _MOST_EFFECTS = 2
@@ -131,16 +133,22 @@ def investigate(
     for i, block in enumerate(plain):
         plain[i], gone = _strike_gross_errors(block, trials, candidates, i, settings, rng)
         struck += gone
-    data, nulls, patterns, expansions = [], [], [], []
+    data, simulated, patterns, expansions = [], [], [], []
     for i, block in enumerate(plain):
         listed, columns = locate.patterns(block.target.problem)
         x = expand(block.target, block.modes.z[:1], trials, columns=columns)
         expansions.append(x)
         data.append(scan(x))
-        nulls.append(screen.replicated(block, trials, settings.simulations, rng, columns))
+        simulated.append(screen.replicated(block, trials, settings.simulations, rng, columns))
         patterns.append(listed)
         report("simulations", i + 1, len(plain))
+    nulls = [s.scan for s in simulated]
     test = screen.global_test(candidates, data, nulls)
+    further: dict[Candidate, float] = {}
+    if test.p > PLAIN_TO_SEE:
+        report("larger effects", 0, 1)
+        test, further = outward(plain, trials, candidates, data, simulated, test)
+        report("larger effects", 1, 1)
     where = [
         locate.findings(p, len(trials), d, n, ", ".join(b.names))
         for p, d, n, b in zip(patterns, data, nulls, plain, strict=True)
@@ -150,7 +158,7 @@ def investigate(
         final = plain
     else:
         report("naming", 0, 1)
-        choice = choose.choose(plain, trials, candidates, data)
+        choice = choose.choose(plain, trials, candidates, data, further)
         verdict, accepted, final, choice = _decide(plain, choice, settings, rng)
         report("naming", 1, 1)
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
@@ -161,7 +169,7 @@ def investigate(
     for i, block in enumerate(plain):
         report("held-out holds", i, len(plain))
         affected = [a for a in accepted if i in a.blocks]
-        common = _common(verdict, choice, affected, plain, final[i], i, test, where[i], alike)
+        common = _common(verdict, choice, affected, plain, final[i], i, test.p, where[i], alike)
         common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
         checks = _held_out(block, final[i], verdict, rng)
         for e, check in zip(block.experiments, checks, strict=True):
@@ -291,7 +299,7 @@ def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.r
     trials, candidates, scans = _scanned(blocks, settings)
     if not candidates:
         return choice
-    nulls = [screen.replicated(b, trials, _RETESTS, rng) for b in blocks]
+    nulls = [screen.replicated(b, trials, _RETESTS, rng).scan for b in blocks]
     p = screen.global_test(candidates, scans, nulls).p
     if p > ALPHA_AFTER:
         return choice
@@ -338,7 +346,7 @@ def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
 
 def _common(
     verdict: str, choice: Choice | None, affected: list[_Accepted], plain: list[Block], final: Block, i: int,
-    test: GlobalTest,
+    p: float,
     where: list[dict[str, Any]], alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What the experiments of one block share in the report."""
@@ -359,7 +367,7 @@ def _common(
         "accepted": names,
         "amplitudes": {a.name: _amplitude(final, a.effects[i]) for a in affected},
         "probabilities": shares,
-        "p_global": test.p,
+        "p_global": p,
         "shared_with": list(dict.fromkeys(shared)),
         "where": where,
     }
@@ -370,7 +378,6 @@ def _outlook(
     settings: Settings, choice: Choice | None, verdict: str, alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What could have been seen, what cannot be, and what to measure next."""
-    threshold = test.threshold(ALPHA)
     best_probe: dict[str, int] = {}
     strength = np.median(null.norm, axis=0)
     for c in candidates:
@@ -378,7 +385,7 @@ def _outlook(
             best_probe[c.name] = c.probe
     seen = {
         name: {
-            "amplitude_80": power.amplitude_80(null, trials[k], k, threshold),
+            "amplitude_80": power.amplitude_80(null, trials[k], k, test.threshold(name, ALPHA)),
             "unit": trials[k].effect.amplitudes[0].unit,
         }
         for name, k in best_probe.items()

@@ -5,8 +5,8 @@ deviation: K is the derivative by the setting errors, ρ their unknown size agai
 scale of the noise is integrated out, ρ is summed over a grid, so no test trusts the noise of a model that may be wrong.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -63,38 +63,64 @@ def probes(effect: Effect) -> list[Probe]:
 
 
 @dataclass(frozen=True)
-class Expansion:
-    """Linear pieces of a block of samples at n parameter sets, rows scaled by each sample's reading error.
+class Tangent:
+    """A block of samples made linear at n parameter sets, rows scaled by each sample's reading error.
 
     Attributes
     ----------
     residual : (n, N)
     parameters : (n, N, p)
         Derivatives by the sampled coordinates that move the mean.
-    signatures : (n, N, m)
-        What each probe adds, per unit amplitude.
-    flexible : (n, N, q)
     left, singular : (n, N, H), (n, H)
         Left singular vectors and values of K.
-    one_sided : (m,) bool
     ratio : (n,)
         The fitted ρ.
     prior_gradient, prior_precision : (n, p), (n, p, p)
-    floor : float
+    floor : (n,)
         Rounding's share of the scaled variance: noise cannot be smaller.
     """
 
     residual: Array
     parameters: Array
-    signatures: Array
-    one_sided: Array
-    flexible: Array
     left: Array
     singular: Array
     ratio: Array
     prior_gradient: Array
     prior_precision: Array
     floor: Array
+
+    @property
+    def degrees(self) -> int:
+        """Readings less parameters."""
+        return int(self.parameters.shape[1] - self.parameters.shape[2])
+
+    @property
+    def least(self) -> Array:
+        """(n,) below which no sum of squares is believed."""
+        return np.asarray(self.degrees * np.maximum(self.floor, _LEAST_NOISE))
+
+    @property
+    def prior_square(self) -> Array:
+        """(n,) squared distance of the point from the prior's own best, as a parabola sees it."""
+        along = np.linalg.solve(self.prior_precision, self.prior_gradient[..., None])[..., 0]
+        return np.asarray((self.prior_gradient * along).sum(axis=1))
+
+
+@dataclass(frozen=True)
+class Expansion(Tangent):
+    """A tangent with what each effect and the flexible reference would add.
+
+    Attributes
+    ----------
+    signatures : (n, N, m)
+        What each probe adds, per unit amplitude.
+    one_sided : (m,) bool
+    flexible : (n, N, q)
+    """
+
+    signatures: Array
+    one_sided: Array
+    flexible: Array
 
 
 @dataclass(frozen=True)
@@ -119,6 +145,16 @@ class Scan:
     amplitude: Array
     norm: Array
     pieces: "Pieces"
+
+    def rows(self, rows: slice) -> "Scan":
+        """Some of its rows; the pieces stay whole."""
+        return replace(
+            self,
+            effects=self.effects[rows],
+            flexible=self.flexible[rows],
+            amplitude=self.amplitude[rows],
+            norm=self.norm[rows],
+        )
 
 
 @dataclass(frozen=True)
@@ -209,56 +245,84 @@ def expand(
     (H, R, n) and its derivatives (H, R, n, p), it returns (H, R, n, more), N.
     """
     problem = target.problem
-    n = len(z)
-    moving = [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
-    theta = target.coordinates.to_natural(z)
-    steps = []
-    for i in moving:
-        shifted = z.copy()
-        shifted[:, i] += _STEP
-        steps.append(target.coordinates.to_natural(shifted))
-    parts: dict[str, list[Array]] = {key: [] for key in ("r", "a", "s", "f", "k", "floor")}
+    points = list(_points(target, z, readings, moving_columns(problem)))
+    added, functions = [], []
+    for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
+        mask = sample.protocol.mask
+        shape = (shapes or forms(target, z[:1], trials))[at][mask]
+        each = [shape[None] / point.sd[:, None, None]]
+        if columns is not None:
+            more = columns(problem, at, point.tension, point.slopes)
+            each.append(np.stack([point.rows(more[..., i], mask) for i in range(more.shape[-1])], axis=-1))
+        added.append(np.concatenate(each, axis=-1))
+        functions.append(flexible.basis(sample.protocol, 1.0)[mask][None] / point.sd[:, None, None])
+    signatures = np.concatenate(added, axis=1)
+    one_sided = [i < len(trials) and trials[i].one_sided for i in range(signatures.shape[-1])]
+    plain = _tangent(target, z, points, moving_columns(problem))
+    return Expansion(
+        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool), flexible=_block_diagonal(functions)
+    )
+
+
+def moving_columns(problem: Problem) -> list[int]:
+    """The columns of parameters that move the mean of the readings."""
+    return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
+
+
+def tangent(target: Target, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
+    """Linearise a block by some of its columns, at the rows of `z` (n, d); readings as in `expand`."""
+    return _tangent(target, z, list(_points(target, z, readings, moving)), moving)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """One sample at n parameter sets: tension (H, R, n), derivatives (H, R, n, p), reading error (n,), and rows."""
+
+    tension: Array
+    slopes: Array
+    sd: Array
+    residual: Array
+    parameters: Array
+    by_setting: Array
+    floor: Array
+
+    def rows(self, values: Array, mask: Array) -> Array:
+        """(H, R, n) to (n, N) in units of the reading error."""
+        return np.asarray((values[mask] / self.sd).T)
+
+
+def _points(target: Target, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Iterator[_Point]:
+    problem, n = target.problem, len(z)
+    both = target.coordinates.to_natural(np.concatenate([z, *_shifted(z, moving, _STEP)]))
+    theta = both[:n]
     for at, sample in enumerate(problem.samples):
-        protocol, mask = sample.protocol, sample.protocol.mask
+        mask = sample.protocol.mask
         own = problem.parameters(theta, sample)
         sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
-        line = linearise(protocol, own, sample.model)
+        line = linearise(sample.protocol, own, sample.model)
         y = sample.readings if readings is None else readings[at]
-
-        def rows(values: Array, mask: Array = mask, sd: Array = sd) -> Array:
-            """(H, R, n) to (n, N) in units of the reading error."""
-            return np.asarray((values[mask] / sd).T)
-
-        mean = line.tension
-        parts["r"].append(rows(y - mean))
-        both = np.concatenate([theta, *steps])
-        moved = simulate(protocol, problem.parameters(both, sample), sample.model)
+        moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
         moved = moved.reshape(*moved.shape[:2], len(moving) + 1, n)
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
-        parts["a"].append(np.stack([rows(slopes[..., i]) for i in range(len(moving))], axis=-1))
-        shape = (shapes or forms(target, z[:1], trials))[at][mask]
-        added = [shape[None] / sd[:, None, None]]
-        if columns is not None:
-            more = columns(problem, at, mean, slopes)
-            added.append(np.stack([rows(more[..., i]) for i in range(more.shape[-1])], axis=-1))
-        parts["s"].append(np.concatenate(added, axis=-1))
-        functions = flexible.basis(protocol, 1.0)[mask]
-        parts["f"].append(functions[None] / sd[:, None, None])
-        jac = noise.jacobian(line)[mask]
-        parts["k"].append(np.moveaxis(jac / sd * (own["setting_sd"] / sd), -1, 0))
-        parts["floor"].append(np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2)
-    k = _block_diagonal(parts["k"])
+        scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
+        jac = np.moveaxis(noise.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
+        floor = np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2
+        yield _Point(line.tension, slopes, sd, ((y - line.tension)[mask] / sd).T, scaled, jac, floor)
+
+
+def _tangent(target: Target, z: Array, points: Sequence[_Point], moving: list[int]) -> Tangent:
+    k = _block_diagonal([p.by_setting for p in points])
+    beyond = ~np.isfinite(k).all(axis=(1, 2))  # what the model cannot compute has no tangent
+    k[beyond] = 1.0
     # K's size is what ρ measures: give it a typical column of length one.
     ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
-    k = k / np.sqrt(ratio)[:, None, None]
-    left, singular, _ = np.linalg.svd(k, full_matrices=False)
+    left, singular, _ = np.linalg.svd(k / np.sqrt(ratio)[:, None, None], full_matrices=False)
     gradient, precision = _prior(target, z, moving)
-    return Expansion(
-        np.concatenate(parts["r"], axis=1), np.concatenate(parts["a"], axis=1), np.concatenate(parts["s"], axis=1),
-        np.array([i < len(trials) and trials[i].one_sided for i in range(parts["s"][0].shape[-1])], bool),
-        _block_diagonal(parts["f"]), left, singular, ratio, gradient, precision,
-        np.min(parts["floor"], axis=0),
-    )  # fmt: skip
+    residual = np.concatenate([p.residual for p in points], axis=1)
+    residual[beyond] = np.nan
+    parameters = np.concatenate([p.parameters for p in points], axis=1)
+    floor = np.min([p.floor for p in points], axis=0)
+    return Tangent(residual, parameters, left, singular, ratio, gradient, precision, floor)
 
 
 def signature(problem: Problem, own: dict[str, Array], model: Model, at: int, probe: Probe) -> Array:
@@ -276,9 +340,8 @@ def signature(problem: Problem, own: dict[str, Array], model: Model, at: int, pr
 
 def scan(x: Expansion) -> Scan:
     """Log Bayes factors of every probe and of the flexible reference."""
-    n, rows, p = x.parameters.shape
-    m = x.signatures.shape[2]
-    degrees = rows - p
+    p, m = x.parameters.shape[2], x.signatures.shape[2]
+    degrees, least = x.degrees, x.least
     columns = np.concatenate([x.parameters, x.signatures, x.flexible, x.residual[..., None]], axis=2)
     levels = np.swapaxes(x.left, 1, 2) @ columns
     plain_product = np.swapaxes(x.parameters, 1, 2) @ columns
@@ -288,13 +351,10 @@ def scan(x: Expansion) -> Scan:
     rr0 = (x.residual**2).sum(axis=1)
     ff0 = np.swapaxes(x.flexible, 1, 2) @ x.flexible
     fr0 = np.einsum("naf,na->nf", x.flexible, x.residual)
-    least = degrees * np.maximum(x.floor, _LEAST_NOISE)
     plain, effects, loose, amplitude, norm = [], [], [], [], []
     kept: dict[str, list[Array]] = {"shared": [], "rss": [], "along": [], "square": []}
     for ratio in RATIOS:
-        with np.errstate(over="ignore"):
-            damp = ratio * x.singular**2 / (1.0 + ratio * x.singular**2)
-        weighted = damp[..., None] * levels
+        weighted = damp(x.singular, ratio)[..., None] * levels
         gram = plain_product - np.swapaxes(levels[..., :p], 1, 2) @ weighted
         pp = gram[..., :p] + x.prior_precision
         pr = gram[..., -1] + x.prior_gradient
@@ -304,16 +364,10 @@ def scan(x: Expansion) -> Scan:
         rr = rr0 - (levels[..., -1] * weighted[..., -1]).sum(axis=1)
         solved = np.linalg.solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
         sr, sm, sf = solved[..., 0], solved[..., 1 : m + 1], solved[..., m + 1 :]
-        rss = (
-            rr
-            - (pr * sr).sum(axis=1)
-            + np.einsum(
-                "np,np->n", x.prior_gradient, np.linalg.solve(x.prior_precision, x.prior_gradient[..., None])[..., 0]
-            )
-        )
+        rss = rr - (pr * sr).sum(axis=1) + x.prior_square
         b = mr - np.einsum("npm,np->nm", pm, sr)
         c = mm - (pm * sm).sum(axis=1)
-        c = np.where(c > _ABSORBED * square, c, np.inf)
+        c = np.where(c > ABSORBED * square, c, np.inf)
         shared = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
         for key, piece in (("shared", shared), ("rss", rss), ("along", b), ("square", c)):
             kept[key].append(piece)
@@ -366,27 +420,51 @@ def projected(x: Expansion, ratio: float) -> Array:
     return np.asarray(signatures - basis @ (basis.T @ signatures))
 
 
+def damp(singular: Array, ratio: Array | float) -> Array:
+    """How much of what moves whole holds the noise takes, at a ratio ρ, along each singular vector of K."""
+    with np.errstate(over="ignore"):
+        return np.asarray(ratio * singular**2 / (1.0 + ratio * singular**2))
+
+
+def residuals(target: Target, z: Array, readings: Sequence[Array] | None = None) -> Array:
+    """(n, N) readings less tensions at the rows of `z`, in units of the reading error."""
+    theta = target.coordinates.to_natural(z)
+    parts = []
+    for at, sample in enumerate(target.problem.samples):
+        own = target.problem.parameters(theta, sample)
+        sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
+        y = sample.readings if readings is None else readings[at]
+        with np.errstate(all="ignore"):
+            left = y - simulate(sample.protocol, own, sample.model)
+        parts.append((left[sample.protocol.mask] / sd).T)
+    return np.concatenate(parts, axis=1)
+
+
+def prior_density(target: Target, z: Array) -> Array:
+    """(n,) log density of the prior in the sampled coordinates."""
+    theta = target.coordinates.to_natural(z)
+    return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta))
+
+
 def _prior(target: Target, z: Array, moving: list[int]) -> tuple[Array, Array]:
     """Gradient and (diagonal, positive) precision of the prior in the sampled coordinates that move the mean."""
     h = 1e-3
-
-    def density(points: Array) -> Array:
-        theta = target.coordinates.to_natural(points)
-        return target.log_prior(theta) + target.coordinates.log_jacobian(theta)
-
+    n, p = len(z), len(moving)
+    values = prior_density(target, np.concatenate([z, *_shifted(z, moving, h), *_shifted(z, moving, -h)]))
+    centre, plus, minus = values[:n, None], *values[n:].reshape(2, p, n).swapaxes(1, 2)
     # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
-    centre = density(z)
-    gradient, precision = np.zeros((len(z), len(moving))), np.zeros((len(z), len(moving), len(moving)))
-    for a, i in enumerate(moving):
-        up, down = z.copy(), z.copy()
-        up[:, i] += h
-        down[:, i] -= h
-        plus, minus = density(up), density(down)
-        inside = np.isfinite(plus) & np.isfinite(minus)
-        with np.errstate(invalid="ignore"):
-            gradient[:, a] = np.where(inside, (plus - minus) / (2 * h), 0.0)
-            precision[:, a, a] = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
+    inside = np.isfinite(plus) & np.isfinite(minus)
+    with np.errstate(invalid="ignore"):
+        gradient = np.where(inside, (plus - minus) / (2 * h), 0.0)
+        diagonal = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
+    precision = np.zeros((n, p, p))
+    precision[:, np.arange(p), np.arange(p)] = diagonal
     return gradient, precision
+
+
+def _shifted(z: Array, columns: list[int], step: float) -> list[Array]:
+    """The rows of `z` with a step along each of the columns in turn."""
+    return [z + step * np.eye(z.shape[1])[i] for i in columns]
 
 
 def _block_diagonal(blocks: Sequence[Array]) -> Array:
@@ -402,4 +480,4 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 _STEP = 1e-5
 _LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
-_ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it
+ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

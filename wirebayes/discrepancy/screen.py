@@ -82,22 +82,34 @@ def _variants(kind: type[Effect], block: Block, several: bool) -> list[Effect]:
 def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
     """(n,) log Bayes factor with the same prior on every amplitude, best amplitude, and amplitude per δ."""
     i = candidate.probe
-    one_sided = scans[candidate.blocks[0]].pieces.one_sided[i]
-    occam = 0.5 * np.log(2 * np.pi) - np.log(LARGEST * (1 if one_sided else 2))
+    one_sided = bool(scans[candidate.blocks[0]].pieces.one_sided[i])
     lr = np.array([scans[b].effects[:, i] for b in candidate.blocks])
     a = np.array([scans[b].amplitude[:, i] for b in candidate.blocks])
     norm = np.array([scans[b].norm[:, i] for b in candidate.blocks])
     if one_sided:
         a = np.maximum(a, 0.0)
     if not candidate.shared:
-        return lr.sum(axis=0) + occam * len(candidate.blocks), a[0], 1.0 / np.maximum(norm[0], 1e-300)
-    # Each block's log Bayes factor as a parabola through zero amplitude and through its own best.
-    with np.errstate(divide="ignore", invalid="ignore"):
+        return lr.sum(axis=0) + occam(one_sided) * len(candidate.blocks), a[0], 1.0 / np.maximum(norm[0], 1e-300)
+    value, mean = shared_amplitude(lr, a, norm)
+    return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
+
+
+def occam(one_sided: bool) -> float:
+    """What the prior of an amplitude, uniform in δ up to `LARGEST`, adds to the log of its best likelihood ratio."""
+    return float(0.5 * np.log(2 * np.pi) - np.log(LARGEST * (1 if one_sided else 2)))
+
+
+def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
+    """Log likelihood ratio (...) of one amplitude for several blocks (b, ...), and that amplitude.
+
+    Each block's is a parabola through zero amplitude and through its own best.
+    """
+    with np.errstate(all="ignore"):
         weight = np.where(np.abs(a) * norm > 0.5, 2.0 * lr / a**2, norm**2)
-    total = np.maximum(weight.sum(axis=0), 1e-300)
-    mean = (weight * a).sum(axis=0) / total
-    value = (lr - 0.5 * weight * (a - mean) ** 2).sum(axis=0)
-    return value + occam, mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
+        total = np.maximum(weight.sum(axis=0), 1e-300)
+        mean = (weight * a).sum(axis=0) / total
+        value = (lr - 0.5 * weight * (a - mean) ** 2).sum(axis=0)
+    return np.where(np.isfinite(value), value, -np.inf), mean
 
 
 def flexible_log_bayes(scans: Sequence[Scan]) -> Array:
@@ -106,7 +118,18 @@ def flexible_log_bayes(scans: Sequence[Scan]) -> Array:
     return np.vstack([single, single.sum(axis=0)])
 
 
-def replicated(block: Block, trials: Sequence[Probe], n: int, rng: np.random.Generator, columns: Any = None) -> Scan:
+@dataclass(frozen=True)
+class Replicates:
+    """Data sets simulated at a block's fit: their scan, plain fits (n, d), and readings, a sample (H, R, n)."""
+
+    scan: Scan
+    z: Array
+    readings: list[Array]
+
+
+def replicated(
+    block: Block, trials: Sequence[Probe], n: int, rng: np.random.Generator, columns: Any = None
+) -> Replicates:
     """Scan `n` data sets simulated at the block's fit, each refitted first."""
     z = np.repeat(block.modes.z[:1], n, axis=0)
     theta = block.target.coordinates.to_natural(z)
@@ -118,40 +141,70 @@ def replicated(block: Block, trials: Sequence[Probe], n: int, rng: np.random.Gen
     for begin in range(0, n, _ROWS):
         rows = slice(begin, begin + _ROWS)
         parts.append(scan(expand(block.target, found.z[rows], trials, [v[..., rows] for v in y], columns, shapes)))
-    return joined(parts)
+    return Replicates(joined(parts), found.z, y)
+
+
+FLEXIBLE = "unknown"
+
+
+def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
+    """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks."""
+    out = {FLEXIBLE: flexible_log_bayes(scans).max(axis=0)}
+    for c in candidates:
+        value = log_bayes(c, scans)[0]
+        out[c.name] = np.maximum(out[c.name], value) if c.name in out else value
+    return out
+
+
+def surprise(value: float, chance: Array) -> float:
+    """Minus the log share of simulated values (n,) as large; beyond the largest it goes on by the distance.
+
+    A log Bayes factor is exceeded by chance about exponentially seldom, so a nat more is a nat more surprising.
+    """
+    larger = int((chance >= value).sum())
+    return float(np.log1p(len(chance)) - np.log1p(larger) + max(value - chance.max(), 0.0))
+
+
+def surprises(chance: Array) -> Array:
+    """(n,) the surprise of each simulated value among the others."""
+    order = np.argsort(-chance)
+    out = np.empty(len(chance))
+    out[order] = np.log(len(chance)) - np.log(np.arange(1, len(chance) + 1))
+    out[order[0]] += chance[order[0]] - chance[order[1]]
+    return out
 
 
 @dataclass(frozen=True)
 class GlobalTest:
-    """The largest statistic of all candidates and of the flexible reference.
+    """The most surprising name, or the flexible reference, beside the most surprising one of each simulation.
 
     Attributes
     ----------
-    p : float
-        Share of refitted simulations at least as large.
-    statistic : float
+    chance : dict of name to (n,) array
+        Its largest log Bayes factor in the simulations.
+    surprises : dict of name to float
+        Of the data.
     null : (n,) array
-    offset : float
-        Added to the flexible reference's log Bayes factor, so that both sides are equally often the largest by chance.
+        Largest surprise of each simulation.
     """
 
-    p: float
-    statistic: float
+    chance: dict[str, Array]
+    surprises: dict[str, float]
     null: Array
-    offset: float
 
-    def threshold(self, alpha: float) -> float:
-        """The statistic that chance exceeds with probability alpha."""
-        return float(np.quantile(self.null, 1.0 - alpha))
+    @property
+    def p(self) -> float:
+        """Share of refitted simulations at least as surprising."""
+        return float((1 + (self.null >= max(self.surprises.values())).sum()) / (1 + len(self.null)))
+
+    def threshold(self, name: str, alpha: float) -> float:
+        """The log Bayes factor at which a name would be as surprising as chance is with probability alpha."""
+        share = np.exp(-np.quantile(self.null, 1.0 - alpha))
+        return float(np.quantile(self.chance[name], 1.0 - min(share, 1.0)))
 
 
 def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Sequence[Scan]) -> GlobalTest:
-    """Compare the data's largest statistic with the simulations'."""
-    best_null = np.max([log_bayes(c, null)[0] for c in candidates], axis=0)
-    best_data = float(np.max([log_bayes(c, data)[0][0] for c in candidates]))
-    loose_null = flexible_log_bayes(null).max(axis=0)
-    loose_data = float(flexible_log_bayes(data).max())
-    offset = float(np.quantile(best_null, 0.97) - np.quantile(loose_null, 0.97))
-    reference = np.maximum(best_null, loose_null + offset)
-    statistic = max(best_data, loose_data + offset)
-    return GlobalTest(float((1 + (reference >= statistic).sum()) / (1 + len(reference))), statistic, reference, offset)
+    """Compare the data's most surprising name with the simulations'."""
+    chance = by_name(candidates, null)
+    found = {name: surprise(float(value[0]), chance[name]) for name, value in by_name(candidates, data).items()}
+    return GlobalTest(chance, found, np.max([surprises(value) for value in chance.values()], axis=0))

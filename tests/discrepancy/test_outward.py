@@ -1,0 +1,86 @@
+"""Effects led up a ladder of amplitudes, and the global test over names."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wirebayes.discrepancy import naming, screen
+from wirebayes.discrepancy.block import Block, fitted
+from wirebayes.discrepancy.expansion import Scan, expand, scan
+from wirebayes.discrepancy.outward import climb, ladders, outward, strengths
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.experiment import read_experiments
+from wirebayes.simulate import Bench, Truth, write
+from wirebayes.wire.effect import Effect
+
+STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1, "sensor_sd": 0.02, "setting_sd": 0.01}
+
+
+def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed: int) -> Block:
+    write(folder, [Bench()], Truth(STIFF | truth, effects), seed)
+    experiments = read_experiments(folder / "experiments.toml")
+    return fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+
+
+def scanned(block: Block, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
+    trials, candidates = screen.candidate_probes([block], kinds)
+    return trials, candidates, scan(expand(block.target, block.modes.z[:1], trials))
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("creep_threshold", 12.0), ("strain_stiffening", 12.0), ("tension_dependent_rate", 1.5)]
+)
+def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, name: str, size: float) -> None:
+    """Newton's method on the density itself, noise and all, pinned at many amplitudes, shares no step with it."""
+    effect = named(name)
+    block = block_of(tmp_path, {effect.columns()[0]: size}, [effect], 1)
+    trials, candidates, data = scanned(block, {name: CATALOGUE[name]})
+    ways = ladders([block], trials, candidates, [data])
+    found = strengths(ways, [{0: climb(block, way, block.modes.z[:1])} for way in ways])
+    best = max(range(len(trials)), key=lambda k: data.effects[0, k])
+    per_delta = 1.0 / float(data.norm[0, best])
+    truth = naming.refit([block], (0,), trials[best].effect, per_delta, float(data.amplitude[0, best]))
+    assert truth.log_bayes > 5.0  # the case is worth testing
+    assert max(float(v[0]) for v in found.values()) == pytest.approx(truth.log_bayes, abs=1.5)
+
+
+def test_rows_climb_alone(tmp_path: Path) -> None:
+    """A data set says the same in any company."""
+    block = block_of(tmp_path, {}, [], 3)
+    trials, candidates, data = scanned(block, {"toe": CATALOGUE["toe"]})
+    drawn = screen.replicated(block, trials, 5, np.random.default_rng(0))
+    way = ladders([block], trials, candidates, [data])[0]
+    together = climb(block, way, drawn.z, drawn.readings).log_bayes
+    alone = climb(block, way, drawn.z[2:3], [y[..., 2:3] for y in drawn.readings]).log_bayes
+    np.testing.assert_allclose(together[:, 2], alone[:, 0], rtol=1e-6, atol=1e-6)
+
+
+def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path: Path) -> None:
+    kinds = {name: CATALOGUE[name] for name in ("creep_threshold", "permanent_creep", "strain_stiffening")}
+    block = block_of(tmp_path, {"creep_threshold.tau_c": 16.0}, [named("creep_threshold")], 1)
+    trials, candidates, data = scanned(block, kinds)
+    drawn = screen.replicated(block, trials, 199, np.random.default_rng(1))
+    near = screen.global_test(candidates, [data], [drawn.scan])
+    far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
+    assert far.surprises["creep_threshold"] > near.surprises["creep_threshold"] + 1.0
+    assert far.p == pytest.approx(1 / 200) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
+
+
+@pytest.mark.statistical
+def test_the_most_surprising_name_is_as_surprising_as_said() -> None:
+    """p is uniform whatever the tails and the correlations of the names: an analytic case, one row as the data."""
+    rng = np.random.default_rng(0)
+    values = []
+    for _ in range(2000):
+        common = rng.exponential(size=100)
+        names = {
+            str(k): np.maximum(common, s * rng.exponential(size=100)) for k, s in enumerate((0.3, 1.0, 1.0, 3.0))
+        }
+        chance = {name: v[1:] for name, v in names.items()}
+        found = {name: screen.surprise(float(v[0]), chance[name]) for name, v in names.items()}
+        null = np.max([screen.surprises(v) for v in chance.values()], axis=0)
+        values.append(screen.GlobalTest(chance, found, null).p)
+    for alpha in (0.02, 0.04, 0.1, 0.5):
+        share, sd = np.mean(np.array(values) <= alpha), np.sqrt(alpha * (1 - alpha) / 2000)
+        assert abs(share - alpha) < 4 * sd, alpha
