@@ -41,10 +41,11 @@ _RAW = 10.0  # δ of the first one before the parameters take their part, if tha
 _APART, _MOST = 2.0, 8  # largest ratio of neighbours, unless they would be more than that many
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
 _LENGTHS = np.array([1.0, 0.4, 0.1])
+_SETTLED, _HOPELESS = 0.05, -15.0  # nats: a gain too small to go on for, a rung from which none leads up again
 _MIDDLE = 6.0  # δ for which a one-sided form is tried
 _LONGEST = 3.0  # of a step, in any sampled coordinate
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
-_ROWS = 125  # data sets that climb at once
+_FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
 _ENOUGH = 6  # simulations as high at which no more are asked for
 _TRIED = 3  # names
 _LEVEL = 0.95  # of chance, above which a name is worth a try
@@ -159,15 +160,18 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
         y = y.copy()
         y[:, column] = at / scale
         first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
-        best = [y.copy(), np.full(len(y), -np.inf), at - main.neutral, np.zeros(len(y))]
+        best = [y.copy(), np.full(len(y), -1e300), at - main.neutral, np.zeros(len(y))]
         for step in range(steps + 1):
             with np.errstate(all="ignore"):
                 both = tangent(target, y, readings, [*free, column])
             here = _weigh(_without_last(both), both.parameters[..., -1] / scale, first, last, degrees)
-            lr = here.height + prior_density(target, y) - nothing
+            lr = np.nan_to_num(here.height + prior_density(target, y) - nothing, nan=-1e300, neginf=-1e300)
+            gain = float(np.max(lr - best[1]))
             better = lr > best[1]
             for kept, new in zip(best, (y, lr, at - main.neutral + here.move, here.norm), strict=True):
                 kept[better] = new[better]
+            if gain < _SETTLED:
+                break
             if step < steps:
                 # A step that led down, where the wire went slack say, is the last one.
                 ahead = _follow(target, y, readings, both, here, free, degrees)
@@ -188,7 +192,7 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
             better = rung[0] > best[1]
             for kept, new in zip(best, (y, *rung), strict=False):
                 kept[better] = new[better]
-            if at in (low, high):
+            if at in (low, high) or (steps == _STEPS and rung[0].max() < _HOPELESS):
                 break
         near, far = (np.clip(main.neutral + best[2] * f, low, high) for f in (1.0 / half, half))
         found.append(look(best[0], main.neutral + best[2], near, far, moving)[1:])
@@ -353,7 +357,7 @@ def _chance(
     own = [way for way in ways if way.probe.effect.name == name]
     out = np.empty(0)
     while len(out) < len(linear) and (out >= value).sum() < _ENOUGH:
-        rows = slice(len(out), len(out) + _ROWS)
+        rows = slice(len(out), len(out) + (_ROWS if len(out) else _FIRST_ROWS))
         part = [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated]
         climbed = strengths(own, [{b: climb(blocks[b], way, *part[b]) for b in way.blocks} for way in own])
         out = np.append(out, np.max([linear[rows], *climbed.values()], axis=0))
