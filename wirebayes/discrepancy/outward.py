@@ -151,9 +151,10 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
     degrees = plain.degrees
     nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, degrees).height + prior_density(block.target, z)
-
     # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
     nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
+    # From where to where a rung speaks: half way, by ratio, to its neighbours.
+    half = np.sqrt(ladder.amplitudes[1] / ladder.amplitudes[0])
 
     def look(y: Array, at: Array, near: Array, far: Array, free: list[int], steps: int = _STEPS) -> tuple[Array, ...]:
         """Follow with the amplitudes `at` (n,): the best place, the log Bayes factor there, amplitude and δ of one."""
@@ -178,12 +179,11 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
                 y = np.where(better[:, None], ahead, best[0])
         return tuple(best)
 
-    # From where to where a rung speaks: half way, by ratio, to its neighbours.
-    half = np.sqrt(ladder.amplitudes[1] / ladder.amplitudes[0])
     found: list[Sequence[Array]] = []
+    unseen = np.full(len(z), -1e300), np.zeros(len(z)), np.zeros(len(z))
     for sign in ladder.signs:
-        y, best = start, [start.copy(), np.full(len(z), -np.inf), np.zeros(len(z))]
-        for amplitude in ladder.amplitudes:
+        y, best = start, [start.copy(), unseen[0].copy(), unseen[1].copy()]
+        for i, amplitude in enumerate(ladder.amplitudes):
             at, near, far = np.clip(main.neutral + sign * amplitude * np.array([1.0, 1.0 / half, half]), low, high)
             # Shape constants mean nothing while the amplitude is small, and would wander.
             free, steps = (moving, _STEPS) if amplitude >= ladder.amplitudes[-1] * _FIRST / _LAST else (rigid, _FEW)
@@ -193,6 +193,7 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
             for kept, new in zip(best, (y, *rung), strict=False):
                 kept[better] = new[better]
             if at in (low, high) or (steps == _STEPS and rung[0].max() < _HOPELESS):
+                found += [unseen] * (len(ladder.amplitudes) - i - 1)
                 break
         near, far = (np.clip(main.neutral + best[2] * f, low, high) for f in (1.0 / half, half))
         found.append(look(best[0], main.neutral + best[2], near, far, moving)[1:])
