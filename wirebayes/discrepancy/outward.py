@@ -33,7 +33,7 @@ from wirebayes.discrepancy.expansion import (
     tangent,
 )
 from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates, by_name, occam, shared_amplitude, surprise
-from wirebayes.wire.effect import EventEffect
+from wirebayes.wire.effect import Effect, EventEffect
 
 Array = NDArray[Any]
 _FIRST, _LAST = 1.5, 24.0  # δ of the rungs
@@ -42,6 +42,7 @@ _APART, _MOST = 2.0, 8  # largest ratio of neighbours, unless they would be more
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
 _LENGTHS = np.array([1.0, 0.4, 0.1])
 _SETTLED, _HOPELESS = 0.05, -15.0  # nats: a gain too small to go on for, a rung from which none leads up again
+_NEVER = -1e300
 _MIDDLE = 6.0  # δ for which a one-sided form is tried
 _LONGEST = 3.0  # of a step, in any sampled coordinate
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
@@ -53,60 +54,64 @@ _LEVEL = 0.95  # of chance, above which a name is worth a try
 
 @dataclass(frozen=True)
 class Ladder:
-    """An effect and the amplitudes it is led through.
+    """A form of an effect and the amplitudes it is led through, from several starts at once.
 
     Attributes
     ----------
-    probe : Probe
-    amplitudes : (rungs,) array
-        Distances from neutral, growing.
+    probes : tuple of Probe
+        One for each start: they differ in their shape constants.
+    amplitudes : (rungs, starts) array
+        Signed distances from neutral, growing in size.
     candidates : tuple of Candidate
-        Of this form of the effect, on the blocks where it may act.
+        Of this form, on the blocks where it may act.
     """
 
-    probe: Probe
+    probes: tuple[Probe, ...]
     amplitudes: Array
     candidates: tuple[Candidate, ...]
+
+    @property
+    def effect(self) -> Effect:
+        return self.probes[0].effect
 
     @property
     def blocks(self) -> set[int]:
         return {b for c in self.candidates for b in c.blocks}
 
-    @property
-    def signs(self) -> tuple[float, ...]:
-        return (1.0,) if self.probe.one_sided else (1.0, -1.0)
-
 
 def ladders(
     blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], data: Sequence[Scan]
 ) -> list[Ladder]:
-    """One ladder for each trial of the shape constants of each form that lasts.
+    """One ladder for each form that lasts, a start for each trial of its shape constants and each sign.
 
     None for events: they move the level of their hold, which the linear scan sees.
     """
-    alike: dict[tuple[Any, ...], list[int]] = {}
+    alike: dict[str, dict[tuple[float, ...], list[int]]] = {}
     for k, probe in enumerate(trials):
         if not isinstance(probe.effect, EventEffect):
             shape = tuple(probe.own[name] for name in probe.effect.columns()[1:])
-            alike.setdefault((probe.effect.key, *shape), []).append(k)
+            alike.setdefault(probe.effect.key, {}).setdefault(shape, []).append(k)
     out = []
-    for numbers in alike.values():
-        here = [c for c in candidates if c.probe == numbers[0]]
+    for shapes in alike.values():
+        every = [k for numbers in shapes.values() for k in numbers]
+        here = tuple(c for c in candidates if c.probe == every[0])
         on = sorted({b for c in here for b in c.blocks})
-        # Of a one-sided form the probe that lies in the middle of the ladder.
-        strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in numbers}
-        visible = [k for k in numbers if strength[k] > 0]
-        if visible:
-            k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
-            raw = float(np.sqrt(sum(_raw(blocks[b], trials[k]) for b in on)))
-            out.append(Ladder(trials[k], _amplitudes(strength[k], raw), tuple(here)))
+        strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in every}
+        starts: list[tuple[Probe, float, float]] = []
+        for numbers in shapes.values():
+            visible = [k for k in numbers if strength[k] > 0]
+            if visible:
+                # Of a one-sided form the probe that lies in the middle of the ladder.
+                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
+                raw = float(np.sqrt(sum(_raw(blocks[b], trials[k]) for b in on)))
+                ends = min(_FIRST / strength[k], _RAW / raw), _LAST / strength[k]
+                starts += [(trials[k], s * ends[0], s * ends[1]) for s in ((1,) if trials[k].one_sided else (1, -1))]
+        if starts:
+            probes, first, last = zip(*starts, strict=True)
+            widest = float(np.max(np.divide(last, first)))
+            rungs = min(1 + int(np.ceil(np.log(widest) / np.log(_APART))), _MOST)
+            out.append(Ladder(probes, np.geomspace(first, last, rungs), here))
     return out
-
-
-def _amplitudes(strength: float, raw: float) -> Array:
-    """Rungs for an effect of which a unit has so many δ, and had so many before the parameters took their part."""
-    first, last = min(_FIRST / strength, _RAW / raw), _LAST / strength
-    return np.geomspace(first, last, min(1 + int(np.ceil(np.log(last / first) / np.log(_APART))), _MOST))
 
 
 def _raw(block: Block, probe: Probe) -> float:
@@ -122,7 +127,7 @@ def _raw(block: Block, probe: Probe) -> float:
 
 @dataclass(frozen=True)
 class Climbed:
-    """A block's way up a ladder ``(rungs, n)``: log Bayes factor over each stretch, where, and δ per amplitude."""
+    """A block on a ladder ``(rungs starts, n)``: log Bayes factor over each stretch, where, and δ per amplitude."""
 
     log_bayes: Array
     amplitude: Array
@@ -141,11 +146,11 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
-    main = ladder.probe.effect.amplitudes[0]
+    main, starts = ladder.effect.amplitudes[0], len(ladder.probes)
     low, high = (float(v) for v in main.prior.support())
-    target, column, start = _with_effect(block, ladder, z)
+    target, column, y = _with_effect(block, ladder, z)
     moving = [i for i in moving_columns(target.problem) if i != column]
-    shapes = set(ladder.probe.effect.columns()[1:])
+    shapes = set(ladder.effect.columns()[1:])
     rigid = [i for i in moving if target.problem.names[i].split("[")[0] not in shapes]
     scale = target.coordinates.scale[column]
     plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
@@ -153,22 +158,25 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, degrees).height + prior_density(block.target, z)
     # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
     nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
+    nothing = np.tile(nothing, starts)
+    if readings is not None:
+        readings = [np.tile(r, (1, 1, starts)) for r in readings]
     # From where to where a rung speaks: half way, by ratio, to its neighbours.
-    half = np.sqrt(ladder.amplitudes[1] / ladder.amplitudes[0])
+    half = np.sqrt(ladder.amplitudes[1] / ladder.amplitudes[0]).repeat(len(z))
 
-    def look(y: Array, at: Array, near: Array, far: Array, free: list[int], steps: int = _STEPS) -> tuple[Array, ...]:
-        """Follow with the amplitudes `at` (n,): the best place, the log Bayes factor there, amplitude and δ of one."""
+    def look(y: Array, amplitude: Array, free: list[int], steps: int) -> tuple[Array, ...]:
+        """Follow with the amplitudes (n,): the best place, the log Bayes factor there, amplitude and δ of one."""
+        at, near, far = (np.clip(main.neutral + amplitude * f, low, high) for f in (1.0, 1.0 / half, half))
         y = y.copy()
         y[:, column] = at / scale
         first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
-        best = [y.copy(), np.full(len(y), -1e300), at - main.neutral, np.zeros(len(y))]
+        best = [y.copy(), np.full(len(y), _NEVER), at - main.neutral, np.zeros(len(y))]
         for step in range(steps + 1):
             with np.errstate(all="ignore"):
                 both = tangent(target, y, readings, [*free, column])
             here = _weigh(_without_last(both), both.parameters[..., -1] / scale, first, last, degrees)
-            lr = np.nan_to_num(here.height + prior_density(target, y) - nothing, nan=-1e300, neginf=-1e300)
-            gain = float(np.max(lr - best[1]))
-            better = lr > best[1]
+            lr = np.nan_to_num(here.height + prior_density(target, y) - nothing, nan=_NEVER, neginf=_NEVER)
+            better, gain = lr > best[1], float(np.max(lr - best[1]))
             for kept, new in zip(best, (y, lr, at - main.neutral + here.move, here.norm), strict=True):
                 kept[better] = new[better]
             if gain < _SETTLED:
@@ -179,39 +187,41 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
                 y = np.where(better[:, None], ahead, best[0])
         return tuple(best)
 
+    unseen = np.full(len(y), _NEVER), np.zeros(len(y)), np.zeros(len(y))
     found: list[Sequence[Array]] = []
-    unseen = np.full(len(z), -1e300), np.zeros(len(z)), np.zeros(len(z))
-    for sign in ladder.signs:
-        y, best = start, [start.copy(), unseen[0].copy(), unseen[1].copy()]
-        for i, amplitude in enumerate(ladder.amplitudes):
-            at, near, far = np.clip(main.neutral + sign * amplitude * np.array([1.0, 1.0 / half, half]), low, high)
-            # Shape constants mean nothing while the amplitude is small, and would wander.
-            free, steps = (moving, _STEPS) if amplitude >= ladder.amplitudes[-1] * _FIRST / _LAST else (rigid, _FEW)
-            y, *rung = look(y, np.full(len(z), at), np.full(len(z), near), np.full(len(z), far), free, steps)
-            found.append(rung)
-            better = rung[0] > best[1]
-            for kept, new in zip(best, (y, *rung), strict=False):
-                kept[better] = new[better]
-            if at in (low, high) or (steps == _STEPS and rung[0].max() < _HOPELESS):
-                found += [unseen] * (len(ladder.amplitudes) - i - 1)
-                break
-        near, far = (np.clip(main.neutral + best[2] * f, low, high) for f in (1.0 / half, half))
-        found.append(look(best[0], main.neutral + best[2], near, far, moving)[1:])
-    return Climbed(*(np.array(v) for v in zip(*found, strict=True)))
+    best = [y.copy(), *(v.copy() for v in unseen)]
+    for amplitudes in ladder.amplitudes:
+        # Shape constants mean nothing while the amplitude is small, and would wander.
+        is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(ladder.amplitudes[-1]) * _FIRST / _LAST).all())
+        y, *rung = look(y, amplitudes.repeat(len(z)), rigid if is_low else moving, _FEW if is_low else _STEPS)
+        found.append(rung)
+        better = rung[0] > best[1]
+        for kept, new in zip(best, (y, *rung), strict=True):
+            kept[better] = new[better]
+        beyond = np.isin(np.clip(main.neutral + amplitudes, low, high), (low, high)).all()
+        if beyond or (not is_low and rung[0].max() < _HOPELESS):
+            found += [unseen] * (len(ladder.amplitudes) - len(found))
+            break
+    found.append(look(best[0], best[2], moving, _STEPS)[1:])
+    return Climbed(*(np.array(v).reshape(-1, len(z)) for v in zip(*found, strict=True)))
 
 
 def _with_effect(block: Block, ladder: Ladder, z: Array) -> tuple[Target, int, Array]:
-    """The block's density with the effect, its amplitude's column, and the plain fits (n, d) as points of it."""
-    effect = ladder.probe.effect
+    """The block's density with the effect, its amplitude's column, and each start's points of it (starts n, d)."""
+    effect = ladder.effect
     problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
     column = next(i for i, name in enumerate(problem.names) if name.split("[")[0] == effect.columns()[0])
     # A prior that is not felt, in whose standard deviations the column counts.
-    free = problem.prior.distributions | {problem.names[column]: stats.norm(0.0, 100.0 * ladder.amplitudes[-1])}
+    wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
+    free = problem.prior.distributions | {problem.names[column]: wide}
     target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
     values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))
-    own = ladder.probe.own | {effect.columns()[0]: effect.amplitudes[0].neutral}
-    theta = [values.get(name, np.full(len(z), own.get(name.split("[")[0]))) for name in problem.names]
-    return target, column, target.coordinates.to_sampled(np.stack(theta, axis=1))
+    theta = []
+    for probe in ladder.probes:
+        own = probe.own | {effect.columns()[0]: effect.amplitudes[0].neutral}
+        each = [values.get(name, np.full(len(z), own.get(name.split("[")[0]))) for name in problem.names]
+        theta.append(np.stack(each, axis=1))
+    return target, column, target.coordinates.to_sampled(np.concatenate(theta))
 
 
 @dataclass(frozen=True)
@@ -301,7 +311,7 @@ def strengths(ways: Sequence[Ladder], climbed: Sequence[Mapping[int, Climbed]]) 
     """(n,) log Bayes factor of each of the ladders' candidates, with the prior of `screen.log_bayes`."""
     out = {}
     for ladder, each in zip(ways, climbed, strict=True):
-        prior = occam(ladder.probe.one_sided)
+        prior = occam(ladder.probes[0].one_sided)
         for candidate in ladder.candidates:
             here = [(each[b].log_bayes, each[b].amplitude, each[b].norm) for b in candidate.blocks]
             if len(here) > 1 and candidate.shared:
@@ -355,7 +365,7 @@ def _chance(
     simulated: Sequence[Replicates],
 ) -> Array:
     """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more of them than it takes."""
-    own = [way for way in ways if way.probe.effect.name == name]
+    own = [way for way in ways if way.effect.name == name]
     out = np.empty(0)
     while len(out) < len(linear) and (out >= value).sum() < _ENOUGH:
         rows = slice(len(out), len(out) + (_ROWS if len(out) else _FIRST_ROWS))
