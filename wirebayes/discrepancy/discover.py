@@ -145,7 +145,7 @@ def investigate(
     nulls = [s.scan for s in simulated]
     test = screen.global_test(candidates, data, nulls)
     further: dict[Candidate, float] = {}
-    if test.p > PLAIN_TO_SEE:
+    if test.p > max(PLAIN_TO_SEE, 1.0 / (1 + settings.simulations)):
         report("larger effects", 0, 1)
         test, further = outward(plain, trials, candidates, data, simulated, test)
         report("larger effects", 1, 1)
