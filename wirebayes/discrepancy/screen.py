@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from wirebayes.bayes.optimum import climb, rowwise
 from wirebayes.bayes.replicate import readings as replicate
@@ -148,11 +149,13 @@ FLEXIBLE = "unknown"
 
 
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
-    """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks."""
-    out = {FLEXIBLE: flexible_log_bayes(scans).max(axis=0)}
+    """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks.
+
+    None is below zero: evidence against a name is no surprise, however rare its size.
+    """
+    out = {FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), 0.0)}
     for c in candidates:
-        value = log_bayes(c, scans)[0]
-        out[c.name] = np.maximum(out[c.name], value) if c.name in out else value
+        out[c.name] = np.maximum(out.get(c.name, 0.0), log_bayes(c, scans)[0])
     return out
 
 
@@ -167,11 +170,9 @@ def surprise(value: float, chance: Array) -> float:
 
 def surprises(chance: Array) -> Array:
     """(n,) the surprise of each simulated value among the others."""
-    order = np.argsort(-chance)
-    out = np.empty(len(chance))
-    out[order] = np.log(len(chance)) - np.log(np.arange(1, len(chance) + 1))
-    out[order[0]] += chance[order[0]] - chance[order[1]]
-    return out
+    larger = stats.rankdata(-chance, method="max")  # itself among them
+    first, second = np.sort(chance)[::-1][:2]
+    return np.asarray(np.log(len(chance)) - np.log(larger) + np.where(chance == first, first - second, 0.0))
 
 
 @dataclass(frozen=True)
