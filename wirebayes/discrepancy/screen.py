@@ -146,16 +146,17 @@ def replicated(
 
 
 FLEXIBLE = "unknown"
+_AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
     """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks.
 
-    None is below zero: evidence against a name is no surprise, however rare its size.
+    None is below `_AGAINST`: clear evidence against a name is no surprise, however rare its size.
     """
-    out = {FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), 0.0)}
+    out = {FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), _AGAINST)}
     for c in candidates:
-        out[c.name] = np.maximum(out.get(c.name, 0.0), log_bayes(c, scans)[0])
+        out[c.name] = np.maximum(out.get(c.name, _AGAINST), log_bayes(c, scans)[0])
     return out
 
 
