@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wirebayes.bayes.noise import reading_variance
 from wirebayes.discrepancy import naming, screen
 from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.discrepancy.expansion import Scan, expand, scan
@@ -13,6 +14,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.experiment import read_experiments
 from wirebayes.simulate import Bench, Truth, write
 from wirebayes.wire.effect import Effect
+from wirebayes.wire.staircase import simulate
 
 STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1, "sensor_sd": 0.02, "setting_sd": 0.01}
 
@@ -65,6 +67,32 @@ def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path:
     far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
     assert far.surprises["creep_threshold"] > near.surprises["creep_threshold"] + 1.0
     assert far.p == pytest.approx(1 / 200) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
+
+
+def test_a_ladder_broken_off_keeps_the_places_of_its_rungs(tmp_path: Path) -> None:
+    """Blocks that share an amplitude are added rung by rung, also where one of them gave up."""
+    block = block_of(tmp_path, {}, [], 3)
+    trials, candidates, data = scanned(block, {"permanent_creep": CATALOGUE["permanent_creep"]})
+    way = ladders([block], trials, candidates, [data])[0]
+    found = climb(block, way, block.modes.z[:1])
+    rungs, starts = way.amplitudes.shape
+    assert found.log_bayes.shape == found.amplitude.shape == found.norm.shape == ((rungs + 1) * starts, 1)
+    assert (found.log_bayes < -1e200).any()  # it was broken off: no more than all creep can be permanent
+
+
+def test_the_noise_ratio_of_a_fit_is_that_of_its_setting_and_sensor_errors(tmp_path: Path) -> None:
+    """Sensor variance times I + ρKKᵀ is the covariance that steps of each hold's setting error give."""
+    block = block_of(tmp_path, {}, [], 3)
+    x, sample = expand(block.target, block.modes.z[:1], []), block.target.problem.samples[0]
+    own = block.target.problem.parameters(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
+    mask, holds, step = sample.protocol.mask, len(sample.readings), 1e-5
+    each = {name: np.repeat(value, holds) for name, value in own.items()}
+    up, down = (simulate(sample.protocol, each, sample.model, s * np.eye(holds))[mask] for s in (step, -step))
+    by_setting = (up - down) / (2 * step)
+    variance = float(reading_variance(own["sensor_sd"], sample.resolution_N)[0])
+    covariance = variance * np.eye(mask.sum()) + float(own["setting_sd"][0]) ** 2 * by_setting @ by_setting.T
+    told = variance * (np.eye(mask.sum()) + x.ratio[0] * x.left[0] * x.singular[0] ** 2 @ x.left[0].T)
+    np.testing.assert_allclose(told, covariance, rtol=1e-4, atol=1e-6 * covariance.max())
 
 
 @pytest.mark.statistical

@@ -83,7 +83,7 @@ class Pinned:
 
     def __init__(self, block: Block, effect: Effect) -> None:
         problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
-        self.column = _column(problem, effect)
+        self.column = column_of(problem, effect)
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
         self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
         self._plain = block
@@ -119,6 +119,7 @@ class Pinned:
         return np.delete(z, self.column, axis=1)
 
 
-def _column(problem: Problem, effect: Effect) -> int:
+def column_of(problem: Problem, effect: Effect) -> int:
+    """The column of an effect's amplitude."""
     main = effect.columns()[0]
     return next(i for i, name in enumerate(problem.names) if name.split("[")[0] == main)

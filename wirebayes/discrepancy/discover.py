@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.fit import seed_of
 from wirebayes.discrepancy import choose, gap, gross, locate, power, screen
-from wirebayes.discrepancy.block import Block, fitted
+from wirebayes.discrepancy.block import Block, column_of, fitted
 from wirebayes.discrepancy.choose import UNKNOWN_WEIGHT, Choice
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
 from wirebayes.discrepancy.naming import probabilities
@@ -336,7 +336,7 @@ def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
     main = effect.amplitudes[0]
     target, best = final.target, final.modes
-    column = next(i for i, name in enumerate(target.problem.names) if name.split("[")[0] == effect.columns()[0])
+    column = column_of(target.problem, effect)
     z = np.repeat(best.z[:1], 3, axis=0)
     z[:, column] += np.array([-1.645, 0.0, 1.645]) * np.sqrt(best.covariance[0, column, column])
     low, mean, high = map(float, target.coordinates.to_natural(z)[:, column])

@@ -6,7 +6,7 @@ scale of the noise is integrated out, ρ is summed over a grid, so no test trust
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -145,16 +145,6 @@ class Scan:
     amplitude: Array
     norm: Array
     pieces: "Pieces"
-
-    def rows(self, rows: slice) -> "Scan":
-        """Some of its rows; the pieces stay whole."""
-        return replace(
-            self,
-            effects=self.effects[rows],
-            flexible=self.flexible[rows],
-            amplitude=self.amplitude[rows],
-            norm=self.norm[rows],
-        )
 
 
 @dataclass(frozen=True)

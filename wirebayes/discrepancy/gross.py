@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.discrepancy.block import Block
 from wirebayes.discrepancy.expansion import Scan, expand, scan
-from wirebayes.discrepancy.naming import LARGEST
+from wirebayes.discrepancy.naming import occam
 from wirebayes.experiment import Experiment
 
 Array = NDArray[Any]
@@ -32,7 +32,7 @@ def suspect(block: Block, rival: float) -> tuple[str, int, int, float] | None:
 
     found: Scan = scan(expand(block.target, block.modes.z[:1], [], columns=columns))
     best = int(np.argmax(found.effects[0]))
-    value = float(found.effects[0, best]) + 0.5 * np.log(2 * np.pi) - np.log(2 * LARGEST) - np.log(len(cells))
+    value = float(found.effects[0, best]) + occam(False) - np.log(len(cells))
     if value < max(3.0, rival + 2.0):
         return None
     at, j, r = cells[best]

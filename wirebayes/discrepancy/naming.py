@@ -46,6 +46,11 @@ class Refit:
     theta: tuple[Array, ...]
 
 
+def occam(one_sided: bool) -> float:
+    """What the prior of an amplitude, uniform in δ up to `LARGEST`, adds to the log of its best likelihood ratio."""
+    return float(0.5 * np.log(2 * np.pi) - np.log(LARGEST if one_sided else 2.0 * LARGEST))
+
+
 def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_delta: float, guess: float) -> Refit:
     """Refit one effect with one amplitude shared by the blocks `which`.
 
@@ -102,8 +107,7 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
         value, ends = value[order], [e[order] for e in ends]
     best = int(np.argmax(value))
     sd = _width(grid, value, best, per_delta)
-    span = LARGEST if one_sided else 2.0 * LARGEST
-    log_bayes = float(value[best] + 0.5 * np.log(2 * np.pi) - np.log(span))
+    log_bayes = float(value[best] + occam(one_sided))
     theta = tuple(p.natural(e[best][None], grid[best : best + 1])[0] for p, e in zip(pinned, ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(grid[best]), sd, theta)
 

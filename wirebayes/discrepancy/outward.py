@@ -18,7 +18,7 @@ from scipy.special import logsumexp
 from wirebayes.bayes import noise
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.problem import build
-from wirebayes.discrepancy.block import Block
+from wirebayes.discrepancy.block import Block, column_of
 from wirebayes.discrepancy.expansion import (
     ABSORBED,
     RATIOS,
@@ -32,7 +32,8 @@ from wirebayes.discrepancy.expansion import (
     residuals,
     tangent,
 )
-from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates, by_name, occam, shared_amplitude, surprise
+from wirebayes.discrepancy.naming import occam
+from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
 from wirebayes.wire.effect import Effect, EventEffect
 
 Array = NDArray[Any]
@@ -210,7 +211,7 @@ def _with_effect(block: Block, ladder: Ladder, z: Array) -> tuple[Target, int, A
     """The block's density with the effect, its amplitude's column, and each start's points of it (starts n, d)."""
     effect = ladder.effect
     problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
-    column = next(i for i, name in enumerate(problem.names) if name.split("[")[0] == effect.columns()[0])
+    column = column_of(problem, effect)
     # A prior that is not felt, in whose standard deviations the column counts.
     wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
     free = problem.prior.distributions | {problem.names[column]: wide}

@@ -12,7 +12,7 @@ from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.problem import with_protocols
 from wirebayes.discrepancy.block import Block
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, projected
-from wirebayes.discrepancy.naming import LARGEST
+from wirebayes.discrepancy.naming import LARGEST, occam
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
@@ -26,12 +26,12 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
     norm = float(np.median(null.norm[:, i]))
     if norm <= 0:
         return None
-    occam = 0.5 * np.log(2 * np.pi) - np.log(LARGEST * (1 if probe.one_sided else 2))
+    prior = occam(probe.one_sided)
     low, high = 0.0, LARGEST / norm
     pieces = null.pieces.of(i, _POWER_ROWS)
 
     def seen(amplitude: float) -> bool:
-        return bool(np.mean(pieces.log_bayes(amplitude) + occam > threshold) >= 0.8)
+        return bool(np.mean(pieces.log_bayes(amplitude) + prior > threshold) >= 0.8)
 
     if not seen(high):
         return None

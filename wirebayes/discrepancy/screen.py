@@ -16,11 +16,13 @@ from wirebayes.bayes.optimum import climb, rowwise
 from wirebayes.bayes.replicate import readings as replicate
 from wirebayes.discrepancy.block import Block
 from wirebayes.discrepancy.expansion import Probe, Scan, expand, forms, joined, probes, scan
-from wirebayes.discrepancy.naming import LARGEST
+from wirebayes.discrepancy.naming import occam
 from wirebayes.wire.effect import Effect, EventEffect
 
 Array = NDArray[Any]
 _ROWS = 250  # replicates linearised at once
+_FLEXIBLE = "unknown"
+_AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
 @dataclass(frozen=True)
@@ -95,11 +97,6 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
     return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
 
 
-def occam(one_sided: bool) -> float:
-    """What the prior of an amplitude, uniform in δ up to `LARGEST`, adds to the log of its best likelihood ratio."""
-    return float(0.5 * np.log(2 * np.pi) - np.log(LARGEST * (1 if one_sided else 2)))
-
-
 def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
     """Log likelihood ratio (...) of one amplitude for several blocks (b, ...), and that amplitude.
 
@@ -145,16 +142,12 @@ def replicated(
     return Replicates(joined(parts), found.z, y)
 
 
-FLEXIBLE = "unknown"
-_AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
-
-
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
     """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks.
 
     None is below `_AGAINST`: clear evidence against a name is no surprise, however rare its size.
     """
-    out = {FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), _AGAINST)}
+    out = {_FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), _AGAINST)}
     for c in candidates:
         out[c.name] = np.maximum(out.get(c.name, _AGAINST), log_bayes(c, scans)[0])
     return out
