@@ -6,7 +6,8 @@ import pytest
 from scipy import stats
 
 from tests.statistical.targets import two_modes
-from wirebayes.bayes import mixture, moves, optimum, proposal, straighten
+from wirebayes.bayes import burn_in, mixture, moves, optimum, proposal, straighten
+from wirebayes.bayes.policy import Policy
 
 
 def crescent(n, rng):
@@ -97,6 +98,33 @@ def test_the_density_of_a_proposal_is_that_of_its_draws(points):
 def test_a_mode_that_died_out_on_the_way_is_still_found(seed):
     found = optimum.modes(two_modes(), np.random.default_rng(seed))
     assert sorted(found.z[:, 0].round(3)) == [0.0, 10.0]
+
+
+def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
+    policy = Policy(ensembles=2, walkers=64, rounds=3, round_steps=8, most_rounds=3)
+    target = two_modes()
+    state, shares = burn_in.begin(target, 1, policy, None, None, None), []
+    while not state.frozen:
+        shares.append(state.proposal.shares)
+        burn_in.one_round(target, state, policy)
+    assert shares == [proposal.ROUGH_SHARES, proposal.EXPLORING, proposal.EXPLORING]
+    assert state.proposal.shares == proposal.SHARES
+
+
+def test_a_climb_is_given_up_on_the_way_and_no_other_with_it():
+    asked = []
+
+    def density(z, rows):
+        asked.append(len(z))
+        return -0.5 * (z**2).sum(axis=1) ** 2
+
+    start = np.array([[3.0, 3.0], [-3.0, 3.0]])
+    whole = optimum.climb(density, start)
+    whole_cost, asked = sum(asked), []
+    left = optimum.climb(density, start, until=lambda z: z[:, 0] < 0.0)
+    assert np.isinf(left.log_density).tolist() == [False, True]
+    assert left.z[0] == pytest.approx(whole.z[0]) and left.converged.tolist() == [True, False]
+    assert sum(asked) < 0.7 * whole_cost
 
 
 def test_degrees_of_freedom_reach_the_density():

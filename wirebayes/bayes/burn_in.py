@@ -2,12 +2,14 @@
 
 The search's cooled population gives the first proposal. Then, round by round, the proposal is fitted to weighted draws
 of itself, which also tell how good it is: the acceptance it would have, and how far the log of posterior over proposal,
-at its 99.9 % quantile over the posterior, lies above its median. While hardly a draw would be accepted, walkers of the
-density to a power below one look further: a warm density has the same places and lower walls between them.
+at its 99.9 % quantile over the posterior, lies above its median. Until it is frozen it draws more from its wide parts
+than it will then, for what lies far out is learned from few draws. While hardly a draw would be accepted, walkers of
+the density to a power below one look further: a warm density has the same places and lower walls between them.
 
 Walkers are placed by weight at last, so that none is left in a far mode of no weight.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.mixture import Mixture
 from wirebayes.bayes.optimum import Optimum, search
 from wirebayes.bayes.policy import Policy
+from wirebayes.bayes.proposal import Proposal
 from wirebayes.bayes.walkers import State, advance
 
 Array = NDArray[Any]
@@ -61,6 +64,8 @@ def one_round(target: Target, state: State, policy: Policy) -> None:
     settled = state.acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
     if state.round >= policy.rounds and settled or state.round >= policy.most_rounds:
         state.frozen, state.learned = True, state.acceptance > policy.acceptance
+        if isinstance(state.proposal, Proposal):
+            state.proposal = replace(state.proposal, shares=proposal.SHARES)
         _place(state, policy, *((z, value, base) if state.learned or state.walk is None else state.walk))
         state.walk = state.seen = None
         # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
@@ -98,7 +103,7 @@ def _fit(
     policy: Policy,
     hot: Array,
     cold: Array,
-    shares: tuple[float, float, float, float] = proposal.SHARES,
+    shares: tuple[float, float, float, float] = proposal.EXPLORING,
 ) -> bool:
     """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
     before, state.seen = state.seen, (hot, cold)

@@ -5,6 +5,7 @@ Every row is an optimisation of its own; rows may also have readings of their ow
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,11 @@ Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
 _ROUNDS = 4  # of climbs from places that no mode explains
-_STRANGE = 200  # the most places that are asked more than once whether a mode explains them
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _WARM_STEPS = 4  # the last ones of the cooling
 _LEAST_SAG = 1.0  # nats
+_ONE_MODE = 4.0  # squared standard deviations
+_LOOKED = 400  # places that are asked whether a mode explains them
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 
@@ -63,7 +65,14 @@ class Optimum:
         return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
 
 
-def climb(density: Density, start: Array, *, iterations: int = 60, tolerance: float = 1e-5) -> Optimum:
+def climb(
+    density: Density,
+    start: Array,
+    *,
+    iterations: int = 60,
+    tolerance: float = 1e-5,
+    until: Callable[[Array], NDArray[np.bool_]] = lambda z: np.zeros(len(z), bool),
+) -> Optimum:
     """Maximise a log density from every row of `start`.
 
     Parameters
@@ -74,6 +83,8 @@ def climb(density: Density, start: Array, *, iterations: int = 60, tolerance: fl
     iterations : int
     tolerance : float
         Stop a row when half its squared Newton decrement is below this.
+    until : function of (m, d) points to (m,) bool
+        Give up the rows, after a step, for which it says so; their log density becomes -inf.
 
     Returns
     -------
@@ -116,6 +127,8 @@ def climb(density: Density, start: Array, *, iterations: int = 60, tolerance: fl
         z[rows[better]] = trial[np.arange(len(rows)), best][better]
         value[rows[better]] = gained[better]
         done[rows[~better]] = True
+        left = rows[until(z[rows])]
+        done[left], value[left] = True, -np.inf
     return Optimum(z, value, curvature, converged)
 
 
@@ -171,7 +184,8 @@ def search(
 
     A population of prior draws is cooled to the posterior. Half of the starts are spread over all places it passed:
     where it ends, a mode of less weight may have died out, but on the way it lived. The others are chosen among passed
-    places that belong to the hill of no mode found by then, as long as there are any.
+    places that belong to the hill of no mode found by then, as long as there are any; such a climb is given up where it
+    comes so near to a known mode that it would count as that one.
 
     Parameters
     ----------
@@ -188,21 +202,24 @@ def search(
     value = target(z)
     best = np.argsort(-value)[: starts // 8]
     passed, height = _cooled(target, z, value, rng)
+    warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
     width = passed.std(axis=0)
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - len(best), rng)
     start = np.vstack([passed[spread], z[best], np.empty((0, z.shape[1])) if extra is None else extra])
     found = _distinct([climb(lambda points, rows: target(points), start)])
-    looked = rng.choice(len(passed), min(draws, len(passed)), replace=False)
-    warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
+    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
+    sag = _sag(target, passed, height, found)
     for _ in range(_ROUNDS):
-        sag = _sag(target, passed, height, found)
-        strange = rng.permutation(np.flatnonzero(sag > _LEAST_SAG))[:_STRANGE]
+        strange = np.flatnonzero(sag > _LEAST_SAG)
         if not len(strange):
             break
-        passed, height, sag = passed[strange], height[strange], sag[strange]
-        chosen = rng.choice(len(sag), min(len(sag), starts // 2 // _ROUNDS), replace=False, p=sag / sag.sum())
-        found = _distinct([found, climb(lambda points, rows: target(points), passed[chosen])])
+        share = sag[strange] / sag[strange].sum()
+        chosen = rng.choice(strange, min(len(strange), starts // 2 // _ROUNDS), replace=False, p=share)
+        known = partial(_near, modes=found.z, curvature=found.curvature)
+        new = climb(lambda points, rows: target(points), passed[chosen], until=known)
+        sag = np.minimum(sag, _sag(target, passed, height, _distinct([new])))
+        found = _distinct([found, new])
     return Search(found, warm, cold)
 
 
@@ -227,10 +244,15 @@ def _distinct(found: Sequence[Optimum]) -> Optimum:
     for i in order:
         if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - 30.0:
             continue
-        apart = [(every.z[i] - every.z[k]) @ every.curvature[k] @ (every.z[i] - every.z[k]) for k in keep]
-        if all(distance > 4.0 for distance in apart):
+        if not _near(every.z[[i]], every.z[keep], every.curvature[keep])[0]:
             keep.append(int(i))
     return Optimum(every.z[keep], every.log_density[keep], every.curvature[keep], every.converged[keep])
+
+
+def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
+    """(n,) whether places (n, d) count as one with any of the modes (k, d)."""
+    apart = z[:, None] - modes
+    return np.asarray((np.einsum("nki,kij,nkj->nk", apart, curvature, apart) <= _ONE_MODE).any(axis=1))
 
 
 def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -36,10 +36,10 @@ class Policy:
     walkers: int = 256
     ess: float = 4000.0
     r_hat: float = 1.01
-    rounds: int = 6
+    rounds: int = 4
     round_steps: int = 4
     most_rounds: int = 9
-    tail: float = 3.0
+    tail: float = 1.5
     acceptance: float = 0.05
     components: int = 6
     block: int = 16

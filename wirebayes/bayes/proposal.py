@@ -16,7 +16,8 @@ from wirebayes.bayes.mixture import Mixture
 from wirebayes.bayes.straighten import Straight
 
 Array = NDArray[Any]
-SHARES = (0.8, 0.08, 0.08, 0.04)  # of the close part, the wide one, the plain one and the start's
+SHARES = (0.72, 0.12, 0.12, 0.04)  # of the close part, the wide one, the plain one and the start's
+EXPLORING = (0.55, 0.2, 0.2, 0.05)  # while it learns: draws of the wide parts teach what lies far out
 ROUGH_SHARES = (0.3, 0.1, 0.1, 0.5)  # while nothing but the start is sure
 
 

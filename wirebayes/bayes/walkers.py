@@ -109,5 +109,5 @@ def _moves(state: State) -> list[tuple[Any, float]]:
     return [(IndependenceMove(state.proposal), 1.0 - share), (walk, share)]
 
 
-_EVOLUTION = 0.1  # share of steps that do not trust the proposal
+_EVOLUTION = 0.05  # share of steps that do not trust the proposal
 _EXPLORATION = 0.4  # the same in burn-in, which looks for what the proposal leaves out
