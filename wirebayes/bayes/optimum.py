@@ -22,7 +22,6 @@ _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _WARM_STEPS = 4  # the last ones of the cooling
 _LEAST_SAG = 1.0  # nats
 _ONE_MODE = 4.0  # squared standard deviations
-_LOOKED = 400  # places that are asked whether a mode explains them
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 
@@ -207,7 +206,7 @@ def search(
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - len(best), rng)
     start = np.vstack([passed[spread], z[best], np.empty((0, z.shape[1])) if extra is None else extra])
     found = _distinct([climb(lambda points, rows: target(points), start)])
-    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
+    looked = rng.choice(len(passed), min(draws, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     sag = _sag(target, passed, height, found)
     for _ in range(_ROUNDS):
