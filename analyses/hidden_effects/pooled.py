@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .targets import Target, targets
 
-SIGNS = {">= ": "≥ ", "<= ": "≤ ", "delta ": "δ = ", "0%": "0 %", "5%": "5 %", "9%": "9 %"}
+SIGNS = {">= ": "≥ ", "<= ": "≤ ", "delta ": "δ = "}
 
 
 def told(row: Target, bold: bool = False) -> str:

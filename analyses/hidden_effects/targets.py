@@ -14,7 +14,7 @@ def _row(name: str, wanted: str, found: dict[str, Any] | None, passed: bool | No
 
 
 def _at_least(name: str, found: dict[str, Any] | None, wanted: float) -> Target:
-    return _row(name, f">= {wanted:.0%}", found, found is not None and found["value"] >= wanted)
+    return _row(name, f">= {100 * wanted:.0f} %", found, found is not None and found["value"] >= wanted)
 
 
 def targets(rows: list[Row]) -> list[Target]:

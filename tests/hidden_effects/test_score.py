@@ -1,8 +1,11 @@
 """Scores on made-up answers whose rates are known by hand."""
 
+import json
+
 import pytest
 from scipy.stats import binom
 
+from analyses.hidden_effects import pooled as program
 from analyses.hidden_effects.rates import closed, closed_of_oracle, lower_bound, pooled, rate, rmse_ratio, upper_bound
 from analyses.hidden_effects.score import confusion, score
 
@@ -75,6 +78,20 @@ def test_rates_of_named_missed_and_wrong():
     assert found(result, "size of the 90 % set")["found"]["value"] == pytest.approx(5 / 3 - 1.5)
     assert result["confusion"]["toe"] == {"toe": 1, "memory": 1, "nothing-missing": 1, "ageing": 1}
     assert not found(result, "detected at delta 10")["passed"]
+
+
+def test_runs_pooled_count_together_and_what_is_missed_is_bold(tmp_path, capsys, monkeypatch):
+    for name, best in (("one", "toe"), ("other", None)):
+        part = score({name: truth(name)}, {name: judged()}, {name: said(best, ["toe"])})
+        (tmp_path / name).write_text(json.dumps({"api": part}), encoding="utf-8")
+    monkeypatch.setattr("sys.argv", ["pooled", str(tmp_path / "one"), str(tmp_path / "other")])
+    program.main()
+    cells = capsys.readouterr().out.split("\n   * - ")
+    (detected,) = (c for c in cells if c.startswith("detected at δ = 10"))
+    assert "≥ 99 %" in detected and "**50 %**" in detected and "of 2" in detected
+    (named,) = (c for c in cells if c.startswith("best in the true group, δ = 10"))
+    assert "100 %" in named and "**" not in named and "of 1" in named
+    assert not any("delta" in c or "clean" in c for c in cells)  # nothing was asked of clean files
 
 
 def test_false_alarms_need_numbers_to_pass():
