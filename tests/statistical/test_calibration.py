@@ -60,6 +60,5 @@ def test_forty_data_sets_of_each_study_lie_in_the_band(study, tmp_path):
 
 @pytest.mark.slow
 def test_a_likelihood_without_the_setting_error_is_found_out(tmp_path):
-    found = calibration.verdict(shares(run(BROKEN, 40, tmp_path, 1, 2)), replicates=20_000)
-    # what a hundred sets are sure to catch it by; k1 with forty depends on the draws
-    assert {"preload", "sensor_sd"} & set(found["outside"])
+    found = calibration.verdict(shares(run(BROKEN, 100, tmp_path, 1, 2)), replicates=20_000)
+    assert {"k1", "preload"} & set(found["outside"])
