@@ -8,6 +8,7 @@ import pytest
 from wirebayes.bayes.noise import reading_variance
 from wirebayes.discrepancy import naming, screen
 from wirebayes.discrepancy.block import Block, fitted
+from wirebayes.discrepancy.choose import choose
 from wirebayes.discrepancy.expansion import Scan, expand, scan
 from wirebayes.discrepancy.outward import climb, ladders, outward, strengths
 from wirebayes.effects import CATALOGUE, named
@@ -67,6 +68,27 @@ def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path:
     far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
     assert far.surprises["creep_threshold"] > near.surprises["creep_threshold"] + 1.0
     assert far.p == pytest.approx(1 / 200) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
+
+
+def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(tmp_path: Path) -> None:
+    """Seven dense holds with a clamp transient: the best plain fit has a setting error of three steps."""
+    times = (0.0, *np.geomspace(1.0, 600.0, 24).round(1).tolist())
+    bench = Bench(length_mm=1272.0, resolution_N=0.0, displacements_mm=tuple(range(1, 8)), times_s=times)
+    wire = {"k1": 500.0, "B": 0.04, "U": 0.75, "k2": 0.008, "N": 0.5, "sensor_sd": 0.007, "setting_sd": 0.026}
+    effect = named("clamp_transient")
+    write(tmp_path, [bench], Truth(wire | {"clamp_transient.a": -0.05, "clamp_transient.T": 31.0}, [effect]), 0)
+    experiments = read_experiments(tmp_path / "experiments.toml")
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    assert block.parameters("simulated")["setting_sd"] > 1.0
+    kinds = {name: CATALOGUE[name] for name in ("clamp_transient", "strain_stiffening")}
+    trials, candidates, data = scanned(block, kinds)
+    drawn = screen.replicated(block, trials, 99, np.random.default_rng(1))
+    near = screen.global_test(candidates, [data], [drawn.scan])
+    far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
+    assert near.p > 0.04 and far.p == pytest.approx(0.01)
+    chosen = choose([block], trials, candidates, [data], log_bayes)
+    assert chosen.best == "clamp_transient"
+    assert chosen.winners["clamp_transient"][0].amplitude == pytest.approx(-0.05, abs=0.005)
 
 
 def test_a_ladder_broken_off_keeps_the_places_of_its_rungs(tmp_path: Path) -> None:

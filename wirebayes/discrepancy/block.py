@@ -14,10 +14,13 @@ from wirebayes.bayes.problem import Problem, build
 from wirebayes.experiment import Experiment
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.protocol import Protocol
 
 Array = NDArray[Any]
 _FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
 _LOG_FLAT = float(stats.norm.logpdf(0.0))
+_ABSURD = 0.5  # setting error, in steps of the test: no bench is set like that
+_AS_HELD = 0.05  # standard deviation of the log of a setting error that is held
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,9 @@ class Block:
     target : Target
     modes : Optimum
         Distinct modes, best first.
+    sober : (k, d) array
+        Where the best fit calls setting error what is larger than half a step of the test, the best one with setting
+        errors as they are expected: a large effect is easily taken in by a setting error without bounds. Else no row.
     """
 
     experiments: tuple[Experiment, ...]
@@ -43,6 +49,7 @@ class Block:
     history: History
     target: Target
     modes: Optimum
+    sober: Array
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -71,7 +78,27 @@ def fitted(
     """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given."""
     target = Target(build(experiments, effects, law=law, history=history))
     extra = None if near is None else target.coordinates.to_sampled(near[None])
-    return Block(tuple(experiments), tuple(effects), law, history, target, modes(target, rng, extra))
+    found = modes(target, rng, extra)
+    return Block(tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng))
+
+
+def _sober(target: Target, found: Optimum, rng: np.random.Generator) -> Array:
+    """(k, d) places of `Block.sober`."""
+    problem, best = target.problem, target.coordinates.to_natural(found.z[:1])
+    if all(
+        problem.parameters(best, s)["setting_sd"][0] <= _ABSURD * _typical_step(s.protocol) for s in problem.samples
+    ):
+        return np.empty((0, found.z.shape[1]))
+    every = problem.prior.distributions
+    held = {n: stats.lognorm(_AS_HELD, scale=d.median()) for n, d in every.items() if n.startswith("setting_sd")}
+    bound = Target(replace(problem, prior=replace(problem.prior, distributions=every | held)))
+    return target.coordinates.to_sampled(bound.coordinates.to_natural(modes(bound, rng).z[:1]))
+
+
+def _typical_step(protocol: Protocol) -> float:
+    """Median distance between displacements that follow each other, mm."""
+    steps = np.abs(np.diff(protocol.displacement_mm))
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
 
 
 class Pinned:
@@ -89,11 +116,13 @@ class Pinned:
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:
-        """(k, d) where the block's own best modes lie, shape constants at their prior medians."""
+        """(k, d) where the block's own best modes and its sober fit lie, shape constants at their prior medians."""
         names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
         known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
-        theta = np.empty((min(best, len(self._plain.modes.z)), len(names)))
-        natural = self._plain.target.coordinates.to_natural(self._plain.modes.z[: len(theta)])
+        natural = self._plain.target.coordinates.to_natural(
+            np.concatenate([self._plain.modes.z[:best], self._plain.sober])
+        )
+        theta = np.empty((len(natural), len(names)))
         for i, name in enumerate(names):
             theta[:, i] = (
                 natural[:, known[name]] if name in known else self.target.problem.prior.distributions[name].median()

@@ -143,13 +143,14 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     block : Block
     ladder : Ladder
     z : (n, d) array
-        The plain fits of n data sets, sampled coordinates.
+        The plain fits of n data sets, sampled coordinates. The ladder is also begun at the block's sober fit.
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
-    main, starts = ladder.effect.amplitudes[0], len(ladder.probes)
+    main, places = ladder.effect.amplitudes[0], [z, *(np.broadcast_to(s, z.shape) for s in block.sober)]
+    starts = len(ladder.probes) * len(places)
     low, high = (float(v) for v in main.prior.support())
-    target, column, y = _with_effect(block, ladder, z)
+    target, column, y = _with_effect(block, ladder, places)
     moving = [i for i in moving_columns(target.problem) if i != column]
     shapes = set(ladder.effect.columns()[1:])
     rigid = [i for i in moving if target.problem.names[i].split("[")[0] not in shapes]
@@ -163,7 +164,8 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     if readings is not None:
         readings = [np.tile(r, (1, 1, starts)) for r in readings]
     # From where to where a rung speaks: half way, by ratio, to its neighbours.
-    half = np.sqrt(ladder.amplitudes[1] / ladder.amplitudes[0]).repeat(len(z))
+    every = np.tile(ladder.amplitudes, len(places)).repeat(len(z), axis=1)
+    half = np.sqrt(every[1] / every[0])
 
     def look(y: Array, amplitude: Array, free: list[int], steps: int) -> tuple[Array, ...]:
         """Follow with the amplitudes (n,): the best place, the log Bayes factor there, amplitude and δ of one."""
@@ -191,10 +193,10 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     unseen = np.full(len(y), _NEVER), np.zeros(len(y)), np.zeros(len(y))
     found: list[Sequence[Array]] = []
     best = [y.copy(), *(v.copy() for v in unseen)]
-    for amplitudes in ladder.amplitudes:
+    for amplitudes in every:
         # Shape constants mean nothing while the amplitude is small, and would wander.
-        is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(ladder.amplitudes[-1]) * _FIRST / _LAST).all())
-        y, *rung = look(y, amplitudes.repeat(len(z)), rigid if is_low else moving, _FEW if is_low else _STEPS)
+        is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(every[-1]) * _FIRST / _LAST).all())
+        y, *rung = look(y, amplitudes, rigid if is_low else moving, _FEW if is_low else _STEPS)
         found.append(rung)
         better = rung[0] > best[1]
         for kept, new in zip(best, (y, *rung), strict=True):
@@ -207,8 +209,11 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     return Climbed(*(np.array(v).reshape(-1, len(z)) for v in zip(*found, strict=True)))
 
 
-def _with_effect(block: Block, ladder: Ladder, z: Array) -> tuple[Target, int, Array]:
-    """The block's density with the effect, its amplitude's column, and each start's points of it (starts n, d)."""
+def _with_effect(block: Block, ladder: Ladder, places: Sequence[Array]) -> tuple[Target, int, Array]:
+    """The block's density with the effect, its amplitude's column, and its points (places starts n, d) at each start.
+
+    `places` (n, d) are points of the density without the effect.
+    """
     effect = ladder.effect
     problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
     column = column_of(problem, effect)
@@ -216,12 +221,13 @@ def _with_effect(block: Block, ladder: Ladder, z: Array) -> tuple[Target, int, A
     wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
     free = problem.prior.distributions | {problem.names[column]: wide}
     target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
-    values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))
     theta = []
-    for probe in ladder.probes:
-        own = probe.own | {effect.columns()[0]: effect.amplitudes[0].neutral}
-        each = [values.get(name, np.full(len(z), own.get(name.split("[")[0]))) for name in problem.names]
-        theta.append(np.stack(each, axis=1))
+    for z in places:
+        values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))
+        for probe in ladder.probes:
+            own = probe.own | {effect.columns()[0]: effect.amplitudes[0].neutral}
+            each = [values.get(name, np.full(len(z), own.get(name.split("[")[0]))) for name in problem.names]
+            theta.append(np.stack(each, axis=1))
     return target, column, target.coordinates.to_sampled(np.concatenate(theta))
 
 
