@@ -69,13 +69,28 @@ def test_evolution_in_straight_coordinates_keeps_the_density():
         return -0.5 * (z[:, 0] ** 2 + ((z[:, 1] - z[:, 0] ** 2) * np.exp(-0.5 * z[:, 0])) ** 2) - 0.5 * z[:, 0]
 
     off = draws(4000) * [1.2, 0.8]
-    move = moves.StraightEvolutionMove(straighten.fit(off, np.arange(2)))
+    move = moves.EvolutionMove(4, straighten.fit(off, np.arange(2)))
     walkers = emcee.EnsembleSampler(400, 2, log_density, moves=[move], vectorize=True)
     walkers.run_mcmc(draws(400), 600)
     z = walkers.get_chain(discard=50)
     error = np.sqrt(emcee.autocorr.integrated_time(z, quiet=True).max() / (z.shape[0] * z.shape[1]))
     found = np.array([z[..., 0].mean(), z[..., 0].var() - 1.0, z[..., 1].mean() - 1.0])
     assert np.abs(found / [1.0, np.sqrt(2.0), z[..., 1].std()]).max() < 5.0 * error
+
+
+@pytest.mark.parametrize("mapped", [False, True])
+def test_evolution_takes_its_differences_within_an_ensemble(mapped):
+    """The second ensemble stands still wherever its own walkers do, whatever the first one does."""
+    rng = np.random.default_rng(3)
+    straight = straighten.fit(rng.normal(size=(500, 2)), np.arange(2)) if mapped else None
+    spread, still = rng.normal(size=(20, 2)), np.tile([1.0, 2.0], (20, 1))
+    start = np.concatenate([spread, still])
+    walkers = emcee.EnsembleSampler(
+        40, 2, lambda z: np.zeros(len(z)), moves=[moves.EvolutionMove(2, straight)], vectorize=True
+    )
+    end = walkers.run_mcmc(start, 5, skip_initial_state_check=True).coords
+    assert np.abs(end[20:] - still).max() < 1e-9
+    assert (np.abs(end[:20] - spread).max(axis=1) > 1e-3).all()
 
 
 def test_points_that_do_not_span_their_space_are_refused():

@@ -79,13 +79,12 @@ def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
     """Walkers set back to good places during the kept steps, which only burn-in may do, shrink the second moments."""
 
     def wrong(target, state, policy, kept=ensemble._kept_block):
-        for positions, values in zip(state.positions, state.values, strict=True):
-            low = values < np.median(values)
-            positions[low], values[low] = positions[values.argmax()], values.max()
+        low = state.values < np.median(state.values)
+        state.positions[low], state.values[low] = state.positions[state.values.argmax()], state.values.max()
         kept(target, state, policy)
 
     monkeypatch.setattr(ensemble, "_kept_block", wrong)
-    monkeypatch.setattr(ensemble, "_block_steps", lambda state, policy: 1 if state.kept_z[0] else 2)
+    monkeypatch.setattr(ensemble, "_block_steps", lambda state, policy: 1 if state.kept_z else 2)
     t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "most_steps": 24, "ess": 1e9}))
     assert t > LIMIT
 
@@ -159,7 +158,7 @@ class Killed(Exception):
     pass
 
 
-@pytest.mark.parametrize("blow", [1, 3, 6, 11])
+@pytest.mark.parametrize("blow", [1, 2, 3, 4])
 def test_a_killed_run_goes_on_to_the_same_bytes(blow, tmp_path, monkeypatch):
     policy = Policy(**{**SMALL.__dict__, "ess": 12000.0})
     whole = sample(gaussian(), 11, policy)
@@ -169,7 +168,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(blow, tmp_path, monkeypatch):
     def mortal(*arguments, advance=walkers.advance):
         nonlocal calls
         calls += 1
-        if calls == blow:  # also in the middle of a block, some ensembles done and others not
+        if calls == blow:
             raise Killed
         return advance(*arguments)
 

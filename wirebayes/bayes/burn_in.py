@@ -30,7 +30,7 @@ def begin(
     target: Target, seed: int, policy: Policy, found: Optimum | None, near: Array | None, rough: Array | None
 ) -> State:
     """Search where nothing is known, and learn a first proposal from rough draws; see `wirebayes.bayes.ensemble`."""
-    spawned = np.random.SeedSequence(seed).spawn(policy.ensembles + 1)
+    spawned = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
     seen = None if rough is None else (rough, rough)
@@ -38,12 +38,10 @@ def begin(
         searched = search(target, rng, extra=near)
         found, seen = searched.modes, seen or (searched.warm, searched.cold)
     known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
-    randoms = [np.random.RandomState(np.random.MT19937(sequence)) for sequence in spawned[1:]]
-    drawn = [_finite_draws(target, known, _walking(target, policy), random) for random in randoms]
-    # Burn-in walks them all as one ensemble: a batch costs little more than one of its parts.
-    positions, values = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
-    states = [random.get_state() for random in randoms]
-    state = State([positions], [values], states, known, known, rng, len(found.z), target.evaluations - before)
+    random = np.random.RandomState(np.random.MT19937(spawned[1]))
+    positions, values = _finite_draws(target, known, _walking(target, policy), random)
+    before = target.evaluations - before
+    state = State(positions, values, random.get_state(), known, known, rng, len(found.z), before)
     if seen is not None and _fit(target, state, policy, *seen, proposal.ROUGH_SHARES):
         state.acceptance, state.seen = 1.0, None  # to be believed until draws tell better
     return state
@@ -70,18 +68,26 @@ def one_round(target: Target, state: State, policy: Policy) -> None:
         state.walk = state.seen = None
         # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
         steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
-        for i in range(policy.ensembles):
-            advance(target, state, i, steps)
-        state.kept_z = [[] for _ in range(policy.ensembles)]
-        state.kept_log_density = [[] for _ in range(policy.ensembles)]
+        advance(target, state, steps, policy.ensembles)
+
+
+def learn_again(target: Target, state: State, policy: Policy) -> None:
+    """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before."""
+    z = np.concatenate(state.kept_z).reshape(-1, state.positions.shape[1])
+    value = np.concatenate(state.kept_log_density).ravel()
+    state.frozen, state.again, state.round = False, True, policy.rounds - 1
+    state.kept_z, state.kept_log_density = [], []
+    state.kept_evaluations = state.accepted = state.proposed = 0
+    hot = z[_resampled((_HOT - 1.0) * value, len(z), state.generator)]
+    _fit(target, state, policy, hot, z)
 
 
 def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
     again = min(state.walks, len(_WARM) - 1)
     state.walks += 1
-    steps = policy.round_steps * policy.walkers // _walking(target, policy) * 2**again
-    sampler, _ = advance(target, state, 0, steps, _WARM[again])
+    steps = policy.round_steps * policy.walkers * policy.ensembles // _walking(target, policy) * 2**again
+    sampler, _ = advance(target, state, steps, power=_WARM[again])
     walked = sampler.get_log_prob(discard=steps // 2, flat=True)
     state.walk = sampler.get_chain(discard=steps // 2, flat=True), walked / _WARM[again], walked
     return state.walk
@@ -125,17 +131,17 @@ def _resampled_twice(z: Array, value: Array, base: Array, rng: np.random.Generat
 
 def _place(state: State, policy: Policy, z: Array, value: Array, base: Array) -> None:
     """Start every ensemble from a share of the places of its own."""
-    state.positions, state.values = [], []
+    chosen = []
     for i in range(policy.ensembles):
-        own, height = z[i :: policy.ensembles], value[i :: policy.ensembles]
-        chosen = _resampled(height - base[i :: policy.ensembles], policy.walkers, state.generator)
-        state.positions.append(own[chosen])
-        state.values.append(height[chosen])
+        own = np.arange(i, len(z), policy.ensembles)
+        chosen.append(own[_resampled((value - base)[own], policy.walkers, state.generator)])
+    state.positions, state.values = z[np.concatenate(chosen)], value[np.concatenate(chosen)]
 
 
 def _walking(target: Target, policy: Policy) -> int:
-    """Walkers of an ensemble in burn-in: few, for the same number of evaluations takes them further."""
-    return min(policy.walkers, max(policy.walkers // 8, 2 * len(target.problem.names) + 2))
+    """Walkers in burn-in: few, for the same number of evaluations takes them further."""
+    each = min(policy.walkers, max(policy.walkers // 8, 2 * len(target.problem.names) + 2))
+    return each * policy.ensembles
 
 
 def _resampled(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -8,7 +8,8 @@ every parameter
   it, so that its error is then below a tenth), and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`,
 
-or until `Policy.most_steps`: then the result says *not converged*, and why.
+or until `Policy.most_steps`: then the result says *not converged*, and why. Where a first look promises that another
+proposal would be done sooner, what was kept counts as burn-in, and teaches that one.
 """
 
 from collections.abc import Callable
@@ -109,10 +110,11 @@ def sample(
         else:
             _kept_block(target, state, policy)
             _look(target, state, policy)
+            if not state.finished and not state.again and _promises_more(state, policy):
+                burn_in.learn_again(target, state, policy)
             progress(min(1.0, 0.2 + 0.8 * float(state.ess.min()) / policy.ess))
         state.save(checkpoint)
-    z = np.stack([np.concatenate(blocks) for blocks in state.kept_z])
-    log_density = np.stack([np.concatenate(blocks) for blocks in state.kept_log_density])
+    z, log_density = (_by_ensemble(blocks, policy) for blocks in (state.kept_z, state.kept_log_density))
     return Chains(
         z, log_density, state.autocorrelation, state.ess, state.r_hat, state.converged, state.why, state.evaluations,
         state.kept_evaluations, state.accepted / max(state.proposed, 1), state.learned, state.modes,
@@ -120,19 +122,24 @@ def sample(
 
 
 def _kept_block(target: Target, state: State, policy: Policy) -> None:
-    steps = _block_steps(state, policy)
-    for i in range(policy.ensembles):
-        sampler, used = advance(target, state, i, steps)
-        state.kept_z[i].append(sampler.get_chain())
-        state.kept_log_density[i].append(sampler.get_log_prob())
-        state.kept_evaluations += used
-        state.accepted += int(sampler.backend.accepted.sum())
-        state.proposed += steps * policy.walkers
+    sampler, used = advance(target, state, _block_steps(state, policy), policy.ensembles)
+    state.kept_z.append(sampler.get_chain())
+    state.kept_log_density.append(sampler.get_log_prob())
+    state.kept_evaluations += used
+    state.accepted += int(sampler.backend.accepted.sum())
+    state.proposed += state.kept_log_density[-1].size
+
+
+def _by_ensemble(blocks: list[Array], policy: Policy) -> Array:
+    """(ensembles, steps, walkers, ...) of blocks (steps, n, ...)."""
+    every = np.concatenate(blocks)
+    each = every.reshape(len(every), policy.ensembles, policy.walkers, *every.shape[2:])
+    return np.ascontiguousarray(np.moveaxis(each, 1, 0))
 
 
 def _block_steps(state: State, policy: Policy) -> int:
     """As many steps as the last look promises to be enough, but no more than were kept so far."""
-    kept = sum(len(block) for block in state.kept_z[0])
+    kept = sum(len(block) for block in state.kept_z)
     if not kept:
         return policy.block
     missing = kept * max(policy.ess / state.ess.min() - 1.0, WINDOW * state.autocorrelation.max() / kept - 1.0)
@@ -142,7 +149,7 @@ def _block_steps(state: State, policy: Policy) -> int:
 
 def _look(target: Target, state: State, policy: Policy) -> None:
     """Apply the stop rule to the draws kept so far."""
-    z = np.stack([np.concatenate(blocks) for blocks in state.kept_z])
+    z = _by_ensemble(state.kept_z, policy)
     steps, d = z.shape[1], z.shape[-1]
     theta = target.coordinates.to_natural(z.reshape(-1, d)).reshape(z.shape)
     # Logarithms of positive parameters: a heavy tail must not hide the walk.
@@ -165,4 +172,11 @@ def _look(target: Target, state: State, policy: Policy) -> None:
         )
 
 
+def _promises_more(state: State, policy: Policy) -> bool:
+    """Whether with a proposal as good as usual, learned once more, draws would be enough after fewer evaluations."""
+    going_on = state.kept_evaluations * (policy.ess / state.ess.min() - 1.0)
+    return bool(going_on > policy.ess / _USUAL + policy.round_steps * policy.walkers * policy.ensembles)
+
+
 _LEAST_BLOCK = 6
+_USUAL = 0.35  # effective draws per kept evaluation

@@ -1,4 +1,4 @@
-"""emcee moves that know what was learned: from a frozen proposal, and differential evolution in its straight places."""
+"""emcee moves: from a frozen proposal, and differential evolution in the coordinates that it straightens."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,27 +31,40 @@ class IndependenceMove(MHMove):  # type: ignore[misc]
         return y, self.proposal.log_density(x) - self.proposal.log_density(y)
 
 
-class StraightEvolutionMove(RedBlueMove):  # type: ignore[misc]
-    """Differential evolution in straightened coordinates u: along bends and down funnels, differences fit everywhere.
+class EvolutionMove(RedBlueMove):  # type: ignore[misc]
+    """Differential evolution within each of several ensembles side by side, in straightened coordinates u.
 
-    Symmetric in u, where the density is p |dx/du|; the map is frozen like the proposal, so each half's chain given the
-    other half leaves the target invariant.
+    There differences fit everywhere, along bends and down funnels. Symmetric in u, where the density is p |dx/du|; the
+    map is frozen like the proposal, so each half's chain given the other half leaves the target invariant. A walker
+    sees differences of its own ensemble alone: ensembles stay independent of each other.
+
+    Parameters
+    ----------
+    ensembles : int
+        Of the same even number of walkers, one after the other.
+    straight : Straight, optional
+        Coordinates as they are when left out; then a fifth of the steps is as long as differences are, from mode to
+        mode.
     """
 
-    def __init__(self, straight: Straight) -> None:
+    def __init__(self, ensembles: int, straight: Straight | None = None) -> None:
+        self.ensembles = ensembles
         self.straight = straight
-        super().__init__()
+        super().__init__(randomize_split=False)  # neighbours fall into different halves: half of every ensemble each
 
     def get_proposal(self, x: Array, others: Sequence[Array], random: Any) -> tuple[Array, Array]:
         """Places (n, d) proposed for walkers at (n, d), from differences of the other half, and log factors (n,)."""
-        (n, d), (u, slope) = x.shape, self.straight.forward(x)
-        pool, _ = self.straight.forward(np.concatenate(others))
-        one = random.randint(len(pool), size=n)
-        other = (one + random.randint(1, len(pool), size=n)) % len(pool)
+        (n, d), each = x.shape, len(others[0]) // self.ensembles
+        (u, slope), (pool, _) = self._forward(x), self._forward(others[0])
+        one = random.randint(each, size=n)
+        other = (one + random.randint(1, each, size=n)) % each
+        own = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)
+        scale = 2.38 / np.sqrt(2.0 * d)
         # short steps for the walker whom long ones do not serve
-        length = 2.38 / np.sqrt(2.0 * d) * random.choice(_LENGTHS, size=(n, 1))
-        y = self.straight.inverse(u + length * (pool[one] - pool[other]))
-        return y, slope - self.straight.forward(y)[1]
+        lengths = (scale, 0.5 * scale) if self.straight else (scale, scale, scale, scale, 1.0)
+        u = u + random.choice(lengths, size=(n, 1)) * (pool[own + one] - pool[own + other])
+        y = self.straight.inverse(u) if self.straight else u
+        return y, slope - self._forward(y)[1]
 
-
-_LENGTHS = (1.0, 0.5)
+    def _forward(self, x: Array) -> tuple[Array, Array]:
+        return self.straight.forward(x) if self.straight else (x, np.zeros(len(x)))

@@ -11,7 +11,7 @@ class Policy:
     Attributes
     ----------
     ensembles, walkers : int
-        Independent ensembles, and walkers in each.
+        Independent ensembles, and walkers in each: an even number, for an ensemble moves in halves.
     ess : float
         Effective draws wanted of every parameter, all ensembles together.
     r_hat : float
@@ -44,6 +44,10 @@ class Policy:
     components: int = 6
     block: int = 16
     most_steps: int = 4000
+
+    def __post_init__(self) -> None:
+        if self.walkers % 2:
+            raise ValueError(f"walkers: {self.walkers} given, an even number is needed")
 
 
 DEFAULT = Policy()

@@ -1,7 +1,7 @@
 """Walkers: their state between two stretches of work, which a file can hold, and the stretches themselves."""
 
 import pickle
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.mixture import Mixture
-from wirebayes.bayes.moves import IndependenceMove, StraightEvolutionMove
+from wirebayes.bayes.moves import EvolutionMove, IndependenceMove
 from wirebayes.bayes.proposal import Proposal
 
 Array = NDArray[Any]
@@ -23,9 +23,10 @@ class State:
 
     Attributes
     ----------
-    positions, values, randoms : list
-        Of each ensemble's walkers: sampled coordinates (w, d), log densities (w,), state of the random generator. In
-        burn-in there is one ensemble of all.
+    positions, values : arrays
+        Sampled coordinates (n, d) and log densities (n,) of all walkers, one ensemble after the other.
+    random
+        State of their random generator.
     proposal, start : Proposal or Mixture
         What the learned move draws from, and what was known before any walk.
     acceptance : float
@@ -34,11 +35,15 @@ class State:
         So often walkers had to look further.
     walk, seen
         Places that the last walk came by, and what the proposal was last fitted to.
+    again : bool
+        The proposal was learned a second time, from draws that were to be kept.
+    kept_z, kept_log_density : list of arrays
+        Blocks (steps, n, d) and (steps, n).
     """
 
-    positions: list[Array]
-    values: list[Array]
-    randoms: list[Any]
+    positions: Array
+    values: Array
+    random: Any
     proposal: Mixture | Proposal
     start: Mixture
     generator: np.random.Generator
@@ -47,12 +52,13 @@ class State:
     round: int = 0
     frozen: bool = False
     learned: bool = True
+    again: bool = False
     acceptance: float = 0.0
     walks: int = 0
     walk: Any = None
     seen: Any = None
-    kept_z: Any = None
-    kept_log_density: Any = None
+    kept_z: list[Array] = field(default_factory=list)
+    kept_log_density: list[Array] = field(default_factory=list)
     kept_evaluations: int = 0
     accepted: int = 0
     proposed: int = 0
@@ -78,8 +84,10 @@ class State:
             part.replace(path)
 
 
-def advance(target: Target, state: State, i: int, steps: int, power: float = 1.0) -> tuple[Any, int]:
-    """Run one ensemble on, on the density to a power; its position and random state are left in `state`.
+def advance(target: Target, state: State, steps: int, ensembles: int = 1, power: float = 1.0) -> tuple[Any, int]:
+    """Run the walkers on, on the density to a power; their places and random state are left in `state`.
+
+    All ensembles walk side by side: a batch costs little more than one of its parts.
 
     Returns
     -------
@@ -90,23 +98,22 @@ def advance(target: Target, state: State, i: int, steps: int, power: float = 1.0
     def density(z: Array) -> Array:
         return power * target(z)
 
-    sampler = emcee.EnsembleSampler(*state.positions[i].shape, density, moves=_moves(state), vectorize=True)
+    sampler = emcee.EnsembleSampler(*state.positions.shape, density, moves=_moves(state, ensembles), vectorize=True)
     before = target.evaluations
-    start = emcee.State(state.positions[i], log_prob=power * state.values[i], random_state=state.randoms[i])
+    start = emcee.State(state.positions, log_prob=power * state.values, random_state=state.random)
     end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
-    state.positions[i], state.values[i], state.randoms[i] = end.coords, end.log_prob / power, sampler.random_state
+    state.positions, state.values, state.random = end.coords, end.log_prob / power, sampler.random_state
     used = target.evaluations - before
     state.evaluations += used
     return sampler, used
 
 
-def _moves(state: State) -> list[tuple[Any, float]]:
-    evolution = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DEMove(gamma0=1.0), 0.2)]
+def _moves(state: State, ensembles: int) -> list[tuple[Any, float]]:
     if not state.learned:
-        return evolution
+        return [(EvolutionMove(ensembles), 1.0)]
     share = _EVOLUTION if state.frozen else _EXPLORATION
-    walk = StraightEvolutionMove(state.proposal.straight) if isinstance(state.proposal, Proposal) else evolution[0][0]
-    return [(IndependenceMove(state.proposal), 1.0 - share), (walk, share)]
+    straight = state.proposal.straight if isinstance(state.proposal, Proposal) else None
+    return [(IndependenceMove(state.proposal), 1.0 - share), (EvolutionMove(ensembles, straight), share)]
 
 
 _EVOLUTION = 0.05  # share of steps that do not trust the proposal
