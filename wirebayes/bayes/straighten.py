@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 Array = NDArray[Any]
@@ -123,7 +122,7 @@ def fit(x: Array, order: NDArray[np.int64]) -> Straight:
         left[:, j] = (v[:, j] - terms @ of_mean) * np.exp(-spread[:, j])
     return Straight(
         order, centre, scale, v.min(axis=0), v.max(axis=0), constant, linear, quadratic, log_scale,
-        spread.min(axis=0), spread.max(axis=0), np.column_stack([_shape(points) for points in left.T]),
+        spread.min(axis=0), spread.max(axis=0), _shapes(left),
     )  # fmt: skip
 
 
@@ -135,18 +134,23 @@ def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
     return np.sinh(inner), np.log(np.cosh(inner) / width) - 0.5 * np.log1p(w * w)
 
 
-def _shape(x: Array) -> Array:
-    """(3,) shape of points (n,), by which their quantiles come nearest to those of a normal."""
-    middle, spread = x.mean(), max(float(x.std()), 1e-12)
-    quantiles = (np.quantile(x, ndtr(_SCORES)) - middle) / spread
+def _shapes(x: Array) -> Array:
+    """(3, m) shapes of points (n, m), by which their quantiles come nearest to those of a normal.
 
-    def off(shape: Array) -> Array:
-        location, log_width, skewness = shape
-        told, _ = _normal(quantiles, np.array([location, np.exp(log_width), skewness]))
-        return np.append(told - _SCORES, _RESERVE * skewness)
-
-    location, log_width, skewness = least_squares(off, np.zeros(3), bounds=([-9, -9, -2], [9, 9, 2])).x
-    return np.array([middle + spread * location, spread * np.exp(log_width), skewness])
+    For each of many skewnesses location and width are a weighted straight-line fit; the weights, slopes of the map,
+    make of a distance between quantiles one between scores.
+    """
+    middle, spread = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
+    quantiles = (np.quantile(x, ndtr(_SCORES), axis=0) - middle) / spread
+    inner = np.arcsinh(_SCORES) + _SKEWNESSES[:, None]
+    curve, slope = np.sinh(inner), np.cosh(inner) / np.sqrt(1.0 + _SCORES**2)
+    lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope[..., None]
+    weighted = quantiles / slope[..., None]
+    line = np.linalg.pinv(lines) @ weighted
+    location, width = line[:, 0], np.maximum(line[:, 1], 1e-3)
+    off = ((weighted - lines @ line) ** 2).sum(axis=1) / width**2 + (_RESERVE * _SKEWNESSES[:, None]) ** 2
+    best, m = np.argmin(off, axis=0), np.arange(x.shape[1])
+    return np.array([middle + spread * location[best, m], spread * width[best, m], _SKEWNESSES[best]])
 
 
 def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -174,4 +178,5 @@ _RIDGE = 1e-3
 _CLEAR = 4.0  # standard errors
 _ALTERNATIONS = 6
 _SCORES = np.linspace(-2.8, 2.8, 15)
+_SKEWNESSES = np.linspace(-2.0, 2.0, 81)
 _RESERVE = 0.1  # against a shape that is only noise
