@@ -17,7 +17,7 @@ from wirebayes.bayes.mixture import rows_by_weight, spread_rows
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
-_ROUNDS = 4  # of climbs from places that no mode explains
+_ROUNDS = 2  # of climbs from places that no mode explains
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _WARM_STEPS = 4  # the last ones of the cooling
 _LEAST_SAG = 1.0  # nats
