@@ -56,11 +56,13 @@ def one_round(target: Target, state: State, policy: Policy) -> None:
     weight = value - base
     typical = weight[_resampled(weight, len(weight), state.generator)]
     state.acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
-    if state.acceptance >= _USEFUL:
-        _fit(target, state, policy, *_resampled_twice(z, value, base, state.generator))
     middle, high = np.quantile(typical, [0.5, 0.999])
     settled = state.acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
-    if state.round >= policy.rounds and settled or state.round >= policy.most_rounds:
+    last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
+    if state.acceptance >= _USEFUL:
+        seen = _resampled_twice(z, value, base, state.generator)
+        _fit(target, state, policy, *seen, points=proposal.ENOUGH if last else _PASSING)
+    if last:
         state.frozen, state.learned = True, state.acceptance > policy.acceptance
         if isinstance(state.proposal, Proposal):
             state.proposal = replace(state.proposal, shares=proposal.SHARES)
@@ -110,14 +112,17 @@ def _fit(
     hot: Array,
     cold: Array,
     shares: tuple[float, float, float, float] = proposal.EXPLORING,
+    points: int = proposal.ENOUGH,
 ) -> bool:
     """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
     before, state.seen = state.seen, (hot, cold)
     if before is not None:
         hot, cold = np.vstack([before[0], hot]), np.vstack([before[1], cold])
     try:
-        order = target.coordinates.order
-        state.proposal = proposal.fit(hot, cold, state.start, order, state.generator, shares, most=policy.components)
+        state.proposal = proposal.fit(
+            hot, cold, state.start, target.coordinates.order, state.generator, shares,
+            most=policy.components, points=points,
+        )  # fmt: skip
     except np.linalg.LinAlgError:
         return False  # too few distinct points yet: keep the proposal that made them
     return True
@@ -167,4 +172,5 @@ _WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the lo
 _HOT = 0.4  # power of the density that the wide part of the proposal is fitted to
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
 _GOOD_ACCEPTANCE = 0.25
+_PASSING = 5000  # points for a proposal that only the next round draws from
 _LONGEST_SETTLING = 8

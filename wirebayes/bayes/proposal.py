@@ -18,6 +18,7 @@ from wirebayes.bayes.straighten import Straight
 Array = NDArray[Any]
 SHARES = (0.72, 0.12, 0.12, 0.04)  # of the close part, the wide one, the plain one and the start's
 EXPLORING = (0.55, 0.2, 0.2, 0.05)  # while it learns: draws of the wide parts teach what lies far out
+ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time
 ROUGH_SHARES = (0.3, 0.1, 0.1, 0.5)  # while nothing but the start is sure
 
 
@@ -65,6 +66,7 @@ def fit(
     shares: tuple[float, float, float, float],
     *,
     most: int,
+    points: int = ENOUGH,
 ) -> Proposal:
     """The proposal learned from the burn-in.
 
@@ -81,19 +83,20 @@ def fit(
         Of the four parts.
     most : int
         The most components of the close mixture; the wide ones, which need not resemble anything, have half as many.
+    points : int
+        About so many are looked at.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    hot, cold = hot[:: 1 + len(hot) // _ENOUGH], cold[:: 1 + len(cold) // _ENOUGH]
+    hot, cold = hot[:: 1 + len(hot) // points], cold[:: 1 + len(cold) // points]
     straight = straighten.fit(cold, order)
     (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
     close = mixture.fit(near, rng, most=most, degrees=_LIGHT)
-    wide, plain = (mixture.fit(points[::2], rng, most=most // 2) for points in (far, hot))
+    wide, plain = (mixture.fit(part[::2], rng, most=most // 2) for part in (far, hot))
     return Proposal(shares, straight, close, wide, plain, start)
 
 
-_ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time
 _LIGHT = 40.0  # degrees of freedom where the wide mixtures look after the tails
