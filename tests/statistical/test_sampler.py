@@ -11,6 +11,7 @@ from wirebayes.bayes.policy import Policy
 
 pytestmark = pytest.mark.statistical
 SMALL = Policy(ensembles=4, walkers=48, ess=300.0, rounds=3, round_steps=12, most_rounds=4, block=24, most_steps=240)
+HASTY = Policy(walkers=64, ess=6000.0, rounds=1, round_steps=1, most_rounds=1)  # one round teaches next to nothing
 RUNS = 24
 # |t| of this size in any of 16 moments happens by chance once in three hundred tests (23 degrees of freedom)
 LIMIT = 4.5
@@ -59,6 +60,19 @@ def test_moments_are_right_in_as_many_dimensions_as_samples_fitted_together_have
     print(f"{d} dimensions: largest |t| {t:.2f}, spread over promised {ratio:.2f}")
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
+
+
+def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(monkeypatch):
+    again = sample(TARGETS["two_modes"](), 1, HASTY)
+    t, ratio = worst(gaussian, HASTY)
+    assert t < LIMIT
+    assert 0.6 < ratio < 1.7
+    monkeypatch.setattr(ensemble, "_promises_more", lambda state, policy: False)
+    stubborn = sample(TARGETS["two_modes"](), 1, HASTY)
+    assert again.converged and stubborn.converged
+    assert again.kept_evaluations == again.log_density.size  # none of those kept before
+    assert again.ess.min() / again.kept_evaluations > 2.0 * stubborn.ess.min() / stubborn.kept_evaluations
+    assert again.evaluations < 0.6 * stubborn.evaluations
 
 
 class _ForgetsTheProposal(moves.IndependenceMove):
@@ -158,9 +172,11 @@ class Killed(Exception):
     pass
 
 
-@pytest.mark.parametrize("blow", [1, 2, 3, 4])
-def test_a_killed_run_goes_on_to_the_same_bytes(blow, tmp_path, monkeypatch):
-    policy = Policy(**{**SMALL.__dict__, "ess": 12000.0})
+PATIENT = Policy(**{**SMALL.__dict__, "ess": 12000.0})
+
+
+@pytest.mark.parametrize(("policy", "blow"), [(PATIENT, 1), (PATIENT, 2), (PATIENT, 4), (HASTY, 3), (HASTY, 4)])
+def test_a_killed_run_goes_on_to_the_same_bytes(policy, blow, tmp_path, monkeypatch):
     whole = sample(gaussian(), 11, policy)
     path = tmp_path / "checkpoint"
     calls = 0
