@@ -47,6 +47,7 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "right_hold": None if hold is None or found_hold is None else found_hold == hold,
         "separable": judged.get("separable"),
         "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],
+        "left": judged["delta_after_refit"] if names else None,
         "optimal": judged.get("optimal") or {},
         "held_out": _held_out(judged, spoken),
         "seconds": record["seconds"],
