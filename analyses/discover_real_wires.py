@@ -13,7 +13,7 @@ import numpy as np
 from wirebayes import paper
 from wirebayes.discrepancy import gap
 from wirebayes.discrepancy.block import fitted
-from wirebayes.discrepancy.discover import Settings, final_effects, investigate
+from wirebayes.discrepancy.discover import Settings, final_models, investigate
 from wirebayes.effects import CATALOGUE
 
 TRAIN = {"roc-line-1m": 8, "roc-line-1.71m": 8, "nylon-1.5m": 8, "kite-1.5m": 5}
@@ -24,7 +24,7 @@ def unseen(experiment, seed=0):
     trained = experiment.train(TRAIN[experiment.name])
     findings = investigate([trained], Settings(kinds=CATALOGUE), seed)
     verdict = findings.report["experiments"][experiment.name]
-    effects = final_effects(findings, trained)
+    effects = final_models(findings)[0].effects
     rng = np.random.default_rng(seed)
     block = fitted([trained], (), "hooke", "saturating", rng)
     plain, final = (

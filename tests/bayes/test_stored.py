@@ -1,25 +1,37 @@
 """A joint fit of two lengths, stored and read back at each sample's own length."""
 
+import json
+
 import numpy as np
 import pytest
 
-from wirebayes.bayes import result
+from wirebayes.bayes import jobs, result
 from wirebayes.bayes.fit import fit
+from wirebayes.bayes.jobs import Job
 from wirebayes.bayes.policy import Policy
 from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
-from wirebayes.simulate import Bench, Truth, draw
+from wirebayes.effects.elastic import LengthDependence
+from wirebayes.experiment import read_experiments
+from wirebayes.simulate import Bench, Truth, draw, write
 from wirebayes.wire.staircase import simulate
 
 HASTY = Policy(walkers=64, rounds=2, round_steps=8, most_rounds=2, block=4, most_steps=4)
 BENCHES = [Bench("short", "line", 800.0), Bench("long", "line", 1700.0)]
 
 
+@pytest.fixture(scope="module")
+def fitted():
+    effects = [SecondRelaxation(), SteadyCreep(), LengthDependence("k1")]
+    joint = draw(BENCHES, Truth({"length_dependence.p": 0.4}, effects), seed=3).problem
+    return fit(joint, 1, policy=HASTY)
+
+
 @pytest.mark.parametrize("sample", [0, 1])
-def test_what_is_read_back_predicts_as_the_joint_fit_does(sample, tmp_path):
-    joint = draw(BENCHES, Truth(effects=[SecondRelaxation(), SteadyCreep()]), seed=3).problem
-    fitted = fit(joint, 1, policy=HASTY)
-    result.save(fitted, tmp_path, {})
+@pytest.mark.parametrize("apart", [False, True])
+def test_what_is_read_back_predicts_as_the_joint_fit_does(fitted, sample, apart, tmp_path):
+    joint = fitted.problem
     here = joint.samples[sample]
+    result.save(fitted, tmp_path, {}, sample=here if apart else None)
     stored = result.load(tmp_path, here.name)
     theta = np.concatenate(list(fitted.theta))[:20]
     read = {name: values[:20] for name, values in stored.draws.items()}
@@ -36,3 +48,16 @@ def test_a_sample_twice_as_long_moved_twice_as_far_reads_the_same():
     long["preload"] = 2.0 * short["preload"]
     one, two = (simulate(s.protocol, own, s.model) for s, own in zip(problem.samples, (short, long), strict=True))
     assert two == pytest.approx(one, rel=1e-9)
+
+
+def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(tmp_path):
+    write(tmp_path, BENCHES, Truth(), 3)
+    experiments = tuple(read_experiments(tmp_path / "experiments.toml"))
+    job = Job("short/final", experiments, apart=("short/final", "long/final"))
+    jobs.run([job], tmp_path, 0, policy=HASTY)
+    said = [(tmp_path / folder / "summary.json").read_text() for folder in job.folders]
+    short, long = (json.loads(text)["parameters"] for text in said)
+    assert short["k1"] == long["k1"] and short["preload"] != long["preload"]
+    (tmp_path / "long/final/summary.json").unlink()
+    jobs.run([job], tmp_path, 0, policy=HASTY)
+    assert [(tmp_path / folder / "summary.json").read_text() for folder in job.folders] == said

@@ -9,7 +9,7 @@ import pytest
 from wirebayes import cli, paper
 from wirebayes.discrepancy import expansion, gap, screen
 from wirebayes.discrepancy.block import fitted
-from wirebayes.discrepancy.discover import discover
+from wirebayes.discrepancy.discover import Settings, discover, final_models, investigate
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment, read_experiments
@@ -108,9 +108,15 @@ def test_two_lengths_tell_the_fixture(tmp_path: Path) -> None:
         Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
     ]
     # In the files of seed 2 the test with the name inside has p = .03, as in one right answer of 33.
-    found = answer(made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3))
+    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
+    findings = investigate(experiments, Settings(kinds=CATALOGUE, simulations=199))
+    found = findings.report["experiments"]["short"]
     assert found["best"] == "fixture_compliance" and found["shared_with"] == []
     assert "length_dependence" in found["power"]
+    # one length alone cannot know it: both samples are sampled together, and each stored with what both know
+    [model] = final_models(findings)
+    assert [e.name for e in model.experiments] == ["short", "long"]
+    assert [e.name for e in model.effects] == ["fixture_compliance"] and "preload[long]" in model.near
 
 
 def test_a_gross_reading_is_struck_out_and_nothing_else_is_missing(tmp_path: Path) -> None:

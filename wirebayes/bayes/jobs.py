@@ -34,6 +34,8 @@ class Job:
     provenance : dict
     near : dict, optional
         Parameters known to be good (see `wirebayes.bayes.fit.fit`).
+    apart : tuple of str
+        Folders of the experiments, one each, where they are stored apart; all in one when left out.
     """
 
     folder: str
@@ -46,6 +48,12 @@ class Job:
     length_exponent: Any = 1.0
     provenance: dict[str, Any] = field(default_factory=dict)
     near: dict[str, float] | None = None
+    apart: tuple[str, ...] = ()
+
+    @property
+    def folders(self) -> tuple[str, ...]:
+        """Where results go."""
+        return self.apart or (self.folder,)
 
 
 def run(
@@ -56,11 +64,11 @@ def run(
     policy: Policy = DEFAULT,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
 ) -> None:
-    """Do all fits whose folder has no ``summary.json`` yet; the results do not depend on how many cores there are.
+    """Do all fits of which a folder has no ``summary.json`` yet; the results do not depend on how many cores there are.
 
     A fit cut off leaves a checkpoint in its folder, from which the next call goes on to the same bytes.
     """
-    todo = [job for job in jobs if not (directory / job.folder / "summary.json").exists()]
+    todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
     if len(todo) == 1 or _cores() == 1:
         for job in todo:
             one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
@@ -81,14 +89,18 @@ def one(
     from wirebayes.bayes.result import save  # xarray takes a second to load; not every user of jobs stores
 
     folder = directory / job.folder
-    folder.mkdir(parents=True, exist_ok=True)
+    for place in job.folders:
+        (directory / place).mkdir(parents=True, exist_ok=True)
     known = catalogue(job.own_effects)
     problem = build(job.experiments, [named(key, known) for key in job.effects], law=job.law, history=job.history,
                     likelihood=job.likelihood, length_exponent=job.length_exponent)  # fmt: skip
     own_seed = seed_of(seed, job.folder)
     checkpoint = folder / ".checkpoint"
     result = fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
-    save(result, folder, job.provenance | {"seed": seed, "policy": vars(policy)}, seed=own_seed)
+    about = job.provenance | {"seed": seed, "policy": vars(policy)}
+    samples = problem.samples if job.apart else (None,)
+    for place, sample in zip(job.folders, samples, strict=True):
+        save(result, directory / place, about, seed=own_seed, sample=sample)
     checkpoint.unlink(missing_ok=True)
 
 

@@ -1,9 +1,10 @@
 """Results on disk: netCDF that ArviZ reads, and a summary in JSON. The only module that knows xarray and ArviZ."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import arviz_base
@@ -19,6 +20,7 @@ from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.bayes.replicate import readings as replicate
 from wirebayes.effects import catalogue, named
+from wirebayes.effects.elastic import LengthDependence
 from wirebayes.errors import InputError
 from wirebayes.output import write_bytes, write_json
 from wirebayes.wire.effect import Effect
@@ -157,6 +159,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         if len(names) > 1:
             reference = float(np.exp(np.mean(np.log(lengths))))
             draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
+            draws = _by_length(draws, model.effects, lengths[at], reference)
         here = constant["held"].values.astype(bool)
         protocol = Protocol(
             float(lengths[at]),
@@ -206,7 +209,7 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
     if together:
         variables = _together_variables(problem, fit.theta)
     else:
-        variables = {k: v.reshape(m, draws) for k, v in problem.parameters(flat, members[0]).items()}
+        variables = {k: v.reshape(m, draws) for k, v in _own(problem, flat, members[0]).items()}
     per_hold = problem.hold_log_likelihood(flat)
     order = [i for i, s in enumerate(problem.samples) if s in members]
     likelihood = np.moveaxis(laid([padded(per_hold[i]) for i in order]), -1, 0).reshape(
@@ -220,7 +223,7 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
     prior_variables = (
         _together_variables(problem, prior[None])
         if together
-        else {k: v[None] for k, v in problem.parameters(prior, members[0]).items()}
+        else {k: v[None] for k, v in _own(problem, prior, members[0]).items()}
     )
     constant: dict[str, Array] = {
         "displacement_mm": laid([padded(s.protocol.displacement_mm) for s in members]),
@@ -296,6 +299,23 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
     tree["posterior"].attrs.update(about)
     tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
     return tree
+
+
+def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
+    """A sample's parameters as they are at its own length, with which it can stand alone."""
+    reference = sample.model.length_ref_mm or sample.protocol.length_mm
+    return _by_length(problem.parameters(theta, sample), sample.model.effects, sample.protocol.length_mm, reference)
+
+
+def _by_length(
+    own: dict[str, Array], effects: Sequence[Effect], length_mm: float, reference_mm: float
+) -> dict[str, Array]:
+    """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with."""
+    hold: Any = SimpleNamespace(length_mm=length_mm, length_ref_mm=reference_mm)
+    for effect in (e for e in effects if isinstance(e, LengthDependence)):
+        values: Any = own
+        own = effect.apply(values, {"p": own[effect.columns()[0]]}, hold)
+    return own
 
 
 def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:

@@ -66,30 +66,31 @@ def discover(
     _say_posterior(findings, output)
     write_json(output / "discovery.json", findings.report)
     opened.finish()
-    for job in jobs:
-        summary = json.loads((output / job.folder / "summary.json").read_text())
+    for folder in (folder for job in jobs for folder in job.folders):
+        summary = json.loads((output / folder / "summary.json").read_text())
         if not summary["converged"]:
-            print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
+            print(f"{folder}: {summary['convergence']}", file=sys.stderr)
 
 
 def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type: ignore[no-untyped-def]
-    """Plain and final fit of every experiment."""
+    """Plain fit of every experiment, and the final ones."""
     from wirebayes.bayes.jobs import Job
-    from wirebayes.discrepancy.discover import final_effects
+    from wirebayes.discrepancy.discover import Joint, final_models
 
+    plain = [("plain", Joint((e,))) for block in findings.final for e in block.experiments]
     out = []
-    for e in findings.experiments:
-        provenance = {"data_sha256": e.data_hash}
-        for model, effects in (("plain", ()), ("final", final_effects(findings, e))):
-            keys = tuple(f.key for f in effects)
-            near = findings.near[e.name] if model == "final" else None
-            out.append(Job(f"{e.name}/{model}", (e,), keys, own_effects, law, history, "chain", 1.0, provenance, near))
+    for kind, model in [*plain, *(("final", m) for m in final_models(findings))]:
+        folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
+        keys = tuple(f.key for f in model.effects)
+        provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
+        out.append(Job(folders[0], model.experiments, keys, own_effects, law, history, "chain", 1.0, provenance,
+                       model.near, folders))  # fmt: skip
     return out
 
 
 def _say_posterior(findings: "Findings", output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
-    for e in findings.experiments:
+    for e in (e for block in findings.final for e in block.experiments):
         parameters = json.loads((output / e.name / "final" / "summary.json").read_text())["parameters"]
         for name, amplitude in findings.report["experiments"][e.name]["amplitudes"].items():
             column = next(c for c in parameters if c.startswith(f"{name}."))
@@ -100,5 +101,5 @@ def _pictures(findings: "Findings", output: Path, own_effects: Path | None) -> N
     """Before and after, hold by hold."""
     from wirebayes.report.discover import before_and_after
 
-    for e in findings.experiments:
+    for e in (e for block in findings.final for e in block.experiments):
         before_and_after(output / e.name, findings.report["experiments"][e.name], output / f"{e.name}.png", own_effects)

@@ -55,6 +55,12 @@ class Block:
     def names(self) -> tuple[str, ...]:
         return tuple(e.name for e in self.experiments)
 
+    @property
+    def best(self) -> dict[str, float]:
+        """The best parameters, all of them."""
+        theta = self.target.coordinates.to_natural(self.modes.z[:1])[0]
+        return dict(zip(self.target.problem.names, theta.tolist(), strict=True))
+
     def parameters(self, name: str) -> dict[str, float]:
         """The best parameters, by the names they have where one of the experiments is fitted alone."""
         theta = self.target.coordinates.to_natural(self.modes.z[:1])

@@ -65,18 +65,12 @@ class Findings:
     ----------
     report : dict
         The content of ``discovery.json``.
-    effects : dict of experiment name to tuple of Effect
-        Of each experiment's final model.
-    near : dict of experiment name to dict
-        The final model's best parameters, by the names they have where the experiment is fitted alone.
-    experiments : tuple of Experiment
-        As given, gross errors struck out.
+    final : tuple of Block
+        The samples of each material, gross errors struck out, with the effects that were accepted.
     """
 
     report: dict[str, Any]
-    effects: dict[str, tuple[Effect, ...]]
-    near: dict[str, dict[str, float]]
-    experiments: tuple[Experiment, ...]
+    final: tuple[Block, ...]
 
 
 def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = CATALOGUE) -> dict[str, type[Effect]]:
@@ -164,8 +158,6 @@ def investigate(
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
     alike = power.similarity([_only(x, len(trials)) for x in expansions], trials, ratios)
     out: dict[str, Any] = {}
-    effects: dict[str, tuple[Effect, ...]] = {}
-    near: dict[str, dict[str, float]] = {}
     for i, block in enumerate(plain):
         report("held-out holds", i, len(plain))
         affected = [a for a in accepted if i in a.blocks]
@@ -173,24 +165,41 @@ def investigate(
         common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
         checks = _held_out(block, final[i], verdict, rng)
         for e, check in zip(block.experiments, checks, strict=True):
-            effects[e.name] = final[i].effects
-            near[e.name] = final[i].parameters(e.name)
             out[e.name] = common | {
                 "held_out": check,
                 "residual_rms_N": _left_over(block, e.name),
                 "gross_errors": [g for g in struck if g["experiment"] == e.name],
             }
     report("held-out holds", len(plain), len(plain))
-    return Findings({"version": 1, "experiments": out}, effects, near, tuple(e for b in plain for e in b.experiments))
+    return Findings({"version": 1, "experiments": out}, tuple(final))
 
 
-def final_effects(findings: Findings, experiment: Experiment) -> tuple[Effect, ...]:
-    """The effects of an experiment's final model; the flexible discrepancy where what is missing has no name."""
-    report = findings.report["experiments"][experiment.name]
-    if report["verdict"] == "unknown":
-        return (_discrepancy(experiment, float(report["residual_rms_N"])),)
-    # An event stays with its experiment, an amplitude needs holds that can show it.
-    return tuple(e for e in findings.effects[experiment.name] if getattr(e, "test", "") in ("", experiment.name))
+@dataclass(frozen=True)
+class Joint:
+    """What is sampled at once: some experiments with some effects, and where the best parameters are, if known."""
+
+    experiments: tuple[Experiment, ...]
+    effects: tuple[Effect, ...] = ()
+    near: dict[str, float] | None = None
+
+
+def final_models(findings: Findings) -> list[Joint]:
+    """The final model of every experiment.
+
+    Samples of one material share what they are, and the amplitude of what was added. Where nothing was, each stands for
+    itself; where what is missing has no name, with the flexible discrepancy.
+    """
+    out = []
+    for block in findings.final:
+        reports = [findings.report["experiments"][name] for name in block.names]
+        if block.effects:
+            out.append(Joint(block.experiments, block.effects, block.best))
+            continue
+        for e, report in zip(block.experiments, reports, strict=True):
+            flexible = report["verdict"] == "unknown"
+            effects = (_discrepancy(e, float(report["residual_rms_N"])),) if flexible else ()
+            out.append(Joint((e,), effects, block.parameters(e.name)))
+    return out
 
 
 @dataclass(frozen=True)
