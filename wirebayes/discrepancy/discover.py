@@ -19,6 +19,7 @@ from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
 from wirebayes.discrepancy.naming import probabilities
 from wirebayes.discrepancy.outward import outward
 from wirebayes.discrepancy.screen import Candidate, GlobalTest
+from wirebayes.discrepancy.sharing import informed
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.errors import InputError
@@ -154,6 +155,9 @@ def investigate(
         report("naming", 0, 1)
         choice = choose.choose(plain, trials, candidates, data, further)
         verdict, accepted, final, choice = _decide(plain, choice, settings, rng)
+        for a in accepted:
+            if len(a.effects) > 1 and settings.kinds[a.name].scope in ("instrument", "environment"):
+                final = informed(final, a.effects, rng)
         report("naming", 1, 1)
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
     alike = power.similarity([_only(x, len(trials)) for x in expansions], trials, ratios)
