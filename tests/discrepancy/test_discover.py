@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wirebayes import cli, paper
-from wirebayes.discrepancy import expansion, gap, screen
+from wirebayes.discrepancy import expansion, gap, power, screen
 from wirebayes.discrepancy.block import fitted
 from wirebayes.discrepancy.discover import Settings, discover, final_models, investigate
 from wirebayes.effects import CATALOGUE, named
@@ -117,6 +117,20 @@ def test_two_lengths_tell_the_fixture(tmp_path: Path) -> None:
     [model] = final_models(findings)
     assert [e.name for e in model.experiments] == ["short", "long"]
     assert [e.name for e in model.effects] == ["fixture_compliance"] and "preload[long]" in model.near
+
+
+def test_what_two_lengths_leave_open_a_third_one_tells(tmp_path: Path) -> None:
+    benches = [
+        Bench(name="short", length_mm=600.0),
+        Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
+    ]
+    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    probes = {p.effect.name: p for p in screen.candidate_probes([block], CATALOGUE)[0]}
+    told = power.next_measurement(block, (probes["fixture_compliance"], probes["length_dependence"]), None)
+    assert "another length, 3600 mm" in told
+    possible = list(probes)
+    assert not any("compliance" in s for s in power.not_identifiable(block, list(CATALOGUE.values()), possible))
 
 
 def test_a_gross_reading_is_struck_out_and_nothing_else_is_missing(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.problem import with_protocols
+from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, with_protocols
 from wirebayes.discrepancy.block import Block
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, projected
 from wirebayes.discrepancy.naming import LARGEST, occam
@@ -19,6 +19,7 @@ from wirebayes.wire.protocol import Protocol
 Array = NDArray[Any]
 ALIKE = 0.95
 _POWER_ROWS = 300  # simulations behind an 80 % amplitude
+_WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
@@ -112,7 +113,8 @@ _ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _Displacemen
 
 def not_identifiable(block: Block, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
     """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show."""
-    trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in _ABSORBABLE]
+    absorbable = [kind for kind in _ABSORBABLE if not (kind is _Compliance and "fixture_compliance" in possible)]
+    trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in absorbable]
     x = expand(block.target, block.modes.z[:1], trials)
     wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
     left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
@@ -134,63 +136,76 @@ class _Plan:
     protocol: Protocol
 
 
-def _plans(p: Protocol) -> list[_Plan]:
+def _plans(p: Protocol, alone: bool) -> list[_Plan]:
+    """What could be done with a sample instead; `alone` if there is no other, whose displacements would differ."""
     recorded = p.recorded
     x = p.displacement_mm[recorded]
     down = x[-2::-1] if len(x) > 1 else x
     log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
-
-    def holds(displacement: Array, times: Array, length: float, warming: bool = False) -> Protocol:
-        h = len(displacement)
-        time = np.tile(times, (h, 1))
-        start = np.concatenate([[0.0], np.cumsum(np.full(h, times[-1]))[:-1]])
-        # A slow swing of the room, three degrees up and down again.
-        warm = 3.0 * np.sin(2 * np.pi * (start[:, None] + time) / max(start[-1] + times[-1], 1.0)) if warming else None
-        return Protocol(
-            length, displacement, time, np.ones(time.shape, bool), np.full(h, times[-1]), np.arange(1, h + 1), warm
-        )
-
     times = p.time_s[int(np.argmax(p.mask.sum(axis=1)))][: int(p.mask.sum(axis=1).max())]
-    span = f"{x.min():g} to {x.max():g} mm"
+    span = f"{x.min():g} to {x.max():g} mm" if alone else "each sample's displacements"
     dense = "600 s with 25 readings spaced evenly in the logarithm of time"
     there_and_back = np.concatenate([x, down])
     halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
-    back = f"the same displacements back from {x.max():g} to {x.min():g} mm, each held {times[-1]:g} s"
+    last = f" from {x.max():g} to {x.min():g} mm" if alone else ", of every sample"
+    back = f"the same displacements back{last}, each held {times[-1]:g} s"
     return [
-        _Plan(f"unload the wire after the last hold: {back}", holds(there_and_back, times, p.length_mm)),
-        _Plan(f"hold each of the displacements {span} for {dense}", holds(x, log_times, p.length_mm)),
-        _Plan(f"load and unload over {span}, each hold {dense}", holds(there_and_back, log_times, p.length_mm)),
-        _Plan(f"take twice as many, half as large steps over {span}", holds(halved, times, p.length_mm)),
-        _Plan(
-            f"repeat the test at a second length, {2 * p.length_mm:g} mm, with steps scaled alike",
-            holds(2 * x, times, 2 * p.length_mm),
-        ),
+        _Plan(f"unload the wire after the last hold: {back}", _holds(there_and_back, times, p.length_mm)),
+        _Plan(f"hold each of the displacements {span} for {dense}", _holds(x, log_times, p.length_mm)),
+        _Plan(f"load and unload over {span}, each hold {dense}", _holds(there_and_back, log_times, p.length_mm)),
+        _Plan(f"take twice as many, half as large steps over {span}", _holds(halved, times, p.length_mm)),
     ]
+
+
+def _holds(displacement: Array, times: Array, length_mm: float) -> Protocol:
+    """Holds at these displacements, each read at these times."""
+    h = len(displacement)
+    time, duration = np.tile(times, (h, 1)), np.full(h, times[-1])
+    return Protocol(length_mm, displacement, time, np.ones(time.shape, bool), duration, np.arange(1, h + 1))
+
+
+def _another_length(problem: Problem) -> tuple[str, Problem]:
+    """The test repeated, beside what there is, on a sample twice as long as the longest."""
+    longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
+    p, length = longest.protocol, 2.0 * longest.protocol.length_mm
+    times = p.time_s[int(np.argmax(p.mask.sum(axis=1)))][: int(p.mask.sum(axis=1).max())]
+    protocol = _holds(2.0 * p.displacement_mm[p.recorded], times, length)
+    model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
+    more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
+    exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
+    prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
+    which = "a second" if len({s.protocol.length_mm for s in problem.samples}) == 1 else "another"
+    words = f"repeat the test at {which} length, {length:g} mm, with steps scaled alike"
+    return words, replace(problem, samples=(*problem.samples, more), prior=prior)
 
 
 def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
     """The plan that tells two candidates apart best, or shows one effect best, by projected signatures."""
     problem = block.target.problem
-    first = problem.samples[0]
     trials = list(pair) if pair else [weakest] if weakest else []
     if not trials:
         return "No candidate remains; more of the same holds would narrow the parameters."
-    scored = []
+    planned = [_another_length(problem)]
+    for plans in zip(*(_plans(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
+        protocols = [plan.protocol for plan in plans]
+        empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
+        planned.append((plans[0].words, with_protocols(problem, protocols, empty)))
     here = _separation(block.target, block, trials)
-    for plan in _plans(first.protocol):
-        empty = np.zeros((*plan.protocol.time_s.shape, 1))
-        other = with_protocols(replace(problem, samples=(first,)), [plan.protocol], [empty])
-        scored.append((_separation(replace_problem(block.target, other), block, trials), plan.words))
+    scored = [(_separation(replace_problem(block.target, other), block, trials), words) for words, other in planned]
     best, words = max(scored)
     ratio = best / here if here > 0 else np.inf
+    told = " from ".join(t.effect.name for t in trials)
+    if ratio < _WORTH:
+        aim = f"tell {told}: measure one of them" if pair else f"show a smaller {told}: measure it"
+        return f"No test tried (unloading, longer holds, finer steps, another length) would {aim} on its own."
     gain = (
         f"{ratio:.1f} times as far apart as now"
         if np.isfinite(ratio) and ratio < 1e3
         else "apart, which they are not now"
     )
     if pair:
-        return f"To tell {trials[0].effect.name} from {trials[1].effect.name}: {words}. They would lie {gain}."
-    return f"To see a smaller {trials[0].effect.name}: {words}. It would stand out {ratio:.1f} times as far as now."
+        return f"To tell {told}: {words}. They would lie {gain}."
+    return f"To see a smaller {told}: {words}. It would stand out {ratio:.1f} times as far as now."
 
 
 def replace_problem(target: Target, problem: Any) -> Target:
