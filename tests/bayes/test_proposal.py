@@ -68,14 +68,17 @@ def test_evolution_in_straight_coordinates_keeps_the_density():
     def log_density(z):
         return -0.5 * (z[:, 0] ** 2 + ((z[:, 1] - z[:, 0] ** 2) * np.exp(-0.5 * z[:, 0])) ** 2) - 0.5 * z[:, 0]
 
-    off = draws(4000) * [1.2, 0.8]
-    move = moves.EvolutionMove(4, straighten.fit(off, np.arange(2)))
-    walkers = emcee.EnsembleSampler(400, 2, log_density, moves=[move], vectorize=True)
-    walkers.run_mcmc(draws(400), 600)
-    z = walkers.get_chain(discard=50)
-    error = np.sqrt(emcee.autocorr.integrated_time(z, quiet=True).max() / (z.shape[0] * z.shape[1]))
-    found = np.array([z[..., 0].mean(), z[..., 0].var() - 1.0, z[..., 1].mean() - 1.0])
-    assert np.abs(found / [1.0, np.sqrt(2.0), z[..., 1].std()]).max() < 5.0 * error
+    move = moves.EvolutionMove(4, straighten.fit(draws(4000) * [1.2, 0.8], np.arange(2)))
+    found = []
+    for seed in range(12):
+        walkers = emcee.EnsembleSampler(400, 2, log_density, moves=[move], vectorize=True)
+        walkers.random_state = np.random.RandomState(seed).get_state()
+        walkers.run_mcmc(draws(400), 200)
+        z = walkers.get_chain(discard=20)
+        found.append([z[..., 0].mean(), z[..., 0].var() - 1.0, z[..., 1].mean() - 1.0])
+    # the spread of independent runs: walkers of an ensemble know of one another
+    t = np.mean(found, axis=0) / (np.std(found, axis=0, ddof=1) / np.sqrt(12.0))
+    assert np.abs(t).max() < 4.5
 
 
 @pytest.mark.parametrize("mapped", [False, True])

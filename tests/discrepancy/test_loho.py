@@ -14,7 +14,8 @@ QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
-    return fit(build([experiments()[0]]), 1, policy=QUICK)
+    # with few draws, the shape of the importance ratios' tail is anybody's guess
+    return fit(build([experiments()[0]]), 2)
 
 
 @pytest.mark.statistical
