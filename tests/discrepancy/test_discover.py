@@ -175,6 +175,10 @@ class ScrewWobble(Effect):
     for model in ("plain", "final"):
         assert json.loads((out / "simulated" / model / "summary.json").read_text())["converged"]
     assert "screw_wobble.a" in json.loads((out / "simulated" / "final" / "summary.json").read_text())["parameters"]
+    # one picture a finding, and none of what shows no pattern
+    seen = {w["covariate"].replace(" ", "-") for w in found["experiments"]["simulated"]["where"] if w["p"] <= 0.05}
+    drawn = {path.stem.removeprefix("where-") for path in (out / "simulated").glob("where-*.png")}
+    assert seen and drawn == seen
 
 
 def test_an_unknown_name_is_refused() -> None:

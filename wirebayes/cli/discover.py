@@ -98,8 +98,10 @@ def _say_posterior(findings: "Findings", output: Path) -> None:
 
 
 def _pictures(findings: "Findings", output: Path, own_effects: Path | None) -> None:
-    """Before and after, hold by hold."""
-    from wirebayes.report.discover import before_and_after
+    """Before and after, hold by hold, and one of each finding."""
+    from wirebayes.report.discover import before_and_after, pictures_of_findings
 
     for e in (e for block in findings.final for e in block.experiments):
-        before_and_after(output / e.name, findings.report["experiments"][e.name], output / f"{e.name}.png", own_effects)
+        verdict = findings.report["experiments"][e.name]
+        before_and_after(output / e.name, verdict, output / f"{e.name}.png", own_effects)
+        pictures_of_findings(output / e.name, verdict, own_effects)

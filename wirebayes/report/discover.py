@@ -1,5 +1,7 @@
-"""Before and after: the readings against the plain and the final model, hold by hold."""
+"""Pictures of a discovery: readings against the plain and the final model, and what the plain one leaves over where."""
 
+import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from wirebayes.bayes import noise, result
+from wirebayes.bayes.problem import Sample
 from wirebayes.wire.staircase import linearise
 
 Array = NDArray[Any]
@@ -44,6 +47,35 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     figure.savefig(target, dpi=130)
     plt.close(figure)
+
+
+def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Path | None = None) -> None:
+    """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.png``.
+
+    None for a pattern over what does not vary within the experiment.
+    """
+    stored = result.load(folder / "plain", own_effects=own_effects)
+    sample, mask = stored.sample, stored.sample.protocol.mask
+    rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
+    line = linearise(sample.protocol, {name: v[rows] for name, v in stored.draws.items()}, sample.model)
+    left = (sample.readings[..., 0] - line.tension.mean(axis=2))[mask]
+    for finding in verdict["where"]:
+        label, values = _COVARIATES[finding["covariate"]]
+        x = np.broadcast_to(values(sample), mask.shape)[mask]
+        if finding["p"] > _SHOWN or np.ptp(x) == 0.0:
+            continue
+        figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
+        axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
+        groups = np.array_split(np.argsort(x, kind="stable"), min(len(np.unique(x)), _GROUPS))
+        middles = [(x[g].mean(), left[g].mean()) for g in groups]
+        axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
+        axis.axhline(0.0, color="0.5", lw=0.6)
+        axis.set_xlabel(label)
+        axis.set_ylabel("measured − plain model (N)")
+        axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 110)), loc="left", fontsize=10)
+        axis.legend(fontsize=8, frameon=False)
+        figure.savefig(folder / f"where-{finding['covariate'].replace(' ', '-')}.png", dpi=130)
+        plt.close(figure)
 
 
 def _residuals(axis: Axes, stored: result.Stored, held: list[int]) -> None:
@@ -86,3 +118,23 @@ def _residuals(axis: Axes, stored: result.Stored, held: list[int]) -> None:
     axis.axhline(0.0, color="0.5", lw=0.6)
     axis.set_xticks(np.arange(len(shown)) + 0.5, [str(int(sample.protocol.number[j])) for j in shown])
     axis.set_xlim(0, len(shown))
+
+
+_SHOWN = 0.05  # p of a pattern that is worth a picture
+_GROUPS = 12
+_COVARIATES: dict[str, tuple[str, Callable[[Sample], Array]]] = {
+    "hold": ("hold number", lambda s: s.protocol.number[:, None]),
+    "displacement": ("displacement (mm)", lambda s: s.protocol.displacement_mm[:, None]),
+    "time in hold": ("time in hold (s)", lambda s: s.protocol.time_s),
+    "elapsed time": ("elapsed time (s)", lambda s: s.protocol.start_s[:, None] + s.protocol.time_s),
+    "tension": ("tension (N)", lambda s: s.readings[..., 0]),
+    "direction": (
+        "direction of the last step",
+        lambda s: np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0))[:, None],
+    ),
+    "temperature": (
+        "warming (K)",
+        lambda s: np.zeros(s.protocol.time_s.shape) if s.protocol.warming_K is None else s.protocol.warming_K,
+    ),
+    "length": ("length (mm)", lambda s: np.full(s.protocol.time_s.shape, s.protocol.length_mm)),
+}
