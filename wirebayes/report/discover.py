@@ -58,12 +58,16 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
     sample, mask = stored.sample, stored.sample.protocol.mask
     rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
     line = linearise(sample.protocol, {name: v[rows] for name, v in stored.draws.items()}, sample.model)
-    left = (sample.readings[..., 0] - line.tension.mean(axis=2))[mask]
+    residual = np.where(mask, sample.readings[..., 0] - line.tension.mean(axis=2), 0.0)
+    level = residual.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
     for finding in verdict["where"]:
         label, values = _COVARIATES[finding["covariate"]]
         x = np.broadcast_to(values(sample), mask.shape)[mask]
         if finding["p"] > _SHOWN or np.ptp(x) == 0.0:
             continue
+        # a pattern within holds is hidden by their levels
+        within = finding["covariate"] == "time in hold"
+        left = (residual - level if within else residual)[mask]
         figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
         axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
         groups = np.array_split(np.argsort(x, kind="stable"), min(len(np.unique(x)), _GROUPS))
@@ -71,7 +75,7 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
         axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.set_xlabel(label)
-        axis.set_ylabel("measured − plain model (N)")
+        axis.set_ylabel("measured − plain model (N)" + (",\nless its hold's mean" if within else ""))
         axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 110)), loc="left", fontsize=10)
         axis.legend(fontsize=8, frameon=False)
         figure.savefig(folder / f"where-{finding['covariate'].replace(' ', '-')}.png", dpi=130)
