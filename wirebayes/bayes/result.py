@@ -20,7 +20,6 @@ from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.bayes.replicate import readings as replicate
 from wirebayes.effects import catalogue, named
-from wirebayes.effects.elastic import LengthDependence
 from wirebayes.errors import InputError
 from wirebayes.output import write_bytes, write_json
 from wirebayes.wire.effect import Effect
@@ -312,10 +311,11 @@ def _by_length(
 ) -> dict[str, Array]:
     """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with."""
     hold: Any = SimpleNamespace(length_mm=length_mm, length_ref_mm=reference_mm)
-    for effect in (e for e in effects if isinstance(e, LengthDependence)):
-        values: Any = own
-        own = effect.apply(values, {"p": own[effect.columns()[0]]}, hold)
-    return own
+    out: Any = own
+    for effect in (e for e in effects if e.compares_lengths):
+        amplitudes = {a.name: own[c] for a, c in zip(effect.amplitudes, effect.columns(), strict=True)}
+        out = effect.apply(out, amplitudes, hold)
+    return dict(out)
 
 
 def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:

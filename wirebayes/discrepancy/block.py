@@ -68,6 +68,13 @@ class Block:
         own = self.target.problem.parameters(theta, sample)
         return {key: float(value[0]) for key, value in own.items()}
 
+    def along(self, effect: Effect, deviations: Sequence[float]) -> Array:
+        """An effect's amplitude so many standard deviations from its best, by the normal approximation as sampled."""
+        column = column_of(self.target.problem, effect)
+        z = np.repeat(self.modes.z[:1], len(deviations), axis=0)
+        z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
+        return self.target.coordinates.to_natural(z)[:, column]
+
     @property
     def log_evidence(self) -> float:
         return float(self.modes.log_evidence.max())

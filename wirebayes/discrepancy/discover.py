@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.fit import seed_of
 from wirebayes.discrepancy import choose, gap, gross, locate, power, screen
-from wirebayes.discrepancy.block import Block, column_of, fitted
+from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.discrepancy.choose import UNKNOWN_WEIGHT, Choice
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
 from wirebayes.discrepancy.naming import probabilities
@@ -156,7 +156,7 @@ def investigate(
         choice = choose.choose(plain, trials, candidates, data, further)
         verdict, accepted, final, choice = _decide(plain, choice, settings, rng)
         for a in accepted:
-            if len(a.effects) > 1 and settings.kinds[a.name].scope in ("instrument", "environment"):
+            if len(a.effects) > 1 and settings.kinds[a.name].scope in screen.FILE_WIDE:
                 final = informed(final, a.effects, rng)
         report("naming", 1, 1)
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
@@ -348,11 +348,7 @@ def _add(
 def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
     main = effect.amplitudes[0]
-    target, best = final.target, final.modes
-    column = column_of(target.problem, effect)
-    z = np.repeat(best.z[:1], 3, axis=0)
-    z[:, column] += np.array([-1.645, 0.0, 1.645]) * np.sqrt(best.covariance[0, column, column])
-    low, mean, high = map(float, target.coordinates.to_natural(z)[:, column])
+    low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
     hold = effect.hold if isinstance(effect, EventEffect) else None
     return {"mean": mean, "q05": low, "q95": high, "unit": main.unit, "hold": hold}
 

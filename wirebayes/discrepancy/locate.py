@@ -7,11 +7,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.problem import Problem
+from wirebayes.bayes.problem import Problem, Sample
 from wirebayes.discrepancy.expansion import Scan
 
 Array = NDArray[Any]
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
+
+
+def _warming(s: Sample) -> Array:
+    return np.zeros(s.protocol.time_s.shape) if s.protocol.warming_K is None else s.protocol.warming_K
+
+
+# What was varied, of a sample's readings: (H, R) or what broadcasts to it.
+COVARIATES: dict[str, Callable[[Sample], Array]] = {
+    "hold": lambda s: s.protocol.number[:, None],
+    "displacement": lambda s: s.protocol.displacement_mm[:, None],
+    "time in hold": lambda s: s.protocol.time_s,
+    "elapsed time": lambda s: s.protocol.start_s[:, None] + s.protocol.time_s,
+    "tension": lambda s: s.readings[..., 0],
+    "direction": lambda s: np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0))[:, None],
+    "temperature": _warming,
+    "length": lambda s: np.array(s.protocol.length_mm),
+}
 
 
 @dataclass(frozen=True)
@@ -85,26 +102,14 @@ def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
         if spread > 1e-9 * (1.0 + abs(middle)):
             out.append((name, [(v - middle) / spread for v in values], degrees))
 
-    shape = [s.protocol.time_s.shape for s in samples]
-    add(
-        "displacement",
-        [np.broadcast_to(s.protocol.displacement_mm[:, None], h) for s, h in zip(samples, shape, strict=True)],
-        3,
-    )
-    add("time in hold", [np.log1p(s.protocol.time_s / max(0.1 * s.typical_hold_s, 1e-9)) for s in samples], 3)
-    add("elapsed time", [s.protocol.start_s[:, None] + s.protocol.time_s for s in samples], 3)
-    add("tension", [s.readings[..., 0] for s in samples], 3)
-    directions = [np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0)) for s in samples]
-    add("direction", [np.broadcast_to(d[:, None], h) for d, h in zip(directions, shape, strict=True)], 1)
-    add(
-        "temperature",
-        [
-            np.zeros(h) if s.protocol.warming_K is None else s.protocol.warming_K
-            for s, h in zip(samples, shape, strict=True)
-        ],
-        2,
-    )
-    add("length", [np.full(h, s.protocol.length_mm) for s, h in zip(samples, shape, strict=True)], 1)
+    def of(name: str) -> list[Array]:
+        return [np.broadcast_to(COVARIATES[name](s), s.protocol.time_s.shape) for s in samples]
+
+    add("displacement", of("displacement"), 3)
+    scales = [max(0.1 * s.typical_hold_s, 1e-9) for s in samples]
+    add("time in hold", [np.log1p(t / scale) for t, scale in zip(of("time in hold"), scales, strict=True)], 3)
+    for name, degrees in (("elapsed time", 3), ("tension", 3), ("direction", 1), ("temperature", 2), ("length", 1)):
+        add(name, of(name), degrees)
     return out
 
 

@@ -142,7 +142,7 @@ def _plans(p: Protocol, alone: bool) -> list[_Plan]:
     x = p.displacement_mm[recorded]
     down = x[-2::-1] if len(x) > 1 else x
     log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
-    times = p.time_s[int(np.argmax(p.mask.sum(axis=1)))][: int(p.mask.sum(axis=1).max())]
+    times = _longest_series(p)
     span = f"{x.min():g} to {x.max():g} mm" if alone else "each sample's displacements"
     dense = "600 s with 25 readings spaced evenly in the logarithm of time"
     there_and_back = np.concatenate([x, down])
@@ -157,6 +157,12 @@ def _plans(p: Protocol, alone: bool) -> list[_Plan]:
     ]
 
 
+def _longest_series(p: Protocol) -> Array:
+    """Reading times of the hold with most readings."""
+    counts = p.mask.sum(axis=1)
+    return p.time_s[int(np.argmax(counts))][: int(counts.max())]
+
+
 def _holds(displacement: Array, times: Array, length_mm: float) -> Protocol:
     """Holds at these displacements, each read at these times."""
     h = len(displacement)
@@ -165,11 +171,10 @@ def _holds(displacement: Array, times: Array, length_mm: float) -> Protocol:
 
 
 def _another_length(problem: Problem) -> tuple[str, Problem]:
-    """The test repeated, beside what there is, on a sample twice as long as the longest."""
+    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
     longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
     p, length = longest.protocol, 2.0 * longest.protocol.length_mm
-    times = p.time_s[int(np.argmax(p.mask.sum(axis=1)))][: int(p.mask.sum(axis=1).max())]
-    protocol = _holds(2.0 * p.displacement_mm[p.recorded], times, length)
+    protocol = _holds(2.0 * p.displacement_mm[p.recorded], _longest_series(p), length)
     model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
     more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
     exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}

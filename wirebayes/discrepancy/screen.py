@@ -22,6 +22,7 @@ from wirebayes.wire.effect import Effect, EventEffect
 Array = NDArray[Any]
 _ROWS = 250  # replicates linearised at once
 _FLEXIBLE = "unknown"
+FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 _AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
@@ -62,7 +63,7 @@ def candidate_probes(blocks: Sequence[Block], kinds: Mapping[str, type[Effect]])
             for probe in probes(effect):
                 number = len(trials)
                 trials.append(probe)
-                if effect.scope in ("instrument", "environment") and len(on) > 1:
+                if effect.scope in FILE_WIDE and len(on) > 1:
                     candidates.append(Candidate(number, effect.name, tuple(on), True))
                     continue
                 candidates += [Candidate(number, effect.name, (b,), True) for b in on]

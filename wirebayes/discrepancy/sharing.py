@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discrepancy.block import Block, column_of, fitted
+from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.wire.effect import Effect
 
 _CLEAR = 2.0  # standard deviations from its edge from which on a one-sided amplitude is nearly log-normal
@@ -41,10 +41,7 @@ def informed(blocks: Sequence[Block], effects: Mapping[int, Effect], rng: np.ran
 
 def _known(block: Block, effect: Effect) -> tuple[float, float]:
     """Mean and standard deviation of an amplitude, by the normal approximation in sampled coordinates."""
-    column = column_of(block.target.problem, effect)
-    z = np.repeat(block.modes.z[:1], 3, axis=0)
-    z[:, column] += np.array([-1.0, 0.0, 1.0]) * np.sqrt(block.modes.covariance[0, column, column])
-    low, mean, high = block.target.coordinates.to_natural(z)[:, column]
+    low, mean, high = block.along(effect, (-1.0, 0.0, 1.0))
     return float(mean), float(0.5 * (high - low))
 
 

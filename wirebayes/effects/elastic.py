@@ -95,6 +95,7 @@ class LengthDependence(Effect):
     name = "length_dependence"
     place = "sample"
     scope = "material"
+    compares_lengths = True
     amplitudes = (Amplitude("p", "-", 0.0, stats.norm(0.0, 1.0)),)
     sentence = "A parameter changes with the length of the sample more than the plain model says."
     shows = "differs between lengths only"

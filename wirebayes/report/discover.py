@@ -1,7 +1,6 @@
 """Pictures of a discovery: readings against the plain and the final model, and what the plain one leaves over where."""
 
 import textwrap
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from wirebayes.bayes import noise, result
-from wirebayes.bayes.problem import Sample
-from wirebayes.wire.staircase import linearise
+from wirebayes.discrepancy.locate import COVARIATES
+from wirebayes.wire.staircase import Linearised, linearise
 
 Array = NDArray[Any]
 _MEASURED, _BAND, _HELD = "#1b1b1b", "#4c78a8", "#f2e6d0"
@@ -56,13 +55,11 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
     """
     stored = result.load(folder / "plain", own_effects=own_effects)
     sample, mask = stored.sample, stored.sample.protocol.mask
-    rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
-    line = linearise(sample.protocol, {name: v[rows] for name, v in stored.draws.items()}, sample.model)
+    line, _ = _walked(stored)
     residual = np.where(mask, sample.readings[..., 0] - line.tension.mean(axis=2), 0.0)
     level = residual.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
     for finding in verdict["where"]:
-        label, values = _COVARIATES[finding["covariate"]]
-        x = np.broadcast_to(values(sample), mask.shape)[mask]
+        x = np.broadcast_to(COVARIATES[finding["covariate"]](sample), mask.shape)[mask]
         if finding["p"] > _SHOWN or np.ptp(x) == 0.0:
             continue
         # a pattern within holds is hidden by their levels
@@ -74,7 +71,7 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
         middles = [(x[g].mean(), left[g].mean()) for g in groups]
         axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
         axis.axhline(0.0, color="0.5", lw=0.6)
-        axis.set_xlabel(label)
+        axis.set_xlabel(_LABELS[finding["covariate"]])
         axis.set_ylabel("measured − plain model (N)" + (",\nless its hold's mean" if within else ""))
         axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 110)), loc="left", fontsize=10)
         axis.legend(fontsize=8, frameon=False)
@@ -82,11 +79,16 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
         plt.close(figure)
 
 
-def _residuals(axis: Axes, stored: result.Stored, held: list[int]) -> None:
-    sample = stored.sample
+def _walked(stored: result.Stored) -> tuple[Linearised, dict[str, Array]]:
+    """The staircase under some of the stored draws, and these."""
     rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
     own = {name: values[rows] for name, values in stored.draws.items()}
-    line = linearise(sample.protocol, own, sample.model)
+    return linearise(stored.sample.protocol, own, stored.sample.model), own
+
+
+def _residuals(axis: Axes, stored: result.Stored, held: list[int]) -> None:
+    sample = stored.sample
+    line, own = _walked(stored)
     variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
     width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
     drawn = line.tension + np.random.default_rng(1).normal(size=line.tension.shape) * width
@@ -126,19 +128,13 @@ def _residuals(axis: Axes, stored: result.Stored, held: list[int]) -> None:
 
 _SHOWN = 0.05  # p of a pattern that is worth a picture
 _GROUPS = 12
-_COVARIATES: dict[str, tuple[str, Callable[[Sample], Array]]] = {
-    "hold": ("hold number", lambda s: s.protocol.number[:, None]),
-    "displacement": ("displacement (mm)", lambda s: s.protocol.displacement_mm[:, None]),
-    "time in hold": ("time in hold (s)", lambda s: s.protocol.time_s),
-    "elapsed time": ("elapsed time (s)", lambda s: s.protocol.start_s[:, None] + s.protocol.time_s),
-    "tension": ("tension (N)", lambda s: s.readings[..., 0]),
-    "direction": (
-        "direction of the last step",
-        lambda s: np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0))[:, None],
-    ),
-    "temperature": (
-        "warming (K)",
-        lambda s: np.zeros(s.protocol.time_s.shape) if s.protocol.warming_K is None else s.protocol.warming_K,
-    ),
-    "length": ("length (mm)", lambda s: np.full(s.protocol.time_s.shape, s.protocol.length_mm)),
+_LABELS = {
+    "hold": "hold number",
+    "displacement": "displacement (mm)",
+    "time in hold": "time in hold (s)",
+    "elapsed time": "elapsed time (s)",
+    "tension": "tension (N)",
+    "direction": "direction of the last step",
+    "temperature": "warming (K)",
+    "length": "length (mm)",
 }

@@ -120,6 +120,7 @@ class Effect:
     amplitudes: ClassVar[tuple[Amplitude, ...]]
     sentence: ClassVar[str]
     shows: ClassVar[str] = ""
+    compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
         """The changed value; `own` holds this effect's amplitudes by their short names, each ``(n,)``."""
