@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests import light
-from wirebayes import paper
+from wirebayes import paper, workers
 from wirebayes.bayes import jobs
 from wirebayes.bayes.least_squares import Variant, at, residuals
 from wirebayes.cli import main
-from wirebayes.reproduce import run, verdicts
+from wirebayes.reproduce import verdicts
 from wirebayes.reproduce.held_out import HeldOut, published_course
 from wirebayes.reproduce.pictures import stiffest_step
 
@@ -142,8 +142,8 @@ def test_the_tables_say_what_the_fits_say(whole):
 
 
 def test_a_killed_run_on_one_core_ends_with_the_same_bytes(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(jobs, "_cores", lambda: 1)
-    monkeypatch.setattr(run, "_cores", lambda: 1)
+    monkeypatch.setattr(jobs, "cores", lambda: 1)
+    monkeypatch.setattr(workers, "cores", lambda: 1)
     directory = tmp_path / "out"
 
     def interrupt(name: str, done: float, total: float) -> None:

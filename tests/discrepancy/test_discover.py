@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wirebayes import cli, paper
+from wirebayes import cli, paper, workers
 from wirebayes.discrepancy import expansion, gap, power, screen
 from wirebayes.discrepancy.block import fitted
 from wirebayes.discrepancy.discover import Settings, discover, final_models, investigate
@@ -72,13 +72,26 @@ def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
 
 
 def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_path: Path) -> None:
-    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
-    found = answer(experiments, kinds={name: CATALOGUE[name] for name in ("steady_creep", "sensor_drift")})
+    experiments = made(tmp_path, [Bench()], {"creep_threshold.tau_c": 2.5}, [named("creep_threshold")])
+    found = answer(experiments, kinds={name: CATALOGUE[name] for name in ("steady_creep", "guide_friction", "toe")})
     assert found["verdict"] == "unknown" and found["best"] == "unknown" and found["accepted"] == []
     held = found["held_out"]
     assert held["final"]["rmse_N"] < held["plain"]["rmse_N"] and held["gap_closed"] > 0
     gain, se = held["leave_one_hold_out"].values()
     assert held["shrinks"] == (gain > max(4.0, 2.0 * se))
+
+
+def test_findings_do_not_depend_on_how_many_processes_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
+    kinds = {name: CATALOGUE[name] for name in ("toe", "memory", "steady_creep")}
+    reports = []
+    for cores in (1, 2):
+        monkeypatch.setattr(workers, "cores", lambda cores=cores: cores)
+        with workers.workers() as each:
+            reports.append(investigate(experiments, Settings(kinds=kinds, simulations=FEW), 0, each=each).report)
+    assert json.dumps(reports[0]) == json.dumps(reports[1])
 
 
 def test_a_slip_names_its_hold(tmp_path: Path) -> None:

@@ -163,6 +163,9 @@ class Target:
         self.evaluations = 0
         self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Target, (self.problem,)  # what else there is has closures, which no other process can be sent
+
     def __call__(self, z: Array, readings: Any = None) -> Array:
         """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""
         self.evaluations += len(z)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wirebayes.bayes import ensemble
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.ensemble import Chains
+from wirebayes.bayes.linear import completed, integrated
 from wirebayes.bayes.policy import DEFAULT, Policy
 from wirebayes.bayes.problem import Problem
 
@@ -75,18 +76,22 @@ def fit(
     -------
     Fit
     """
-    target = Target(problem)
+    target = Target(integrated(problem))
+    walked = target.problem.names
     start = None
-    if near is not None and near.keys() >= set(problem.names):
-        start = target.coordinates.to_sampled(np.array([[near[name] for name in problem.names]]))
-    cloud = None if rough is None else target.coordinates.to_sampled(rough)
+    if near is not None and near.keys() >= set(walked):
+        start = target.coordinates.to_sampled(np.array([[near[name] for name in walked]]))
+    cloud = None
+    if rough is not None:
+        cloud = target.coordinates.to_sampled(rough[:, [problem.names.index(name) for name in walked]])
     chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud)
     m, steps, walkers, d = chains.z.shape
     thin = max(1, steps * walkers // STORED_DRAWS)
     z = np.moveaxis(chains.z[:, thin - 1 :: thin], 2, 1)
     log_density = np.moveaxis(chains.log_density[:, thin - 1 :: thin], 2, 1).reshape(m, -1)
-    theta = target.coordinates.to_natural(z.reshape(-1, d)).reshape(m, -1, d)
-    return Fit(problem, theta, log_density, chains, thin)
+    theta = target.coordinates.to_natural(z.reshape(-1, d))
+    _, theta, added = completed(target.problem, theta, np.random.default_rng(seed_of(seed, "completed")))
+    return Fit(problem, theta.reshape(m, -1, theta.shape[1]), log_density + added.reshape(m, -1), chains, thin)
 
 
 def seed_of(seed: int, *words: str) -> int:

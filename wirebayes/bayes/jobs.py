@@ -1,10 +1,8 @@
 """Many fits at once: each in a folder of its own, on all cores, resumed where a run was cut off."""
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from wirebayes.bayes.problem import Likelihood, build
 from wirebayes.effects import catalogue, named
 from wirebayes.experiment import Experiment
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.workers import cores, workers
 
 
 @dataclass(frozen=True)
@@ -69,16 +68,13 @@ def run(
     A fit cut off leaves a checkpoint in its folder, from which the next call goes on to the same bytes.
     """
     todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
-    if len(todo) == 1 or _cores() == 1:
+    if len(todo) == 1 or cores() == 1:
         for job in todo:
             one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
         return
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # inherited by the workers: one BLAS thread each
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with ProcessPoolExecutor(min(_cores(), max(len(todo), 1)), mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(one, job, directory, seed, policy) for job in todo]
-        for done, future in enumerate(as_completed(futures), 1):
-            future.result()
+    work = partial(one, directory=directory, seed=seed, policy=policy)
+    with workers(len(todo)) as each:
+        for done, _ in enumerate(each(work, todo), 1):
             report("fits", done, len(todo))
 
 
@@ -102,7 +98,3 @@ def one(
     for place, sample in zip(job.folders, samples, strict=True):
         save(result, directory / place, about, seed=own_seed, sample=sample)
     checkpoint.unlink(missing_ok=True)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -71,17 +71,9 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
         keep = slice(None) if mask[j].all() else mask[j]
         by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
         r = readings[j][keep] - line.tension[j][keep] - by_c * m
-        cc = np.einsum("rn,rn->n", by_c, by_c) * weight
-        cs = np.einsum("rn,rn->n", by_c, by_s) * weight
-        ss = np.einsum("rn,rn->n", by_s, by_s) * weight
+        cc, cs, ss, det, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, p, setting_var)
         cr = np.einsum("rn,rn->n", by_c, r) * weight
         sr = np.einsum("rn,rn->n", by_s, r) * weight
-        # the difference of two products may come out below zero by rounding
-        det = 1.0 + p * cc + setting_var * ss + p * setting_var * np.maximum(cc * ss - cs * cs, 0.0)
-        # Posterior covariance of (carried creep, setting error), its columns divided by the determinant.
-        v_cc = p * (1.0 + setting_var * ss) / det
-        v_ss = setting_var * (1.0 + p * cc) / det
-        v_cs = -p * setting_var * cs / det
         post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
         pull_c = ((1.0 + setting_var * ss) * cr - setting_var * cs * sr) / det
         pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
@@ -92,6 +84,71 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
         mean[j + 1] = a * (m + post_c) + c * post_s
         var[j + 1] = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
     return Filtered(out, mean, var)
+
+
+def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> tuple[Array, ...]:
+    """What a hold (R, n) tells of the creep carried in, of variance p before, and of its setting error, q.
+
+    Products of the slopes, the determinant by which the readings' covariance exceeds that of sensor errors alone, and
+    the covariance of the two given the readings.
+    """
+    cc = np.einsum("rn,rn->n", by_c, by_c) * weight
+    cs = np.einsum("rn,rn->n", by_c, by_s) * weight
+    ss = np.einsum("rn,rn->n", by_s, by_s) * weight
+    # the difference of two products may come out below zero by rounding
+    det = 1.0 + p * cc + q * ss + p * q * np.maximum(cc * ss - cs * cs, 0.0)
+    return cc, cs, ss, det, p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det
+
+
+def seen(
+    line: Linearised,
+    filtered: Filtered,
+    readings: Array,
+    shapes: Array,
+    mask: Array,
+    variance: Array,
+    setting_sd: Array,
+) -> tuple[Array, Array]:
+    """What the readings say of shapes that may be added to them, V their covariance.
+
+    Parameters
+    ----------
+    line, readings, mask, variance, setting_sd
+        As for `chain`.
+    filtered : Filtered
+        What it returned for them.
+    shapes : (H, R, k) array
+
+    Returns
+    -------
+    (n, k, k) and (n, k) arrays
+        shapesᵀ V⁻¹ shapes and shapesᵀ V⁻¹ (readings - tension).
+    """
+    holds, _, n = line.tension.shape
+    k = shapes.shape[2]
+    gram, along = np.zeros((k, k, n)), np.zeros((k, n))
+    mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings
+    q, weight = setting_sd * setting_sd, 1.0 / variance
+    for j in range(holds):
+        a, c = line.carry_by_creep[j], line.carry_by_setting[j]
+        keep = mask[j]
+        if not keep.any():
+            mean = a * mean
+            continue
+        by_c, by_s, f = line.by_creep[j][keep], line.by_setting[j][keep], shapes[j][keep]
+        r = readings[j][keep] - line.tension[j][keep] - by_c * filtered.carried_mean[j]
+        cc, cs, _, _, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, filtered.carried_var[j], q)
+        cr = np.einsum("rn,rn->n", by_c, r) * weight
+        sr = np.einsum("rn,rn->n", by_s, r) * weight
+        fc, fs, fr = (f.T @ v * weight for v in (by_c, by_s, r))
+        both = (f.T @ f)[..., None] * weight - mean[:, None] * fc - fc[:, None] * mean + cc * mean[:, None] * mean
+        # From here on what is left of the shapes beside the creep that they would have carried in.
+        fr, fc, fs = fr - mean * cr, fc - cc * mean, fs - cs * mean
+        post_c, post_s = v_cc * fc + v_cs * fs, v_cs * fc + v_ss * fs
+        gram += both - fc[:, None] * post_c - fs[:, None] * post_s
+        along += fr - post_c * cr - post_s * sr
+        mean = a * (mean + post_c) + c * post_s
+    return np.moveaxis(gram, -1, 0), along.T
 
 
 def jacobian(line: Linearised) -> Array:

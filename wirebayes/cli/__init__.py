@@ -3,7 +3,6 @@
 Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wrong is a bug and shows its traceback.
 """
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -13,6 +12,7 @@ import typer
 
 from wirebayes import __version__
 from wirebayes.errors import InputError
+from wirebayes.workers import one_thread_each
 
 
 class Command(NamedTuple):
@@ -88,9 +88,6 @@ COMMANDS = {
 }
 
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -104,8 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 2 bad input or usage.
     """
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")  # small matrices: more threads only fight over them
+    one_thread_each()  # small matrices: more threads only fight over them
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     called = next((word for word in arguments if not word.startswith("-")), None)
     try:

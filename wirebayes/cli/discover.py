@@ -44,6 +44,7 @@ def discover(
     from wirebayes.effects import catalogue
     from wirebayes.experiment import read_experiments, select
     from wirebayes.output import open_run, write_json
+    from wirebayes.workers import workers
 
     experiments = select(read_experiments(file), experiment)
     if train_holds is not None:
@@ -59,7 +60,8 @@ def discover(
     if opened.state == "done":
         return
     with progress() as report:
-        findings = investigate(experiments, Settings(elastic_law, history, kinds), seed, report)
+        with workers(own_effects=own_effects) as each:
+            findings = investigate(experiments, Settings(elastic_law, history, kinds), seed, report, each)
         jobs = _jobs(findings, elastic_law, history, own_effects)
         run(jobs, output, seed, report=report)
     _pictures(findings, output, own_effects)

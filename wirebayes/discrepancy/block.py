@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.bayes.coordinates import Target
+from wirebayes.bayes.linear import integrated
 from wirebayes.bayes.optimum import Optimum, climb, modes
 from wirebayes.bayes.problem import Problem, build
 from wirebayes.experiment import Experiment
@@ -88,8 +89,11 @@ def fitted(
     rng: np.random.Generator,
     near: Array | None = None,
 ) -> Block:
-    """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given."""
-    target = Target(build(experiments, effects, law=law, history=history))
+    """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given.
+
+    What the readings depend on linearly is integrated out (see `wirebayes.bayes.linear`).
+    """
+    target = Target(integrated(build(experiments, effects, law=law, history=history)))
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
     return Block(tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng))

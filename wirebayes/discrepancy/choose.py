@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,12 @@ from wirebayes.discrepancy.block import Block
 from wirebayes.discrepancy.expansion import Probe, Scan
 from wirebayes.discrepancy.naming import Refit, probabilities, refit, smallest_set
 from wirebayes.discrepancy.screen import Candidate, flexible_log_bayes, log_bayes
+from wirebayes.wire.effect import Effect
+from wirebayes.workers import Each
 
 Array = NDArray[Any]
+_Form = tuple[str, str, tuple[int, ...], bool]  # name, key of the effect, blocks, one amplitude for all
+_Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
 UNKNOWN_WEIGHT = 1.0  # prior odds of *something unknown* to one named effect
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
 _MOST, _MOST_A_NAME = 16, 3
@@ -59,11 +64,15 @@ def choose(
     candidates: Sequence[Candidate],
     scans: Sequence[Scan],
     further: Mapping[Candidate, float] = {},
+    each: Each = map,
 ) -> Choice:
-    """Evidence of every name, refitted where the scan, or the look from further out, gives it a chance."""
+    """Evidence of every name, refitted where the scan, or the look from further out, gives it a chance.
+
+    Refits are independent of each other, and `each` may be a `map` over processes.
+    """
     linear = [tuple(float(v[0]) for v in log_bayes(c, scans)) for c in candidates]
-    forms: dict[tuple[str, str, tuple[int, ...], bool], int] = {}
-    promise: dict[tuple[str, str, tuple[int, ...], bool], float] = {}
+    forms: dict[_Form, int] = {}
+    promise: dict[_Form, float] = {}
     for i, c in enumerate(candidates):
         effect = trials[c.probe].effect
         form = (c.name, effect.key, c.blocks, c.shared)
@@ -72,24 +81,24 @@ def choose(
             forms[form] = i
     ranked = sorted(forms.items(), key=lambda item: -promise[item[0]])
     top = promise[ranked[0][0]]
-    refitted: dict[tuple[str, str, tuple[int, ...], bool], list[Refit]] = {}
     near = [f for f, _ in ranked if promise[f] >= top - _MARGIN - _SHARE * max(top, 0.0)][:_MOST]
     names = {name for name, *_ in near}
+    tried: dict[_Form, list[_Place]] = {}
+    tasks: dict[_Place, tuple[Effect, float, float]] = {}
     for form, i in ranked:
         # A name that stands a chance is refitted in its other forms too: the scan may have taken the wrong one.
-        if form[0] not in names or sum(f[0] == form[0] for f in refitted) >= _MOST_A_NAME:
+        if form[0] not in names or sum(f[0] == form[0] for f in tried) >= _MOST_A_NAME:
             continue
         c = candidates[i]
         effect = trials[c.probe].effect
-        if c.shared:
-            refitted[form] = [refit(blocks, c.blocks, effect, linear[i][2], linear[i][1])]
-        else:
-            alone = [Candidate(c.probe, c.name, (b,), True) for b in c.blocks]
-            parts = [log_bayes(a, scans) for a in alone]
-            refitted[form] = [
-                refit(blocks, a.blocks, effect, float(p[2][0]), float(p[1][0]))
-                for a, p in zip(alone, parts, strict=True)
-            ]
+        tried[form] = [(effect.key, on) for on in ([c.blocks] if c.shared else [(b,) for b in c.blocks])]
+        for place in tried[form]:
+            # Each block on its own is a form too, and need not be refitted twice.
+            _, guess, per_delta = log_bayes(Candidate(c.probe, c.name, place[1], True), scans)
+            tasks.setdefault(place, (effect, float(per_delta[0]), float(guess[0])))
+    done = each(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
+    found = dict(zip(tasks, done, strict=True))
+    refitted = {form: [found[place] for place in places] for form, places in tried.items()}
     values: dict[str, dict[tuple[str, tuple[int, ...], bool], float]] = {}
     for form, i in forms.items():
         value = sum(r.log_bayes for r in refitted[form]) if form in refitted else linear[i][0]

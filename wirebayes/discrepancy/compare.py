@@ -1,11 +1,9 @@
 """Models side by side: each hold left out in turn, and the last holds predicted from the first."""
 
-import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +18,7 @@ from wirebayes.discrepancy.loho import loho
 from wirebayes.effects import catalogue
 from wirebayes.experiment import Experiment
 from wirebayes.output import write_json
+from wirebayes.workers import workers
 
 Array = NDArray[np.float64]
 POLICY = Policy(walkers=128, ess=2000.0, most_steps=1200)
@@ -143,20 +142,11 @@ def run(
 ) -> None:
     """Judge all models whose file is not there yet, on all cores; the results do not depend on how many there are."""
     todo = [task for task in tasks if not (directory / task.file).exists()]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     for task in todo:
         (directory / task.file).parent.mkdir(parents=True, exist_ok=True)
-    if cores == 1 or len(todo) < 2:
-        for done, task in enumerate(todo, 1):
-            _store(task, directory, seed, policy)
-            report("models", done, len(todo))
-        return
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # inherited by the workers: one BLAS thread each
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with ProcessPoolExecutor(min(cores, len(todo)), mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(_store, task, directory, seed, policy) for task in todo]
-        for done, future in enumerate(as_completed(futures), 1):
-            future.result()
+    work = partial(_store, directory=directory, seed=seed, policy=policy)
+    with workers(len(todo)) as each:
+        for done, _ in enumerate(each(work, todo), 1):
             report("models", done, len(todo))
 
 

@@ -6,6 +6,7 @@ a flexible reference; further effects by leave-one-hold-out; the gap on held-out
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from wirebayes.discrepancy.choose import UNKNOWN_WEIGHT, Choice
 from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
 from wirebayes.discrepancy.naming import probabilities
 from wirebayes.discrepancy.outward import outward
-from wirebayes.discrepancy.screen import Candidate, GlobalTest
+from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates
 from wirebayes.discrepancy.sharing import informed
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
@@ -26,12 +27,14 @@ from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.workers import Each
 
 Array = NDArray[Any]
 ALPHA = 0.04
 PLAIN_TO_SEE = 0.002  # p of the linear scan at which no look from further out could change the verdict
 ALPHA_AFTER = 0.03
 KEEP_ELPD = 4.0
+_WORTH_A_REFIT, _WORTH_ADDING = 1.3, 2.0  # log Bayes factors of a second effect: by scan, and refitted
 _MOST_EFFECTS = 2
 _NEAR, _MOST_COMPANY = 4.0, 2  # names this close to the best one are looked at again, so many
 _LEFT_OVER = 8.0  # the most that a second effect may explain of what one unknown form leaves over beside a name
@@ -101,6 +104,7 @@ def investigate(
     settings: Settings,
     seed: int = 0,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    each: Each = map,
 ) -> Findings:
     """Judge the experiments of one file together.
 
@@ -111,6 +115,8 @@ def investigate(
     seed : int
     report : function of (what, done, total)
         Told as the work goes on.
+    each : function, optional
+        The built-in `map`, or one over processes (`wirebayes.workers`); the findings are the same.
 
     Returns
     -------
@@ -120,7 +126,8 @@ def investigate(
     groups: dict[str, list[Experiment]] = {}
     for e in experiments:
         groups.setdefault(e.material, []).append(e)
-    plain = [fitted(members, (), settings.law, settings.history, rng) for members in groups.values()]
+    laws = repeat(settings.law), repeat(settings.history)
+    plain = list(each(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
     trials, candidates = screen.candidate_probes(plain, settings.kinds)
     if not candidates:
         raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
@@ -128,21 +135,23 @@ def investigate(
     for i, block in enumerate(plain):
         plain[i], gone = _strike_gross_errors(block, trials, candidates, i, settings, rng)
         struck += gone
-    data, simulated, patterns, expansions = [], [], [], []
-    for i, block in enumerate(plain):
+    data, simulated, patterns, expansions = [], list[Replicates](), [], []
+    for block in plain:
         listed, columns = locate.patterns(block.target.problem)
         x = expand(block.target, block.modes.z[:1], trials, columns=columns)
         expansions.append(x)
         data.append(scan(x))
-        simulated.append(screen.replicated(block, trials, settings.simulations, rng, columns))
         patterns.append(listed)
-        report("simulations", i + 1, len(plain))
+    of_each = repeat(trials), repeat(settings.simulations), rng.spawn(len(plain))
+    for replicates in each(_simulated, plain, *of_each):
+        simulated.append(replicates)
+        report("simulations", len(simulated), len(plain))
     nulls = [s.scan for s in simulated]
     test = screen.global_test(candidates, data, nulls)
     further: dict[Candidate, float] = {}
     if test.p > max(PLAIN_TO_SEE, 1.0 / (1 + settings.simulations)):
         report("larger effects", 0, 1)
-        test, further = outward(plain, trials, candidates, data, simulated, test)
+        test, further = outward(plain, trials, candidates, data, simulated, test, each)
         report("larger effects", 1, 1)
     where = [
         locate.findings(p, len(trials), d, n, ", ".join(b.names))
@@ -153,8 +162,8 @@ def investigate(
         final = plain
     else:
         report("naming", 0, 1)
-        choice = choose.choose(plain, trials, candidates, data, further)
-        verdict, accepted, final, choice = _decide(plain, choice, settings, rng)
+        choice = choose.choose(plain, trials, candidates, data, further, each)
+        verdict, accepted, final, choice = _decide(plain, choice, settings, rng, each)
         for a in accepted:
             if len(a.effects) > 1 and settings.kinds[a.name].scope in screen.FILE_WIDE:
                 final = informed(final, a.effects, rng)
@@ -167,7 +176,7 @@ def investigate(
         affected = [a for a in accepted if i in a.blocks]
         common = _common(verdict, choice, affected, plain, final[i], i, test.p, where[i], alike)
         common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
-        checks = _held_out(block, final[i], verdict, rng)
+        checks = _held_out(block, final[i], verdict, rng, each)
         for e, check in zip(block.experiments, checks, strict=True):
             out[e.name] = common | {
                 "held_out": check,
@@ -223,6 +232,10 @@ class _Accepted:
     effects: dict[int, Effect]
 
 
+def _simulated(block: Block, trials: list[Probe], n: int, rng: np.random.Generator) -> Replicates:
+    return screen.replicated(block, trials, n, rng, locate.patterns(block.target.problem)[1])
+
+
 def _strike_gross_errors(
     block: Block, trials: list[Probe], candidates: list[Candidate], i: int, settings: Settings, rng: np.random.Generator
 ) -> tuple[Block, list[dict[str, Any]]]:
@@ -243,41 +256,54 @@ def _strike_gross_errors(
 
 
 def _decide(
-    plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator
+    plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator, each: Each
 ) -> tuple[str, list[_Accepted], list[Block], Choice]:
     """Verdict, accepted effects in order, final blocks, and the choice as revised by pairs of effects."""
-    choice = _with_company(plain, choice, settings, rng)
+    choice, added = _with_company(plain, choice, settings, rng, each)
     if choice.best == "unknown":
         return "unknown", [], plain, choice
-    blocks, accepted = _add(plain, choice, choice.best, settings, rng)
-    done = [accepted]
-    while len(done) < _MOST_EFFECTS:
-        trials, candidates, scans = _scanned(blocks, settings)
-        if not candidates:
-            break
-        if max(float(screen.log_bayes(c, scans)[0][0]) for c in candidates) < KEEP_ELPD - 2.0:
-            break
-        further = choose.choose(blocks, trials, candidates, scans)
-        name = max(further.winners, key=lambda n: further.log_bayes[n])
-        if further.log_bayes[name] < 2.0:
+    blocks, done, further = added[choice.best].blocks, [added[choice.best].accepted], added[choice.best].further
+    while further is not None and len(done) < _MOST_EFFECTS:
+        name = max(further.winners, key=further.log_bayes.__getitem__)
+        if further.log_bayes[name] < _WORTH_ADDING:
             break
         more, extra = _add(blocks, further, name, settings, rng)
-        gain = sum(
-            float((gap.leave_one_hold_out(m, rng) - gap.leave_one_hold_out(b, rng)).sum())
-            for i, (m, b) in enumerate(zip(more, blocks, strict=True))
-            if i in extra.blocks
-        )
-        if gain <= KEEP_ELPD:
+        after, before = ([version[b] for b in extra.blocks] for version in (more, blocks))
+        elpd = [v.sum() for v in each(gap.leave_one_hold_out, after + before, rng.spawn(2 * len(after)))]
+        if sum(elpd[: len(after)]) - sum(elpd[len(after) :]) <= KEEP_ELPD:
             break
         blocks, done = more, [*done, extra]
-    choice = _retested(blocks, choice, settings, rng)
+        further = _beside(blocks, settings, each)[0] if len(done) < _MOST_EFFECTS else None
+    choice = _retested(blocks, choice, settings, rng, each)
     if choice.best == "unknown":
         return "unknown", [], plain, choice
     return "named" if choice.set == [choice.best] else "ambiguous", done, blocks, choice
 
 
-def _with_company(plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator) -> Choice:
+@dataclass(frozen=True)
+class _Added:
+    """The blocks with a name in them, and what would come next: None where nothing has a chance."""
+
+    blocks: list[Block]
+    accepted: _Accepted
+    further: Choice | None
+
+
+def _beside(blocks: list[Block], settings: Settings, each: Each) -> tuple[Choice | None, float]:
+    """What could be added to fitted blocks, if anything has a chance, and the flexible reference's evidence."""
+    trials, candidates, scans = _scanned(blocks, settings)
+    loose = choose.flexible_evidence(scans)
+    if max((float(screen.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) < _WORTH_A_REFIT:
+        return None, loose
+    return choose.choose(blocks, trials, candidates, scans, each=each), loose
+
+
+def _with_company(
+    plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator, each: Each
+) -> tuple[Choice, dict[str, _Added]]:
     """The likeliest names once more, each together with a second effect, and together with the flexible reference.
+
+    The best of the new choice, unless it is *unknown*, is among those added.
 
     A pair has prior odds of a tenth to one effect, shared by all second effects, and counts for the name. A name that
     needs the flexible reference beside it is only like what is missing: that counts for *unknown*. So does a small
@@ -288,22 +314,25 @@ def _with_company(plain: list[Block], choice: Choice, settings: Settings, rng: n
     names = [n for n in names if choice.log_bayes[n] > choice.log_bayes[names[0]] - _NEAR][:_MOST_COMPANY]
     odds = np.log(0.1) - np.log(len(settings.kinds))
     evidence, unknown = dict(choice.log_bayes), choice.unknown
-    for name in names:
-        blocks, _ = _add(plain, choice, name, settings, rng)
-        trials, candidates, scans = _scanned(blocks, settings)
-        beside = choose.flexible_evidence(scans) + np.log(0.5 / len(names))
+    known: dict[str, _Added] = {}
+    with_one = each(_add, repeat(plain), repeat(choice), names, repeat(settings), rng.spawn(len(names)))
+    for name, (blocks, accepted) in zip(names, with_one, strict=True):
+        further, loose = _beside(blocks, settings, each)
+        known[name] = _Added(blocks, accepted, further)
+        beside = loose + np.log(0.5 / len(names))
         unknown = float(np.logaddexp(unknown, choice.log_bayes[name] + beside))
-        if max((float(screen.log_bayes(c, scans)[0][0]) for c in candidates), default=0.0) + odds < -_NEAR:
+        if further is None:
             continue
-        further = choose.choose(blocks, trials, candidates, scans)
         pair = max((further.log_bayes[n] for n in further.winners), default=-np.inf)
         evidence[name] = float(np.logaddexp(evidence[name], choice.log_bayes[name] + odds + pair))
         alike = choice.log_bayes[name] + odds + np.log(2.0) + min(pair, _LEFT_OVER)
         unknown = float(np.logaddexp(unknown, alike))
-    return _weighed(replace(choice, log_bayes=evidence, unknown=unknown))
+    return _weighed(replace(choice, log_bayes=evidence, unknown=unknown)), known
 
 
-def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator) -> Choice:
+def _retested(
+    blocks: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator, each: Each
+) -> Choice:
     """The global test again, with what was accepted inside: a name that leaves too much over gives way to *unknown*.
 
     At `ALPHA_AFTER` both are as likely; below it the odds grow as p to the power -0.8, the density that p has where
@@ -312,7 +341,8 @@ def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.r
     trials, candidates, scans = _scanned(blocks, settings)
     if not candidates:
         return choice
-    nulls = [screen.replicated(b, trials, _RETESTS, rng).scan for b in blocks]
+    simulated = each(screen.replicated, blocks, repeat(trials), repeat(_RETESTS), rng.spawn(len(blocks)))
+    nulls = [s.scan for s in simulated]
     p = screen.global_test(candidates, scans, nulls).p
     if p > ALPHA_AFTER:
         return choice
@@ -424,7 +454,9 @@ def _outlook(
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
 
 
-def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator) -> list[dict[str, Any]]:
+def _held_out(
+    block: Block, final: Block, verdict: str, rng: np.random.Generator, each: Each
+) -> list[dict[str, Any]]:
     """Plain and final model on the last third of the holds, and by leaving out one hold at a time."""
     train = [gap.last_third(e) for e in block.experiments]
     if not all(train):
@@ -439,19 +471,26 @@ def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator
             }
             for _ in block.experiments
         ]
-    plain = gap.held_out(block.experiments, train, (), block, rng)
-    better, whole = plain, list[Block]()
+    asked: list[tuple[Any, ...]] = [(block.experiments, train, (), block)]
+    whole = list[Block]()
     if verdict == "unknown":
-        better = []
-        for e, k in zip(block.experiments, train, strict=True):
-            whole.append(fitted([e], [_unnamed(block, e, rng)], block.law, block.history, rng))
-            better += gap.held_out([e], [k], [_unnamed(block, e.train(k), rng)], block, rng)
+        n = len(train)
+        first = [e.train(k) for e, k in zip(block.experiments, train, strict=True)]
+        unnamed = list(each(_unnamed, repeat(block), [*block.experiments, *first], rng.spawn(2 * n)))
+        alone, added = [(e,) for e in block.experiments], [(d,) for d in unnamed]
+        whole += each(fitted, alone, added[:n], repeat(block.law), repeat(block.history), rng.spawn(n))
+        asked += zip(alone, [(k,) for k in train], added[n:], repeat(block), strict=False)
     elif final.effects:
-        better, whole = gap.held_out(block.experiments, train, final.effects, final, rng), [final]
+        asked.append((block.experiments, train, final.effects, final))
+        whole.append(final)
+    predicted = each(gap.held_out, *zip(*asked, strict=True), rng.spawn(len(asked)))
+    left_out = each(gap.leave_one_hold_out, [block, *whole], rng.spawn(1 + len(whole)))  # at the same time
+    plain, *parts = predicted
+    better = [h for part in parts for h in part] or plain
     shrinks, loho = False, None
     if whole:
-        each = np.concatenate([gap.leave_one_hold_out(b, rng) for b in whole])
-        difference = each - gap.leave_one_hold_out(block, rng)
+        without, *elpd = left_out
+        difference = np.concatenate(elpd) - without
         se = float(difference.std(ddof=1) * np.sqrt(len(difference)))
         loho = {"elpd_difference": float(difference.sum()), "elpd_difference_se": se}
         shrinks = bool(difference.sum() > KEEP_ELPD and difference.sum() > 2 * se)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.bayes import noise, quick
-from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.problem import build
+from wirebayes.bayes.linear import completed
+from wirebayes.bayes.problem import Problem, build
 from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.experiment import Experiment
 from wirebayes.wire.effect import Effect
@@ -79,13 +79,13 @@ def held_out(
     first = [e.train(k) for e, k in zip(experiments, train, strict=True)]
     near = block.target.coordinates.to_natural(block.modes.z[:1])[0] if block.effects == tuple(effects) else None
     trained = fitted(first, effects, block.law, block.history, rng, near)
-    theta = quick.draws(trained.target, trained.modes, rng, 500)
+    problem, theta = _draws(trained, rng, 500)
     whole = build(experiments, effects, law=block.law, history=block.history)
     # The training readings' reference tension belongs to the parameters.
-    models = [s.model for s in trained.target.problem.samples]
+    models = [s.model for s in problem.samples]
     out: list[HeldOut] = []
     for sample, model, k in zip(whole.samples, models, train, strict=True):
-        own = trained.target.problem.parameters(theta, trained.target.problem.samples[len(out)])
+        own = problem.parameters(theta, problem.samples[len(out)])
         line = linearise(sample.protocol, own, model)
         variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
         last = np.flatnonzero(sample.protocol.recorded)[k:]
@@ -133,13 +133,9 @@ def leave_one_hold_out(block: Block, rng: np.random.Generator) -> Array:
     Weights are truncated at the square root of their number; a weight that would need more is a hold that the others
     do not predict, which its small density says already.
     """
-    target: Target = block.target
-    theta = quick.draws(target, block.modes, rng, 1500)
+    problem, theta = _draws(block, rng, 1500)
     values = np.concatenate(
-        [
-            v[s.protocol.recorded]
-            for v, s in zip(target.problem.leave_one_hold_out(theta), target.problem.samples, strict=True)
-        ]
+        [v[s.protocol.recorded] for v, s in zip(problem.leave_one_hold_out(theta), problem.samples, strict=True)]
     )
     values = np.where(np.isfinite(values), values, -1e6)
     log_weight = -values - logsumexp(-values, axis=1, keepdims=True)
@@ -147,3 +143,9 @@ def leave_one_hold_out(block: Block, rng: np.random.Generator) -> Array:
     log_weight = np.minimum(log_weight, ceiling)
     log_weight -= logsumexp(log_weight, axis=1, keepdims=True)
     return np.asarray(logsumexp(log_weight + values, axis=1))
+
+
+def _draws(block: Block, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:
+    """The problem with all parameters of a block, and n rough draws of its posterior."""
+    problem, theta, _ = completed(block.target.problem, quick.draws(block.target, block.modes, rng, n), rng)
+    return problem, theta

@@ -74,9 +74,9 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
     def curve(amplitudes: Array, start: list[Array] | None) -> tuple[Array, list[Array]]:
         total, ends = np.zeros(len(amplitudes)), []
         for i, p in enumerate(pinned):
-            begin = starts[i] if start is None else start[i][None]
-            k = len(begin)
-            found = p.climb(np.tile(begin, (len(amplitudes), 1)), np.repeat(amplitudes, k))
+            begin = np.tile(starts[i], (len(amplitudes), 1)) if start is None else start[i]
+            k = len(begin) // len(amplitudes)
+            found = p.climb(begin, np.repeat(amplitudes, k))
             value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
             pick = np.argmax(value, axis=1)
             total = total + value[np.arange(len(amplitudes)), pick]
@@ -100,7 +100,7 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
             right = grid[best + 1] if best + 1 < len(grid) else grid[best]
             finer = np.linspace(left, right, 8)[1:-1]
             refined += 1
-        more, more_ends = curve(finer, [e[best] for e in ends])
+        more, more_ends = curve(finer, [_between(grid, e, best, finer) for e in ends])
         grid, value = np.concatenate([grid, finer]), np.concatenate([value, more])
         ends = [np.concatenate([e, m]) for e, m in zip(ends, more_ends, strict=True)]
         grid, order = np.unique(grid, return_index=True)
@@ -110,6 +110,15 @@ def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_del
     log_bayes = float(value[best] + occam(one_sided))
     theta = tuple(p.natural(e[best][None], grid[best : best + 1])[0] for p, e in zip(pinned, ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(grid[best]), sd, theta)
+
+
+def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:
+    """(m, d) where climbs with `finer` amplitudes begin: on the line from the best place to its neighbour's."""
+    aside = np.where(finer < grid[best], max(best - 1, 0), min(best + 1, len(grid) - 1))
+    apart = grid[aside] - grid[best]
+    share = np.divide(finer - grid[best], apart, out=np.zeros(len(finer)), where=apart != 0)
+    near = np.isfinite(ends[aside]).all(axis=1) & (share <= 1.0)
+    return np.asarray(ends[best] + np.where(near, share, 0.0)[:, None] * (ends[aside] - ends[best]))
 
 
 def _width(grid: Array, value: Array, best: int, fallback: float) -> float:

@@ -8,6 +8,7 @@ same ladders, so what is found on the way has its chance level.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from wirebayes.discrepancy.expansion import (
 from wirebayes.discrepancy.naming import occam
 from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
 from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.workers import Each
 
 Array = NDArray[Any]
 _FIRST, _LAST = 1.5, 24.0  # δ of the rungs
@@ -336,6 +338,7 @@ def outward(
     data: Sequence[Scan],
     simulated: Sequence[Replicates],
     test: GlobalTest,
+    each: Each = map,
 ) -> tuple[GlobalTest, dict[Candidate, float]]:
     """The global test with every effect led up its ladder, in the data and in the simulations alike.
 
@@ -348,7 +351,7 @@ def outward(
     """
     ways = ladders(blocks, trials, candidates, data)
     own = [(b.modes.z[:1], None) for b in blocks]
-    found = strengths(ways, [{b: climb(blocks[b], way, *own[b]) for b in way.blocks} for way in ways])
+    found = strengths(ways, list(each(_climbs, ways, repeat(blocks), repeat(own))))
     linear = by_name(candidates, data)
     value = {c.name: float(linear[c.name][0]) for c in found}
     for c, strength in found.items():
@@ -356,27 +359,32 @@ def outward(
     lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in value.items()}
     surprises = dict(test.surprises)
     for name in sorted((n for n in lead if lead[n] > 0), key=lambda n: -lead[n])[:_TRIED]:
-        chance = _chance(value[name], name, test.chance[name], blocks, ways, simulated)
+        own_ways = [way for way in ways if way.effect.name == name]
+        chance = _chance(value[name], test.chance[name], blocks, own_ways, simulated, each)
         surprises[name] = surprise(value[name], chance)
         if surprises[name] > test.null.max():
             break
     return replace(test, surprises=surprises), {c: float(v[0]) for c, v in found.items()}
 
 
+def _climbs(way: Ladder, blocks: Sequence[Block], plain: Sequence[tuple[Array, Any]]) -> dict[int, Climbed]:
+    """A ladder climbed on all its blocks, from plain fits and their readings, a block each."""
+    return {b: climb(blocks[b], way, *plain[b]) for b in way.blocks}
+
+
 def _chance(
     value: float,
-    name: str,
     linear: Array,
     blocks: Sequence[Block],
     ways: Sequence[Ladder],
     simulated: Sequence[Replicates],
+    each: Each,
 ) -> Array:
     """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more of them than it takes."""
-    own = [way for way in ways if way.effect.name == name]
     out = np.empty(0)
     while len(out) < len(linear) and (out >= value).sum() < _ENOUGH:
         rows = slice(len(out), len(out) + (_ROWS if len(out) else _FIRST_ROWS))
         part = [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated]
-        climbed = strengths(own, [{b: climb(blocks[b], way, *part[b]) for b in way.blocks} for way in own])
+        climbed = strengths(ways, list(each(_climbs, ways, repeat(blocks), repeat(part))))
         out = np.append(out, np.max([linear[rows], *climbed.values()], axis=0))
     return out

@@ -1,6 +1,7 @@
 """The catalogue of effects, one small class each, a module per part of the bench."""
 
 import importlib.util
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -51,6 +52,7 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     if spec is None or spec.loader is None:
         raise InputError(f"{own}: not a Python file (its name should end in .py)")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # so that other processes can be sent its effects
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever the user's file raises is told in one line

@@ -39,6 +39,7 @@ class Discrepancy(Effect):
     scope = "environment"
     sentence = "Something is missing that has no name here; its size was learned from the readings."
     shows = "smooth over holds and time"
+    adds = True
 
     @property
     def key(self) -> str:

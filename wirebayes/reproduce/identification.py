@@ -1,7 +1,6 @@
 """Table 4 beside least squares of our own: published and refitted parameters in every reading of the model."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from wirebayes.bayes.fit import seed_of
 from wirebayes.bayes.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
 from wirebayes.experiment import Experiment
+from wirebayes.workers import Each
 
 Row = dict[str, Any]
 
@@ -18,7 +18,7 @@ def rows(
     published: Mapping[str, Mapping[str, float]],
     training_holds: int,
     seed: int,
-    pool: ProcessPoolExecutor | None = None,
+    each: Each = map,
 ) -> list[Row]:
     """One row for each wire, variant and source of the parameters.
 
@@ -29,7 +29,8 @@ def rows(
     training_holds : int
         Both are adjusted to these first holds: all parameters, or the preload that the published ones lack.
     seed : int
-    pool : ProcessPoolExecutor, optional
+    each : function, optional
+        The built-in `map`, or one over processes.
 
     Returns
     -------
@@ -37,8 +38,7 @@ def rows(
         Parameters, and the rms of what each predicts on the training holds, on the rest and on all, in N.
     """
     wires = [(e, dict(published[e.name]), training_holds, seed) for e in experiments]
-    found = map(_wire, wires) if pool is None else pool.map(_wire, wires)
-    return [row for part in found for row in part]
+    return [row for part in each(_wire, wires) for row in part]
 
 
 def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:

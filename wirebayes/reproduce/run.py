@@ -1,10 +1,7 @@
 """``wirebayes reproduce``, step by step: fits, tables, pictures, page."""
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +20,7 @@ from wirebayes.output import open_run, write_csv, write_json
 from wirebayes.report.page import write as write_page
 from wirebayes.reproduce import identification, pictures, section_4, verdicts
 from wirebayes.reproduce.held_out import HeldOut, held_out
+from wirebayes.workers import workers
 
 Array = NDArray[Any]
 Row = dict[str, Any]
@@ -105,8 +103,8 @@ def _tables_and_pictures(
     report: Callable[[str, float, float], None],
 ) -> None:
     table_4 = published["table_4"]
-    with ProcessPoolExecutor(min(len(experiments), _cores()), mp_context=get_context("spawn")) as pool:
-        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, pool))
+    with workers(len(experiments)) as each:
+        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, each))
     report("tables and pictures", 1, 3)
     posterior: list[Row] = []
     creep: list[Row] = []
@@ -231,7 +229,3 @@ def _not_converged(directory: Path, jobs: Sequence[Job]) -> list[str]:
         if not summary["converged"]:
             lines.append(f"{job.folder}: {summary['convergence']}")
     return lines
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

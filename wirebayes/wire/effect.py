@@ -120,6 +120,7 @@ class Effect:
     amplitudes: ClassVar[tuple[Amplitude, ...]]
     sentence: ClassVar[str]
     shows: ClassVar[str] = ""
+    adds: ClassVar[bool] = False  # a sum to the reading, of each amplitude times a function of hold and time alone
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:

@@ -1,0 +1,51 @@
+"""Independent work on all cores; what comes out does not depend on how many there are."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+Each = Callable[..., Iterable[Any]]  # as the built-in `map`
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def one_thread_each() -> None:
+    """One thread for linear algebra, here and in processes started later, unless the user said otherwise."""
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def workers(most: int | None = None, own_effects: Path | None = None) -> Iterator[Each]:
+    """A `map` over processes, as many as there are cores, be it one: what is sent may lose its last bit on the way.
+
+    Parameters
+    ----------
+    most : int, optional
+        No more processes than there are pieces of work; the built-in `map` for a single one.
+    own_effects : Path, optional
+        The user's file of effects, which the processes must know too.
+    """
+    if most == 1:
+        yield map
+        return
+    n = cores() if most is None else min(cores(), most)
+    one_thread_each()
+    with ProcessPoolExecutor(n, get_context("spawn"), _prepare, (own_effects,)) as pool:
+        for _ in range(n):
+            pool.submit(cores)  # processes start now, not when they are needed
+        yield pool.map
+
+
+def _prepare(own_effects: Path | None) -> None:
+    from wirebayes.effects import catalogue  # the command line imports this module before it knows what is asked
+
+    catalogue(own_effects)
