@@ -25,20 +25,23 @@ def cores() -> int:
 
 @contextmanager
 def workers(most: int | None = None, own_effects: Path | None = None) -> Iterator[Each]:
-    """A `map` over processes, as many as there are cores, be it one: what is sent may lose its last bit on the way.
+    """A `map` over processes, as many as there are cores.
+
+    There are processes on one core, too: a copy that was sent may be laid out otherwise in memory, which changes the last
+    bit of what is computed with it.
 
     Parameters
     ----------
     most : int, optional
-        No more processes than there are pieces of work; the built-in `map` for a single one.
+        Pieces of work, where their number is known: no more processes than that, and none for a single piece.
     own_effects : Path, optional
         The user's file of effects, which the processes must know too.
     """
-    if most == 1:
+    if most is not None and most < 2:
         yield map
         return
-    n = cores() if most is None else min(cores(), most)
     one_thread_each()
+    n = cores() if most is None else min(cores(), most)
     with ProcessPoolExecutor(n, get_context("spawn"), _prepare, (own_effects,)) as pool:
         for _ in range(n):
             pool.submit(cores)  # processes start now, not when they are needed

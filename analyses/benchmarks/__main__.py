@@ -29,6 +29,7 @@ PEERS = {
     "emcee stretch, natural": lambda p, s, t: plain.stretch(p, s, t, True),
     "emcee stretch, our coordinates": lambda p, s, t: plain.stretch(p, s, t, False),
     "dynesty, unit cube": plain.dynesty_run,
+    "dynesty with random walks, unit cube": lambda p, s, t: plain.dynesty_run(p, s, t, "rwalk"),
     "nutpie, natural": lambda p, s, t: gradient.nutpie_run(p, s, t, True),
     "nutpie, our coordinates": lambda p, s, t: gradient.nutpie_run(p, s, t, False),
 }
@@ -71,7 +72,7 @@ def main():
         tried = sum(name in c["peers"] for c in cases)
         if tried:
             told = f"{np.median(ratios):8.1f} {min(ratios):8.1f}" if ratios else "not converged"
-            print(f"  {name:32s} {told}   ({len(ratios)} of {tried} converged)")
+            print(f"  {name:36s} {told}   ({len(ratios)} of {tried} converged)")
 
 
 def run(problem, title, options):
@@ -80,7 +81,7 @@ def run(problem, title, options):
     if difference > 1e-8:
         raise SystemExit("the peers' model is not the package's")
     out = {"case": title, "log_density_difference": difference, "ours": [], "peers": {}}
-    print(f"  {'':32s} {'all costs':>10s} {'sampling':>10s} {'ratio':>8s}  effective draws per processor second")
+    print(f"  {'':36s} {'all costs':>10s} {'sampling':>10s} {'ratio':>8s}  effective draws per processor second")
     for name, peer in PEERS.items():
         if options.peers and not any(name.startswith(word) for word in options.peers):
             continue
@@ -120,7 +121,7 @@ def _tell(name, r):
             line = (
                 f"not converged (divergences {r.get('divergences')}, R-hat {r.get('r_hat')}, ESS {r.get('ess', 0):.0f})"
             )
-    print(f"  {name:32s} {line}", flush=True)
+    print(f"  {name:36s} {line}", flush=True)
 
 
 if __name__ == "__main__":

@@ -80,8 +80,11 @@ def stretch(problem, seed, seconds, natural=True, walkers=128):
     return judged(costs, values, evaluations=evaluations, kept_evaluations=evaluations - 4 * walkers * discard), values
 
 
-def dynesty_run(problem, seed, seconds):
-    """dynesty's default nested sampler in the prior's unit cube, with the compiled likelihood, to its default end."""
+def dynesty_run(problem, seed, seconds, sample="auto"):
+    """dynesty's nested sampler in the prior's unit cube, with the compiled likelihood, to its default end.
+
+    Its default way to new points in so few dimensions is to draw them evenly within bounds; "rwalk" walks to them.
+    """
     import dynesty
     import jax
     import jax.numpy as jnp
@@ -104,7 +107,9 @@ def dynesty_run(problem, seed, seconds):
 
     with costs.part("compile"):
         value(transform(np.full(len(terms), 0.5)))
-    sampler = dynesty.NestedSampler(value, transform, len(terms), nlive=500, rstate=np.random.default_rng(seed))
+    sampler = dynesty.NestedSampler(
+        value, transform, len(terms), nlive=500, sample=sample, rstate=np.random.default_rng(seed)
+    )
     began, done = time.process_time(), True
     with costs.part("sample"):
         for it, _ in enumerate(sampler.sample(dlogz=0.01)):
