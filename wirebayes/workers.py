@@ -27,8 +27,8 @@ def cores() -> int:
 def workers(most: int | None = None, own_effects: Path | None = None) -> Iterator[Each]:
     """A `map` over processes, as many as there are cores.
 
-    There are processes on one core, too: a copy that was sent may be laid out otherwise in memory, which changes the last
-    bit of what is computed with it.
+    There are processes on one core, too: a copy that was sent may be laid out otherwise in memory, and what is computed
+    with it differ in the last bit.
 
     Parameters
     ----------
