@@ -44,7 +44,8 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No place stands out."]
     gap = [_gap(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
-    loose = [f"Not identifiable here: {listed(v['not_identifiable'])}."] if v.get("not_identifiable") else []
+    hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
+    loose = [f"Not identifiable here: {listed([_words(what) for what, _ in hidden])}."] if hidden else []
     if v.get("next_measurement"):
         loose.append(f"Measure next: {v['next_measurement']}")
     columns = [Points("Where they disagree", where), Points("What is known", [p for p in gap if p])]
@@ -63,6 +64,9 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
         lines = [[_words(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
         caption = "Amplitudes that would have been seen four times in five."
         blocks.append(Table(["effect", "amplitude", "unit"], lines, caption))
+    if hidden:
+        caption = "Not identifiable here: present or absent, these readings would be nearly the same."
+        blocks.append(Table(["what", "why"], [[_words(what), why] for what, why in hidden], caption))
     return Section(name, blocks)
 
 
