@@ -96,8 +96,10 @@ def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array,
 
 
 def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
-    """Draws of the proposal: places (n, d), their log densities and those of the proposal."""
-    z = state.proposal.rvs(policy.round_steps * policy.walkers * policy.ensembles, state.generator)
+    """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
+    most = policy.round_steps * policy.walkers * policy.ensembles
+    n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS))
+    z = state.proposal.rvs(n, state.generator)
     before = target.evaluations
     value = target(z)
     state.evaluations += target.evaluations - before
@@ -173,4 +175,5 @@ _HOT = 0.4  # power of the density that the wide part of the proposal is fitted 
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
 _GOOD_ACCEPTANCE = 0.25
 _PASSING = 5000  # points for a proposal that only the next round draws from
+_IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are as many draws as asked for; the fewest before
 _LONGEST_SETTLING = 8

@@ -20,7 +20,7 @@ class Policy:
         Burn-in: at least so many fits of the proposal; more, up to the second number, while too few of its draws would
         be accepted or it leaves out a tail.
     round_steps : int
-        A round takes as many draws as so many steps of all walkers.
+        A round takes as many draws as so many steps of all walkers, the first two a quarter and half of that.
     tail : float
         A proposal leaves out a tail when the log of posterior over proposal, at its 99.9 % quantile over the posterior,
         lies this far above its median: walkers that reach such places stay there for very long.
