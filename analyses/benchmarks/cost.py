@@ -24,7 +24,7 @@ from wirebayes.experiment import Experiment, Hold
 from wirebayes.output import write_json
 from wirebayes.paper import experiments
 
-BATCH, REPEATS, SEEDS = 256, 7, 5
+BATCH, REPEATS, SEEDS = 256, 7, 20
 
 
 def staircase(holds, readings, name="made"):

@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 import wirebayes
 from analyses.benchmarks import asked
-from wirebayes.bayes import jobs
+from wirebayes import workers
 from wirebayes.bayes.fit import fit
 from wirebayes.bayes.problem import build
 from wirebayes.discrepancy.discover import discover
@@ -42,11 +42,7 @@ class Here(Executor):
 
 
 def reproduce():
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        patch.object(jobs, "ProcessPoolExecutor", Here),
-        patch.object(run, "ProcessPoolExecutor", Here),
-    ):
+    with tempfile.TemporaryDirectory() as folder, patch.object(workers, "ProcessPoolExecutor", Here):
         run.reproduce(Path(folder) / "out")
 
 
