@@ -9,7 +9,8 @@ import pytest
 from wirebayes import cli, paper, workers
 from wirebayes.discrepancy import expansion, gap, power, screen
 from wirebayes.discrepancy.block import fitted
-from wirebayes.discrepancy.discover import Settings, discover, final_models, investigate
+from wirebayes.discrepancy.discover import discover, final_models, investigate
+from wirebayes.discrepancy.settings import Settings
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment, read_experiments

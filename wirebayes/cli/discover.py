@@ -40,7 +40,8 @@ def discover(
     from wirebayes import __version__
     from wirebayes.bayes.jobs import run
     from wirebayes.cli.progress import progress
-    from wirebayes.discrepancy.discover import Settings, catalogue_without, investigate
+    from wirebayes.discrepancy.discover import catalogue_without, investigate
+    from wirebayes.discrepancy.settings import Settings
     from wirebayes.effects import catalogue
     from wirebayes.experiment import read_experiments, select
     from wirebayes.output import open_run, write_json
