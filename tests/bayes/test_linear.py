@@ -66,6 +66,16 @@ def test_bayes_rule_holds_at_every_completed_draw(effects):
     )
 
 
+def test_absurd_parameters_have_no_density_and_stop_nobody():
+    inner = integrated(problem_of("kite-1.5m"))
+    rng = np.random.default_rng(0)
+    theta = likely(inner, 2000)
+    theta[1:] *= 10.0 ** rng.uniform(-40, 40, size=theta[1:].shape)
+    value = inner.log_likelihood(theta)
+    assert value[0] == pytest.approx(inner.log_likelihood(theta[:1])[0])
+    assert not np.isnan(value).any() and (value == -np.inf).any()
+
+
 def test_only_what_is_linear_to_the_end_is_integrated_out():
     assert integrated(build([WIRES["roc-line-1m"]], [named("sensor_drift")])).names[-1] == "setting_sd"
     plain = build([WIRES["roc-line-1m"]], [named("toe")])

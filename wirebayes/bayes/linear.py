@@ -46,10 +46,11 @@ class Integrated(Problem):
         with np.errstate(all="ignore"):
             total, precision, pull = self._seen(theta, readings)
             sign, log_volume = np.linalg.slogdet(precision)
-            mean = _solved(precision, pull)
+            regular = (sign > 0) & np.isfinite(log_volume)
+            mean = _solved(np.where(regular[:, None, None], precision, np.eye(len(self.sd))), pull)
             total = total + 0.5 * ((pull * mean).sum(axis=1) - log_volume)
             total = total - np.log(self.sd).sum() - 0.5 * ((self.mean / self.sd) ** 2).sum()
-        return np.where(np.isfinite(total) & (sign > 0), total, -np.inf)
+        return np.where(regular & np.isfinite(total), total, -np.inf)
 
     def drawn(self, theta: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
