@@ -17,6 +17,7 @@ from wirebayes.wire.staircase import linearise, simulate
 
 Array = NDArray[Any]
 _ROWS = 2048  # draws completed at once
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,40 +45,47 @@ class Integrated(Problem):
     def log_likelihood(self, theta: Array, readings: Any = None) -> Array:
         """(n,) log-likelihood of the other parameters; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
-            total, precision, pull = self._seen(theta, readings)
-            sign, log_volume = np.linalg.slogdet(precision)
-            regular = (sign > 0) & np.isfinite(log_volume)
-            mean = _solved(np.where(regular[:, None, None], precision, np.eye(len(self.sd))), pull)
-            total = total + 0.5 * ((pull * mean).sum(axis=1) - log_volume)
-            total = total - np.log(self.sd).sum() - 0.5 * ((self.mean / self.sd) ** 2).sum()
+            total, square, value, vectors, along = self._seen(theta, readings)
+            explained = (along**2 / value).sum(axis=1)
+            # At absurd parameters rounding may make more of the readings than there is to explain.
+            regular = (value[:, 0] > 1.0 - _ROUNDING) & (explained <= (1.0 + _ROUNDING) * square)
+            total = total + 0.5 * (explained - np.log(value).sum(axis=1) - ((self.mean / self.sd) ** 2).sum())
         return np.where(regular & np.isfinite(total), total, -np.inf)
 
     def drawn(self, theta: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
-        _, precision, pull = self._seen(theta, None)
-        root = np.linalg.cholesky(precision)
-        normal = rng.normal(size=pull.shape)
-        amplitudes = _solved(precision, pull) + _solved(np.swapaxes(root, 1, 2), normal)
-        log_root = np.log(np.einsum("nkk->nk", root)).sum(axis=1)
-        return amplitudes, log_root - 0.5 * (normal**2 + np.log(2.0 * np.pi)).sum(axis=1)
+        _, _, value, vectors, along = self._seen(theta, None)
+        normal = rng.normal(size=along.shape)
+        amplitudes = np.einsum("nij,nj->ni", vectors, along / value + normal / np.sqrt(value)) * self.sd
+        log_density = 0.5 * (np.log(value) - normal**2 - np.log(2.0 * np.pi)).sum(axis=1)
+        return amplitudes, log_density - np.log(self.sd).sum()
 
-    def _seen(self, theta: Array, readings: Any) -> tuple[Array, Array, Array]:
-        """Log-likelihood of no amplitudes (n,), precision of theirs (n, k, k) and its product with the mean (n, k)."""
+    def _seen(self, theta: Array, readings: Any) -> tuple[Array, ...]:
+        """What the readings say of the amplitudes, in standard deviations of their priors.
+
+        The log-likelihood of none (n,); no less than what there is to explain (n,), prior included; and of the
+        posterior precision (n, k, k), which is no less than one, the eigenvalues (n, k) and vectors (n, k, k), and its
+        product with the posterior mean along them (n, k).
+        """
+        k = len(self.sd)
         total: Any = 0.0
-        precision: Any = np.diag(self.sd**-2.0)
-        pull: Any = self.mean / self.sd**2
+        square: Any = ((self.mean / self.sd) ** 2).sum()
+        precision: Any = np.eye(k)
+        pull: Any = self.mean / self.sd
         for i, sample in enumerate(self.samples):
             own = self.parameters(theta, sample)
-            y = sample.readings if readings is None else readings[i]
+            y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
             variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
             line = linearise(sample.protocol, own, sample.model)
-            filtered = noise.chain(line, y, sample.protocol.mask, variance, own["setting_sd"])
-            gram, along = noise.seen(
-                line, filtered, y, self.shapes[i], sample.protocol.mask, variance, own["setting_sd"]
-            )
-            total = total + filtered.log_likelihood.sum(axis=0)
+            filtered = noise.chain(line, y, mask, variance, own["setting_sd"])
+            gram, along = noise.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, own["setting_sd"])
+            height = filtered.log_likelihood.sum(axis=0)
+            total = total + height
+            square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
             precision, pull = precision + gram, pull + along
-        return total, precision, pull
+        finite = np.isfinite(precision).all(axis=(1, 2))
+        value, vectors = np.linalg.eigh(np.where(finite[:, None, None], precision, np.eye(k)))
+        return np.where(finite, total, -np.inf), square, value, vectors, np.einsum("nij,ni->nj", vectors, pull)
 
 
 def integrated(problem: Problem) -> Problem:
@@ -141,8 +149,3 @@ def _shapes(problem: Problem, i: int, columns: list[str]) -> Array:
     theta[:, where] = np.vstack([np.zeros(len(columns)), np.eye(len(columns))])
     made = simulate(sample.protocol, problem.parameters(theta, sample), sample.model)
     return made[..., 1:] - made[..., :1]
-
-
-def _solved(matrix: Array, right: Array) -> Array:
-    """(n, k) solutions of a system each."""
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
