@@ -293,7 +293,10 @@ def _outlook(
 def _held_out(
     block: Block, final: Block, verdict: str, rng: np.random.Generator, each: Each
 ) -> list[dict[str, Any]]:
-    """Plain and final model on the last third of the holds, and by leaving out one hold at a time."""
+    """Plain and final model on the last third of the holds, and by leaving out one hold at a time.
+
+    The flexible discrepancy beside them: an effect that predicts worse than a smooth curve does not shrink the gap.
+    """
     train = [gap.last_third(e) for e in block.experiments]
     if not all(train):
         nothing: dict[str, Any] = {"rmse_N": None, "elpd": None}
@@ -308,42 +311,50 @@ def _held_out(
             for _ in block.experiments
         ]
     asked: list[tuple[Any, ...]] = [(block.experiments, train, (), block)]
-    whole = list[Block]()
-    if verdict == "unknown":
-        n = len(train)
+    named, whole = bool(final.effects), list[Block]()
+    n = len(train) if named or verdict == "unknown" else 0
+    if n:
         first = [e.train(k) for e, k in zip(block.experiments, train, strict=True)]
         unnamed = list(each(_unnamed, repeat(block), [*block.experiments, *first], rng.spawn(2 * n)))
         alone, added = [(e,) for e in block.experiments], [(d,) for d in unnamed]
         whole += each(fitted, alone, added[:n], repeat(block.law), repeat(block.history), rng.spawn(n))
         asked += zip(alone, [(k,) for k in train], added[n:], repeat(block), strict=False)
-    elif final.effects:
+    if named:
         asked.append((block.experiments, train, final.effects, final))
         whole.append(final)
     predicted = each(gap.held_out, *zip(*asked, strict=True), rng.spawn(len(asked)))
-    left_out = each(gap.leave_one_hold_out, [block, *whole], rng.spawn(1 + len(whole)))  # at the same time
+    left_out = each(gap.leave_one_hold_out, [block, *whole] if n else [], rng.spawn(1 + len(whole)))  # at the same time
     plain, *parts = predicted
-    better = [h for part in parts for h in part] or plain
+    flexible = [h for part in parts[:n] for h in part]
+    better = parts[-1] if named else flexible or plain
     shrinks, loho = False, None
-    if whole:
+    if n:
         without, *elpd = left_out
-        difference = np.concatenate(elpd) - without
-        se = float(difference.std(ddof=1) * np.sqrt(len(difference)))
-        loho = {"elpd_difference": float(difference.sum()), "elpd_difference_se": se}
-        shrinks = bool(difference.sum() > KEEP_ELPD and difference.sum() > 2 * se)
+        loose = np.concatenate(elpd[:n])
+        difference = (elpd[-1] if named else loose) - without
+        gain, se = float(difference.sum()), float(difference.std(ddof=1) * np.sqrt(len(difference)))
+        unnamed_gain = float((loose - without).sum())
+        loho = {"elpd_difference": gain, "elpd_difference_se": se, "flexible_elpd_difference": unnamed_gain}
+        shrinks = gain > max(KEEP_ELPD, 2.0 * se) and gain >= unnamed_gain
     out = []
-    for a, b in zip(plain, better, strict=True):
+    for i, (a, b) in enumerate(zip(plain, better, strict=True)):
         d = b.elpd - a.elpd
         out.append({
             "holds": a.holds,
-            "plain": {"rmse_N": a.rmse_N, "elpd": float(a.elpd.sum()), "coverage_90": a.inside},
-            "final": {"rmse_N": b.rmse_N, "elpd": float(b.elpd.sum()), "coverage_90": b.inside,
-                      "elpd_difference_se": float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None},
+            "plain": _score(a),
+            "final": _score(b)
+                     | {"elpd_difference_se": float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None},
+            "flexible": _score(flexible[i]) if n else None,
             "floor_N": float(np.sqrt(b.floor)),
-            "gap_closed": gap.gap_closed(a, b) if whole else None,
+            "gap_closed": gap.gap_closed(a, b) if n else None,
             "leave_one_hold_out": loho,
             "shrinks": shrinks,
         })  # fmt: skip
     return out
+
+
+def _score(held: gap.HeldOut) -> dict[str, float]:
+    return {"rmse_N": held.rmse_N, "elpd": float(held.elpd.sum()), "coverage_90": held.inside}
 
 
 def _unnamed(block: Block, experiment: Experiment, rng: np.random.Generator) -> Discrepancy:

@@ -89,7 +89,10 @@ def _gap(v: dict[str, Any]) -> str:
         return ""
     plain, final = (number(held[model]["rmse_N"], 2) for model in ("plain", "final"))
     holds = listed([str(h) for h in held["holds"]])
-    return f"On the unused holds {holds} the rms error goes from {plain} to {final} N."
+    text = f"On the unused holds {holds} the rms error goes from {plain} to {final} N"
+    if v.get("accepted") and held.get("flexible"):
+        text += f"; a smooth curve without a name gets to {number(held['flexible']['rmse_N'], 2)}"
+    return text + "."
 
 
 def _amplitude(effect: str, a: dict[str, Any]) -> str:
