@@ -27,7 +27,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found = read_json(folder / "discovery.json")["experiments"]
     overview = Table(
         ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
-        [[name, _spoken(v), listed(v["effects"]), number(v["p_global"], 2), _share(v)] for name, v in found.items()],
+        [[name, _spoken(v), listed([_words(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)] for name, v in found.items()],
     )
     sections = [Section("In a minute", [overview]), *(_section(folder, name, v) for name, v in found.items())]
     lead = "Simulation against measurement: where they disagree, which effect is missing, and whether adding it helps."
@@ -35,10 +35,11 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 
 def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
+    candidates = listed([_words(e) for e in v["set"]])
     words = {
         "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
         "unknown": "Something is missing that no effect of the catalogue explains.",
-        "ambiguous": f"Something is missing; these readings cannot tell {listed(v['set'])} apart.",
+        "ambiguous": f"Something is missing; these readings cannot tell {candidates} apart.",
         "named": f"What is missing: {listed([_words(e) for e in v['effects']])}.",
     }
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
@@ -75,7 +76,7 @@ def _spoken(v: dict[str, Any]) -> str:
 
 
 def _words(effect: str) -> str:
-    return effect.replace("_", " ")
+    return "something unknown" if effect == "unknown" else effect.replace("_", " ")
 
 
 def _share(v: dict[str, Any]) -> str:
