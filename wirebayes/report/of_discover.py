@@ -27,7 +27,10 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found = read_json(folder / "discovery.json")["experiments"]
     overview = Table(
         ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
-        [[name, _spoken(v), listed([_words(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)] for name, v in found.items()],
+        [
+            [name, _spoken(v), listed([_words(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)]
+            for name, v in found.items()
+        ],
     )
     sections = [Section("In a minute", [overview]), *(_section(folder, name, v) for name, v in found.items())]
     lead = "Simulation against measurement: where they disagree, which effect is missing, and whether adding it helps."
