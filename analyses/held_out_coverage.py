@@ -8,8 +8,6 @@ other, so the interval of the coverage is over sets.
 """
 
 import argparse
-import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +20,7 @@ from wirebayes.bayes.problem import Problem, build
 from wirebayes.bayes.replicate import readings
 from wirebayes.discrepancy.heldout import LEVELS, held_out
 from wirebayes.paper import experiments
+from wirebayes.workers import workers
 
 WIRES = {
     "k1": stats.lognorm(0.5, scale=900.0), "B": stats.lognorm(0.5, scale=0.3), "U": stats.lognorm(0.3, scale=0.6),
@@ -58,9 +57,8 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    with ProcessPoolExecutor() as pool:
-        results = list(pool.map(one, [(asked.seed, number) for number in range(asked.sets)]))
+    with workers() as each:
+        results = list(each(one, [(asked.seed, number) for number in range(asked.sets)]))
     print(f"{asked.sets} simulated sets, {sum(not r[2] for r in results)} of them not converged")
     for name, place in (("free", 0), ("given the first reading", 1)):
         shares = 100 * np.array([r[place] for r in results])

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 Each = Callable[..., Iterable[Any]]  # as the built-in `map`
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def one_thread_each() -> None:
     """One thread for linear algebra, here and in processes started later, unless the user said otherwise."""
-    for name in THREADS:
+    for name in _THREADS:
         os.environ.setdefault(name, "1")
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wirebayes.bayes import noise
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import Problem
-from wirebayes.wire.staircase import linearise, simulate
+from wirebayes.wire.staircase import simulate
 
 Array = NDArray[Any]
 _ROWS = 2048  # draws completed at once
@@ -45,7 +45,7 @@ class Integrated(Problem):
     def log_likelihood(self, theta: Array, readings: Any = None) -> Array:
         """(n,) log-likelihood of the other parameters; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
-            total, square, value, vectors, along = self._seen(theta, readings)
+            total, square, value, _, along = self._seen(theta, readings)
             explained = (along**2 / value).sum(axis=1)
             # At absurd parameters rounding may make more of the readings than there is to explain.
             regular = (value[:, 0] > 1.0 - _ROUNDING) & (explained <= (1.0 + _ROUNDING) * square)
@@ -73,12 +73,10 @@ class Integrated(Problem):
         precision: Any = np.eye(k)
         pull: Any = self.mean / self.sd
         for i, sample in enumerate(self.samples):
-            own = self.parameters(theta, sample)
             y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
-            variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
-            line = linearise(sample.protocol, own, sample.model)
-            filtered = noise.chain(line, y, mask, variance, own["setting_sd"])
-            gram, along = noise.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, own["setting_sd"])
+            line, variance, setting_sd = self.linearised(theta, sample)
+            filtered = noise.chain(line, y, mask, variance, setting_sd)
+            gram, along = noise.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
             height = filtered.log_likelihood.sum(axis=0)
             total = total + height
             square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
