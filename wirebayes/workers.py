@@ -2,9 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +38,10 @@ def workers(most: int | None = None, own_effects: Path | None = None) -> Iterato
     if most is not None and most < 2:
         yield map
         return
+    # every command imports this module, few start processes
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     one_thread_each()
     n = cores() if most is None else min(cores(), most)
     with ProcessPoolExecutor(n, get_context("spawn"), _prepare, (own_effects,)) as pool:

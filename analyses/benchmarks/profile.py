@@ -11,13 +11,12 @@ import cProfile
 import pstats
 import tempfile
 from collections import defaultdict
-from concurrent.futures import Executor, Future
+from concurrent import futures
 from pathlib import Path
 from unittest.mock import patch
 
 import wirebayes
 from analyses.benchmarks import asked
-from wirebayes import workers
 from wirebayes.bayes.fit import fit
 from wirebayes.bayes.problem import build
 from wirebayes.discrepancy.discover import discover
@@ -29,20 +28,20 @@ HOME = str(Path(wirebayes.__file__).parent)
 SHOWN = 12
 
 
-class Here(Executor):
+class Here(futures.Executor):
     """An executor that does the work at once, in this process."""
 
     def __init__(self, *args, **kwargs):
         pass
 
     def submit(self, fn, *args, **kwargs):
-        future = Future()
+        future = futures.Future()
         future.set_result(fn(*args, **kwargs))
         return future
 
 
 def reproduce():
-    with tempfile.TemporaryDirectory() as folder, patch.object(workers, "ProcessPoolExecutor", Here):
+    with tempfile.TemporaryDirectory() as folder, patch.object(futures, "ProcessPoolExecutor", Here):
         run.reproduce(Path(folder) / "out")
 
 
