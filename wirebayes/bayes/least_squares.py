@@ -6,6 +6,7 @@ published parameters, and with the posterior.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -69,13 +70,14 @@ class Identified:
     parameters : dict of name to float
     rms_N : float
         Over the readings they were adjusted to.
-    at_edge : tuple of str
-        Parameters that ran to the edge of the search: the readings do not hold them back.
+    not_held_back : tuple of str
+        Parameters at the edge of the search, or with an edge within their standard error: the readings do not hold them
+        back, and along such a ridge the search stops anywhere.
     """
 
     parameters: dict[str, float]
     rms_N: float
-    at_edge: tuple[str, ...] = ()
+    not_held_back: tuple[str, ...] = ()
 
 
 def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: Variant) -> Array:
@@ -173,7 +175,8 @@ def identify(
     end = ends[int(np.argmin(costs))]
     found = {name: float(value[0]) for name, value in natural(end[None]).items()}
     ordered = {name: found[name] for name in variant.parameters}
-    edge = np.minimum(end - low, high - end) < 0.01 * (high - low)
+    loose = np.maximum(0.01 * (high - low), costs.min() * _per_unit_misfit(misfit, end))
+    edge = np.minimum(end - low, high - end) < loose
     return Identified(ordered, float(costs.min()), tuple(name for name, on in zip(names, edge, strict=True) if on))
 
 
@@ -186,16 +189,25 @@ def _logged(values: Array, logarithmic: NDArray[np.bool_]) -> Array:
     return np.where(logarithmic, np.log(np.where(logarithmic, values, 1.0)), values)
 
 
-def _descend(misfit: Callable[[Array], Array], start: Array, low: Array, high: Array) -> Array:
-    """One least-squares descent, its Jacobian by central differences in one batch."""
-    moves = _STEP * np.concatenate([np.eye(len(start)), -np.eye(len(start))])
+def _jacobian(misfit: Callable[[Array], Array], z: Array) -> Array:
+    """(m, d) derivatives of the residuals at a point (d,), by central differences in one batch."""
+    moves = _STEP * np.concatenate([np.eye(len(z)), -np.eye(len(z))])
+    values = misfit(z + moves)
+    return (values[:, : len(z)] - values[:, len(z) :]) / (2.0 * _STEP)
 
-    def jacobian(z: Array) -> Array:
-        values = misfit(z + moves)
-        return (values[:, : len(z)] - values[:, len(z) :]) / (2.0 * _STEP)
+
+def _per_unit_misfit(misfit: Callable[[Array], Array], z: Array) -> Array:
+    """(d,) standard errors at a point (d,) if residuals had a standard deviation of one."""
+    _, singular, directions = np.linalg.svd(_jacobian(misfit, z), full_matrices=False)
+    return np.sqrt(((directions / np.maximum(singular, 1e-12)[:, None]) ** 2).sum(axis=0))
+
+
+def _descend(misfit: Callable[[Array], Array], start: Array, low: Array, high: Array) -> Array:
+    """One least-squares descent."""
 
     def at_point(z: Array) -> Array:
         return np.asarray(misfit(z[None])[:, 0])
 
+    jacobian = partial(_jacobian, misfit)
     found = least_squares(at_point, start, jac=jacobian, bounds=(low, high), x_scale="jac", max_nfev=300)
     return np.asarray(found.x)

@@ -69,11 +69,11 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
             rows, "hold", "", "hooke", "Hold by hold, law (1): the reading under which Table 4 reproduces the tables."
         ),
     ]
-    loose = [unbroken(r) for r in of_table_4(rows, "refitted") if r["at_edge_of_search"]]
+    loose = [unbroken(r) for r in of_table_4(rows, "refitted") if r["not_held_back"]]
     if loose:
         words = (
-            f"On {listed(loose)} the refit runs along a ridge to the edge of the search: its k1 and B mean nothing by "
-            "themselves."
+            f"On {listed(loose)} the readings leave a ridge along which the refit may run to the edge of the search: "
+            "what the last column names means nothing by itself."
         )
         blocks.append(Text(words))
     better = [

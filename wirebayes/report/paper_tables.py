@@ -27,12 +27,12 @@ def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -
     """Published and refitted parameters in one reading of the model."""
     chosen = [r for r in rows if (r["likelihood"], r["history"], r["elastic_law"]) == (likelihood, history, law)]
     header = ["sample", "parameters", "k1, N", "B, mm N⁻ᵁ", "U", "k2, s⁻ᴺ", "N", "preload, mm"]
-    header += ["rms, first five, N", "rms, rest, N", "rms, all, N", "at the edge of the search"]
+    header += ["rms, first five, N", "rms, rest, N", "rms, all, N", "not held back"]
     lines = []
     for r in chosen:
         values = (number(r[key], 4) for key in ("k1_N", "B", "U", "k2", "N", "preload_mm"))
         misses = (f"{r[key]:.3f}" for key in ("rms_first_N", "rms_rest_N", "rms_all_N"))
-        lines.append([r["experiment"], r["parameters"], *values, *misses, r["at_edge_of_search"] or "–"])
+        lines.append([r["experiment"], r["parameters"], *values, *misses, r["not_held_back"] or "–"])
     return Table(header, lines, caption)
 
 

@@ -65,7 +65,7 @@ def _row(experiment: Experiment, variant: Variant, source: str, found: Identifie
         "rms_first_N": rms(left[:cut]),
         "rms_rest_N": rms(left[cut:]),
         "rms_all_N": rms(left),
-        "at_edge_of_search": " ".join(found.at_edge),
+        "not_held_back": " ".join(found.not_held_back),
     }
 
 
