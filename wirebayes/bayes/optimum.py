@@ -18,7 +18,9 @@ Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
 _ROUNDS = 2  # of climbs from places that no mode explains
+_LOOKED = 400  # places that are asked whether a mode explains them
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
+_EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
 _WARM_STEPS = 4  # the last ones of the cooling
 _LEAST_SAG = 1.0  # nats
 _ONE_MODE = 4.0  # squared standard deviations
@@ -100,10 +102,8 @@ def climb(
         rows = np.flatnonzero(~done)
         if not len(rows):
             break
-        gradient, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows])
-        eigen, vectors = np.linalg.eigh(-hessian)
-        scale = np.maximum(np.abs(eigen).max(axis=1, keepdims=True), 1e-8)
-        eigen = np.maximum(np.abs(eigen), 1e-9 * scale)
+        gradient, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=1)
+        eigen, vectors = _positive(-hessian)
         along = np.einsum("nij,ni->nj", vectors, gradient)
         curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
         decrement = 0.5 * (along**2 / eigen).sum(axis=1)
@@ -128,15 +128,31 @@ def climb(
         done[rows[~better]] = True
         left = rows[until(z[rows])]
         done[left], value[left] = True, -np.inf
+    rows = np.flatnonzero(np.isfinite(value))
+    if len(rows):
+        _, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=2)
+        eigen, vectors = _positive(-hessian)
+        curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
     return Optimum(z, value, curvature, converged)
 
 
-def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array) -> tuple[Array, Array]:
-    """Gradient and Hessian by central differences, all points of all rows in one batch."""
+def _positive(matrices: Array) -> tuple[Array, Array]:
+    """Eigenvalues, made positive, and vectors of symmetric matrices (n, d, d)."""
+    eigen, vectors = np.linalg.eigh(matrices)
+    scale = np.maximum(np.abs(eigen).max(axis=1, keepdims=True), 1e-8)
+    return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
+
+
+def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array, sides: int) -> tuple[Array, Array]:
+    """Gradient and Hessian by central differences, all points of all rows in one batch.
+
+    Mixed derivatives take most of the points: with one side only, half as many, they tell the way well enough.
+    """
     n, d = z.shape
     upper = np.triu_indices(d, 1)
     unit = np.eye(d)
-    moves = np.concatenate([unit, -unit, unit[upper[0]] + unit[upper[1]], -unit[upper[0]] - unit[upper[1]]])
+    mixed = unit[upper[0]] + unit[upper[1]]
+    moves = np.concatenate([unit, -unit, mixed, -mixed] if sides == 2 else [unit, -unit, mixed])
     points = z[:, None, :] + moves[None] * h[:, None, :]
     f = density(points.reshape(-1, d), np.repeat(rows, len(moves))).reshape(n, len(moves))
     f = np.where(np.isfinite(f), f, value[:, None] - 1e3)
@@ -144,13 +160,11 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     gradient = (plus - minus) / (2.0 * h)
     hessian = np.zeros((n, d, d))
     hessian[:, np.arange(d), np.arange(d)] = (plus + minus - 2.0 * value[:, None]) / h**2
-    m = len(upper[0])
-    both, neither = f[:, 2 * d : 2 * d + m], f[:, 2 * d + m :]
     i, j = upper
-    mixed = (both + neither - plus[:, i] - plus[:, j] - minus[:, i] - minus[:, j] + 2.0 * value[:, None]) / (
-        2.0 * h[:, i] * h[:, j]
-    )
-    hessian[:, i, j] = hessian[:, j, i] = mixed
+    twice = f[:, 2 * d : 2 * d + len(i)] - plus[:, i] - plus[:, j] + value[:, None]
+    if sides == 2:
+        twice = 0.5 * (twice + f[:, 2 * d + len(i) :] - minus[:, i] - minus[:, j] + value[:, None])
+    hessian[:, i, j] = hessian[:, j, i] = twice / (h[:, i] * h[:, j])
     return gradient, hessian
 
 
@@ -181,10 +195,10 @@ def search(
 ) -> Search:
     """Look for the modes of a posterior: good ones among many prior draws, each climbed.
 
-    A population of prior draws is cooled to the posterior. Half of the starts are spread over all places it passed:
-    where it ends, a mode of less weight may have died out, but on the way it lived. The others are chosen among passed
-    places that belong to the hill of no mode found by then, as long as there are any; such a climb is given up where it
-    comes so near to a known mode that it would count as that one.
+    A population of prior draws is cooled to the posterior. Half of the starts, the highest place among them, are spread
+    over all places it passed: where it ends, a mode of less weight may have died out, but on the way it lived. The
+    others are chosen among passed places that belong to the hill of no mode found by then, as long as there are any;
+    such a climb is given up where it comes so near to a known mode that it would count as that one.
 
     Parameters
     ----------
@@ -199,14 +213,13 @@ def search(
     """
     z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
     value = target(z)
-    best = np.argsort(-value)[: starts // 8]
     passed, height = _cooled(target, z, value, rng)
     warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
     width = passed.std(axis=0)
-    spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - len(best), rng)
-    start = np.vstack([passed[spread], z[best], np.empty((0, z.shape[1])) if extra is None else extra])
+    spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
+    start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
     found = _distinct([climb(lambda points, rows: target(points), start)])
-    looked = rng.choice(len(passed), min(draws, len(passed)), replace=False)
+    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     sag = _sag(target, passed, height, found)
     for _ in range(_ROUNDS):
@@ -217,21 +230,23 @@ def search(
         chosen = rng.choice(strange, min(len(strange), starts // 2 // _ROUNDS), replace=False, p=share)
         known = partial(_near, modes=found.z, curvature=found.curvature)
         new = climb(lambda points, rows: target(points), passed[chosen], until=known)
-        sag = np.minimum(sag, _sag(target, passed, height, _distinct([new])))
+        sag[strange] = np.minimum(sag[strange], _sag(target, passed[strange], height[strange], _distinct([new])))
         found = _distinct([found, new])
     return Search(found, warm, cold)
 
 
 def _sag(target: Target, z: Array, height: Array, found: Optimum) -> Array:
-    """(n,) how far the density between (n, d) places and the mode best seen from there lies below the straight line.
+    """(n,) how far the density between (n, d) places and a mode seen from there lies below the straight line.
 
-    Within one hill it lies above.
+    Within one hill it lies above. The best mode is asked first, the others where no one before was seen.
     """
     least = np.full(len(z), 1e3)
     for mode, top in zip(found.z, found.log_density, strict=True):
-        between = z[:, None] + _ON_THE_WAY[:, None] * (mode - z)[:, None]
-        line = height[:, None] + _ON_THE_WAY * (top - height)[:, None]
-        least = np.minimum(least, (line - target(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1))
+        unseen = np.flatnonzero(least > _LEAST_SAG)
+        between = z[unseen, None] + _ON_THE_WAY[:, None] * (mode - z[unseen])[:, None]
+        line = height[unseen, None] + _ON_THE_WAY * (top - height[unseen])[:, None]
+        sag = (line - target(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1)
+        least[unseen] = np.minimum(least[unseen], sag)
     return least
 
 
@@ -257,7 +272,7 @@ def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
 def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Places (n, d) and their log densities (n,), from the density to powers that grow from 0 to 1, all together.
 
-    Each step of the power halves the effective number of rows and moves them by differential evolution: near enough to
+    Each step of the power leaves a fifth of the rows effective and moves them by differential evolution: near enough to
     the modes to find them.
     """
     m, d = z.shape
@@ -281,18 +296,18 @@ def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) ->
 
 
 def _next_step(value: Array, most: float) -> float:
-    """The largest step of the power that leaves half of the rows effective."""
+    """The largest step of the power that leaves enough rows effective."""
 
     def effective(step: float) -> float:
         weight = np.exp(step * (value - value.max()))
         return float(weight.sum() ** 2 / (weight**2).sum())
 
-    if effective(most) >= 0.5 * len(value):
+    if effective(most) >= _EFFECTIVE * len(value):
         return most
     low, high = -40.0, float(np.log(most))
     for _ in range(40):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if effective(np.exp(middle)) > 0.5 * len(value) else (low, middle)
+        low, high = (middle, high) if effective(np.exp(middle)) > _EFFECTIVE * len(value) else (low, middle)
     return float(np.exp(low))
 
 
