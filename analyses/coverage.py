@@ -24,7 +24,7 @@ from wirebayes.simulate import Bench, Simulated, Truth, draw
 from wirebayes.wire.staircase import linearise
 
 Array = Any
-POLICY = Policy(walkers=128, ess=1000.0, most_steps=800)
+POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
 
 
 def bench(rng: np.random.Generator) -> Bench:

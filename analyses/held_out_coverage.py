@@ -28,7 +28,7 @@ WIRES = {
     "sensor_sd": stats.lognorm(0.4, scale=0.008), "setting_sd": stats.lognorm(0.5, scale=0.03),
 }  # fmt: skip
 TRAINED = 8
-POLICY = Policy(walkers=128, ess=1500.0)
+POLICY = Policy(walkers=64, round_draws=2048, ess=1500.0)
 
 
 def with_wires(problem: Problem) -> Problem:

@@ -9,7 +9,7 @@ from wirebayes import paper
 from wirebayes.bayes.policy import Policy
 from wirebayes.reproduce import run
 
-POLICY = Policy(walkers=32, ess=300.0, rounds=2, round_steps=8, block=20, most_steps=60, r_hat=1.5)
+POLICY = Policy(walkers=32, ess=300.0, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 
 
 def reproduce(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wirebayes.bayes.convergence import WINDOW, autocorrelation_steps, nested_r_hat
+from wirebayes.bayes.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 
 WANTED = 20_000
 R_HAT = 1.01
@@ -39,18 +39,19 @@ class Costs:
 def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergences=0, weights_ess=None):
     """Effective draws, convergence and the rate with all costs counted, from (groups, steps, walkers, d) draws.
 
-    The slowest parameter counts. A gradient-based peer may have negative autocorrelation, so ArviZ's bulk estimate
-    stands in where it is the larger. `weights_ess` is for weighted independent draws (nested sampling).
+    The slowest parameter counts. Of many walkers their means tell the effective draws, of a few chains ArviZ's bulk
+    estimate, which knows negative autocorrelation. `weights_ess` is for weighted independent draws (nested sampling).
     """
     out = {"cpu_s": costs.cpu, "wall_s": costs.wall, "divergences": divergences}
     if weights_ess is None:
-        ess = values.shape[0] * values.shape[1] * values.shape[2] / autocorrelation_steps(values)
-        if values.shape[2] == 1:
+        if values.shape[2] > 1:
+            ess = values.shape[0] * values.shape[1] * values.shape[2] / autocorrelation_steps(values)
+        else:
             import arviz_stats
 
-            ess = np.maximum(ess, [arviz_stats.ess(values[:, :, 0, k], method="bulk") for k in range(values.shape[-1])])
+            ess = np.array([arviz_stats.ess(values[:, :, 0, k], method="bulk") for k in range(values.shape[-1])])
         r_hat = float(_r_hat(values).max())
-        steps_enough = values.shape[1] >= WINDOW * values.shape[0] * values.shape[1] * values.shape[2] / ess.min()
+        steps_enough = values.shape[1] >= ENOUGH * values.shape[0] * values.shape[1] * values.shape[2] / ess.min()
         converged = r_hat <= R_HAT and divergences == 0 and bool(steps_enough or values.shape[2] == 1)
         out |= {"ess": float(ess.min()), "r_hat": r_hat, "converged": converged}
     else:

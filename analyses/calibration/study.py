@@ -12,7 +12,7 @@ from wirebayes.bayes.problem import Problem, build, with_readings
 from wirebayes.bayes.replicate import readings
 from wirebayes.simulate import PAPER_TIMES_S, Bench
 
-POLICY = Policy(walkers=128, ess=400.0)
+POLICY = Policy(walkers=64, round_draws=2048, ess=400.0)
 BENCHES = {
     "paper": Bench("paper", displacements_mm=tuple(range(1, 13)), times_s=PAPER_TIMES_S),
     "unloading": Bench(

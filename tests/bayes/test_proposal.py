@@ -119,7 +119,7 @@ def test_a_mode_that_died_out_on_the_way_is_still_found(seed):
 
 
 def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
-    policy = Policy(ensembles=2, walkers=64, rounds=3, round_steps=8, most_rounds=3)
+    policy = Policy(ensembles=2, walkers=64, rounds=3, round_draws=1024, most_rounds=3)
     target = two_modes()
     state, shares = burn_in.begin(target, 1, policy, None, None, None), []
     while not state.frozen:

@@ -15,7 +15,7 @@ from wirebayes.experiment import read_experiments
 from wirebayes.simulate import Bench, Truth, draw, write
 from wirebayes.wire.staircase import simulate
 
-HASTY = Policy(walkers=64, rounds=2, round_steps=8, most_rounds=2, block=4, most_steps=4)
+HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=4)
 BENCHES = [Bench("short", "line", 800.0), Bench("long", "line", 1700.0)]
 
 

@@ -17,7 +17,7 @@ from wirebayes.report.blocks import Page, Picture, Pictures, Section, Table, Tex
 from wirebayes.report.page import render, write
 
 _VOID = {"meta", "img", "link", "br", "hr", "input"}
-_FAST = Policy(walkers=32, ess=200.0, rounds=2, round_steps=8, block=20, most_steps=40, r_hat=1.5)
+_FAST = Policy(walkers=32, ess=200.0, rounds=2, round_draws=1024, block=20, most_steps=40, r_hat=1.5)
 
 
 class Reader(HTMLParser):

@@ -39,7 +39,7 @@ def test_the_band_s_edges_are_the_verdict():
 
 
 def test_a_data_set_is_the_same_whoever_fits_it_and_a_cut_file_is_finished(tmp_path):
-    hasty = Policy(ensembles=2, walkers=48, rounds=1, round_steps=8, most_rounds=1, ess=10.0, block=12, most_steps=12)
+    hasty = Policy(ensembles=2, walkers=48, rounds=1, round_draws=768, most_rounds=1, ess=10.0, block=12, most_steps=12)
     study, again = (Study("paper", "hold", policy=hasty) for _ in range(2))
     whole = run(study, 2, tmp_path, 0, 2)
     path = tmp_path / "paper-hold-seed0.jsonl"

@@ -12,7 +12,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.simulate import Bench, Truth, draw
 
 pytestmark = pytest.mark.statistical
-POLICY = Policy(walkers=128, ess=2000.0)
+POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0)
 
 
 class Silent(Problem):

@@ -88,7 +88,7 @@ def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array,
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
     again = min(state.walks, len(_WARM) - 1)
     state.walks += 1
-    steps = policy.round_steps * policy.walkers * policy.ensembles // _walking(target, policy) * 2**again
+    steps = policy.round_draws // _walking(target, policy) * 2**again
     sampler, _ = advance(target, state, steps, power=_WARM[again])
     walked = sampler.get_log_prob(discard=steps // 2, flat=True)
     state.walk = sampler.get_chain(discard=steps // 2, flat=True), walked / _WARM[again], walked
@@ -97,7 +97,7 @@ def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array,
 
 def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
-    most = policy.round_steps * policy.walkers * policy.ensembles
+    most = policy.round_draws
     n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS))
     z = state.proposal.rvs(n, state.generator)
     before = target.evaluations
@@ -124,6 +124,7 @@ def _fit(
         state.proposal = proposal.fit(
             hot, cold, state.start, target.coordinates.order, state.generator, shares,
             most=policy.components, points=points,
+            before=state.proposal if isinstance(state.proposal, Proposal) else None,
         )  # fmt: skip
     except np.linalg.LinAlgError:
         return False  # too few distinct points yet: keep the proposal that made them
@@ -147,7 +148,7 @@ def _place(state: State, policy: Policy, z: Array, value: Array, base: Array) ->
 
 def _walking(target: Target, policy: Policy) -> int:
     """Walkers in burn-in: few, for the same number of evaluations takes them further."""
-    each = min(policy.walkers, max(policy.walkers // 8, 2 * len(target.problem.names) + 2))
+    each = min(policy.walkers, max(policy.walkers // 4, 2 * len(target.problem.names) + 2))
     return each * policy.ensembles
 
 

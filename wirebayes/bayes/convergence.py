@@ -6,31 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-WINDOW = 5.0  # Sokal's: autocorrelations are summed over so many autocorrelation times
+ENOUGH = 5.0  # autocorrelation times that steps must span, lest the time itself be cut short by them
 
 
 def autocorrelation_steps(values: Array) -> Array:
     """(d,) integrated autocorrelation time in steps, of (ensembles, steps, walkers, d) draws.
 
-    The autocovariance about the mean of all ensembles is averaged over all walkers before the sum (the window is
-    Sokal's, five times the time), so that walkers stuck apart lengthen it instead of vanishing into their own means.
+    The variance of walkers' means about the mean of all, in units of what independent steps would give. No lag is cut
+    off, so a weak memory that lasts is counted in full, walkers stuck apart lengthen the time, and the error is
+    sqrt(2 / walkers), however long they walked. Walkers must be many, and know little of one another.
     """
-    m, steps, walkers, d = values.shape
-    centred = values - values.mean(axis=(0, 1, 2))
-    size = 1 << (2 * steps - 1).bit_length()
-    out = np.empty(d)
-    for k in range(d):
-        series = np.moveaxis(centred[..., k], 1, -1).reshape(-1, steps)
-        transform = np.fft.rfft(series, size, axis=-1)
-        power = (transform.real**2 + transform.imag**2).sum(axis=0)
-        covariance = np.fft.irfft(power, size)[:steps] / np.arange(steps, 0, -1)
-        if covariance[0] <= 0:
-            out[k] = np.inf
-            continue
-        times = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-        window = np.flatnonzero(np.arange(steps) >= WINDOW * times)
-        out[k] = max(times[window[0] if len(window) else -1], 1.0)
-    return out
+    steps, d = values.shape[1], values.shape[-1]
+    means = values.mean(axis=1).reshape(-1, d)
+    variance = values.reshape(-1, d).var(axis=0)
+    moving = variance > 0
+    between = means.var(axis=0, ddof=1) / np.where(moving, variance, 1.0)
+    return np.where(moving, steps * between, np.inf)
 
 
 def nested_r_hat(values: Array) -> Array:

@@ -3,9 +3,8 @@
 Policy. Burn-in (`wirebayes.bayes.burn_in`) ends with a frozen proposal. Then draws are kept, block by block, until for
 every parameter
 
-- the effective sample size from the autocorrelation time is at least `Policy.ess`,
-- the kept steps span the five autocorrelation times that its estimate sums over (about 1,000 walkers are averaged in
-  it, so that its error is then below a tenth), and
+- the effective sample size, from the spread of the walkers' means, is at least `Policy.ess`,
+- the kept steps span five autocorrelation times, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`,
 
 or until `Policy.most_steps`: then the result says *not converged*, and why. Where a first look promises that another
@@ -21,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes import burn_in
-from wirebayes.bayes.convergence import WINDOW, autocorrelation_steps, nested_r_hat
+from wirebayes.bayes.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.optimum import Optimum
 from wirebayes.bayes.policy import DEFAULT, Policy
@@ -142,7 +141,7 @@ def _block_steps(state: State, policy: Policy) -> int:
     kept = sum(len(block) for block in state.kept_z)
     if not kept:
         return policy.block
-    missing = kept * max(policy.ess / state.ess.min() - 1.0, WINDOW * state.autocorrelation.max() / kept - 1.0)
+    missing = kept * max(policy.ess / state.ess.min() - 1.0, ENOUGH * state.autocorrelation.max() / kept - 1.0)
     wanted = int(np.clip(np.ceil(missing), min(_LEAST_BLOCK, policy.block), kept))
     return min(wanted, policy.most_steps - kept)
 
@@ -154,10 +153,10 @@ def _look(target: Target, state: State, policy: Policy) -> None:
     theta = target.coordinates.to_natural(z.reshape(-1, d)).reshape(z.shape)
     # Logarithms of positive parameters: a heavy tail must not hide the walk.
     values = np.where(target.coordinates.log_columns, np.log(np.abs(theta) + 1e-300), theta)
-    state.autocorrelation = autocorrelation_steps(values)
+    state.autocorrelation = np.maximum(autocorrelation_steps(values), 1.0)
     state.ess = values.shape[0] * steps * values.shape[2] / state.autocorrelation
     state.r_hat = nested_r_hat(values)
-    long_enough = steps >= WINDOW * state.autocorrelation.max()
+    long_enough = steps >= ENOUGH * state.autocorrelation.max()
     if long_enough and (state.ess >= policy.ess).all() and (state.r_hat <= policy.r_hat).all():
         state.finished, state.converged = True, True
         least, most = float(state.ess.min()), float(state.r_hat.max())
@@ -175,8 +174,8 @@ def _look(target: Target, state: State, policy: Policy) -> None:
 def _promises_more(state: State, policy: Policy) -> bool:
     """Whether with a proposal as good as usual, learned once more, draws would be enough after fewer evaluations."""
     going_on = state.kept_evaluations * (policy.ess / state.ess.min() - 1.0)
-    return bool(going_on > policy.ess / _USUAL + policy.round_steps * policy.walkers * policy.ensembles)
+    return bool(going_on > policy.ess / _USUAL + policy.round_draws)
 
 
-_LEAST_BLOCK = 6
-_USUAL = 0.35  # effective draws per kept evaluation
+_LEAST_BLOCK = 8
+_USUAL = 0.4  # effective draws per kept evaluation

@@ -1,5 +1,6 @@
 """A mixture of multivariate Student-t distributions: density, draws, and its fit by expectation-maximisation."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -61,26 +62,39 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
     return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
 
 
-def fit(x: Array, rng: np.random.Generator, *, most: int = 8, degrees: float = DEGREES) -> Mixture:
-    """The mixture of as many components, up to `most`, as points (n, d) can hold apart."""
-    for k in range(most, 0, -1):
-        try:
-            return _em(x, k, degrees, rng)
-        except np.linalg.LinAlgError:
-            continue
-    raise np.linalg.LinAlgError("the points do not span their space")
+def fit(
+    x: Array, rng: np.random.Generator, *, most: int = 8, degrees: float = DEGREES, before: Mixture | None = None
+) -> Mixture:
+    """The mixture of as many components, up to `most`, as points (n, d) can hold apart.
 
-
-def _em(x: Array, k: int, degrees: float, rng: np.random.Generator, iterations: int = 60) -> Mixture:
-    n, d = x.shape
+    It is sought from the one `before`, of nearly these points, if that has so many.
+    """
+    d = x.shape[1]
     middle = x.mean(axis=0)
     root = np.linalg.cholesky(np.cov(x.T).reshape(d, d) + 1e-9 * np.diag(x.var(axis=0)))
     x = np.linalg.solve(root, (x - middle).T).T
-    centres = x[spread_rows(x, k, rng)]
-    if len(centres) < k:
-        raise np.linalg.LinAlgError("fewer different points than components")
+
+    def starts() -> Iterator[Mixture]:
+        if before is not None and len(before.weights) == most:
+            centres = np.linalg.solve(root, (before.centres - middle).T).T
+            yield Mixture(before.weights, centres, np.linalg.solve(root, before.factors), degrees)
+        for k in range(most, 0, -1):
+            centres = x[spread_rows(x, k, rng)]
+            if len(centres) == k:
+                yield Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0), degrees)
+
+    for start in starts():
+        try:
+            found = _em(x, start)
+        except np.linalg.LinAlgError:
+            continue
+        return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors, degrees)
+    raise np.linalg.LinAlgError("the points do not span their space")
+
+
+def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
+    (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
-    mixture = Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0), degrees)
     last = -np.inf
     for _ in range(iterations):
         distances = mixture._distances(x)
@@ -102,7 +116,7 @@ def _em(x: Array, k: int, degrees: float, rng: np.random.Generator, iterations: 
         if log_likelihood - last < 4e-3 * n:
             break
         last = log_likelihood
-    return Mixture(mixture.weights, middle + mixture.centres @ root.T, root @ mixture.factors, degrees)
+    return mixture
 
 
 def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:

@@ -1,10 +1,12 @@
-"""emcee moves: from a frozen proposal, and differential evolution in the coordinates that it straightens."""
+"""emcee moves: pools of draws of a frozen proposal, and differential evolution in coordinates that it straightens."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from emcee.moves import MHMove, RedBlueMove
+from emcee import State
+from emcee.moves import RedBlueMove
+from emcee.moves.move import Move
 from numpy.typing import NDArray
 
 from wirebayes.bayes.mixture import Mixture
@@ -14,21 +16,71 @@ from wirebayes.bayes.straighten import Straight
 Array = NDArray[Any]
 
 
-class IndependenceMove(MHMove):  # type: ignore[misc]
-    """Metropolis-Hastings with an independent proposal q: accepts with min(1, p(y) q(x) / (p(x) q(y))).
+class PoolMove(Move):  # type: ignore[misc]
+    """Steps through pools of draws of a frozen proposal q, a step of another move before each.
 
-    The proposal neither depends on the walker nor changes while draws are kept, so each walker's chain leaves the
-    target invariant; q's tails (Student-t) are heavier than the target's, which keeps the chain uniformly ergodic
-    wherever p/q is bounded. Adapting q during kept draws would void the argument: fit it to the burn-in, then freeze.
+    A walker at x has a pool of its own: x and K independent draws of q, each weighted by p/q. Its next K places are
+    taken from the pool by weight, systematically: K equal steps around a circle from a random origin, on which
+    every member of the pool has an arc as long as its share of the weights. Given the pool, x is any of its members
+    with these very shares, and so is each place, independent of which x is, because the origin is: with x from p,
+    every place is from p, and the last one starts the next pool. Neither q nor the size of a pool depends on the
+    walker or changes while draws are kept. q's tails (Student-t) are heavier than the target's, so that p/q is bounded
+    and the chain uniformly ergodic. To adapt q during kept draws would void the argument: fit it to the burn-in, then
+    freeze it.
+
+    Metropolis-Hastings compares a walker with one draw at a time and forgets the draw it refuses. Here all draws
+    compete at once: as many effective draws come as from importance sampling, 1.3 to 1.7 times as many on the paper's
+    wires, and places that repeat follow one another, so that autocorrelation tells how many there are.
+
+    Parameters
+    ----------
+    proposal : Mixture or Proposal
+    between : emcee Move
+    steps : int
+        As many as will be asked for; they are cut into pools of the same size.
+    most : int
+        The most steps of a pool, the one of the other move included.
+
+    References
+    ----------
+    H. Tjelmeland, Using all Metropolis-Hastings proposals to estimate mean values, NTNU preprint 4/2004.
+    C. Andrieu, A. Lee and M. Vihola, Uniform ergodicity of the iterated conditional SMC and geometric ergodicity of
+    particle Gibbs samplers, Bernoulli 24(2), 2018 (iterated sampling importance resampling).
     """
 
-    def __init__(self, proposal: Mixture | Proposal) -> None:
-        self.proposal = proposal
-        super().__init__(self._propose)
+    def __init__(self, proposal: Mixture | Proposal, between: Move, steps: int, most: int) -> None:
+        self.proposal, self.between, self.steps, self.most = proposal, between, steps, most
+        self.coming: list[tuple[Array, Array, NDArray[np.bool_]]] = []
 
-    def _propose(self, x: Any, random: Any) -> tuple[Any, Any]:
-        y = self.proposal.rvs(len(x), random)
-        return y, self.proposal.log_density(x) - self.proposal.log_density(y)
+    def propose(self, model: Any, state: State) -> tuple[State, NDArray[np.bool_]]:
+        """The next place of every walker, and which ones are new."""
+        if self.coming:
+            x, value, new = self.coming.pop()
+            return State(x, log_prob=value, random_state=state.random_state), new
+        size = -(-self.steps // -(-self.steps // self.most))
+        self.steps -= size
+        state, accepted = self.between.propose(model, state)
+        if size > 1:
+            self.coming = self._pooled(model, state, size - 1)[::-1]
+        return state, accepted
+
+    def _pooled(self, model: Any, state: State, k: int) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+        """The next k places of all walkers: (n, d), their log densities (n,), and whether they changed (n,)."""
+        (n, d), random = state.coords.shape, model.random
+        y = self.proposal.rvs(n * k, random)
+        value = np.column_stack([state.log_prob, model.compute_log_prob_fn(y)[0].reshape(n, k)])
+        pool = np.concatenate([state.coords[:, None], y.reshape(n, k, d)], axis=1)
+        weight = value - self._log_proposal(pool)
+        weight = np.exp(weight - weight.max(axis=1, keepdims=True))
+        until = np.cumsum(weight, axis=1)
+        at = (random.uniform(size=(n, 1)) + np.arange(k) / k) % 1.0 * until[:, -1:]
+        taken = np.array([np.searchsorted(ends, places) for ends, places in zip(until, at, strict=True)])
+        changed = np.diff(taken, axis=1, prepend=0) != 0
+        row = np.arange(n)
+        return [(pool[row, i], value[row, i], new) for i, new in zip(taken.T, changed.T, strict=True)]
+
+    def _log_proposal(self, pool: Array) -> Array:
+        return self.proposal.log_density(pool.reshape(-1, pool.shape[-1])).reshape(pool.shape[:2])
 
 
 class EvolutionMove(RedBlueMove):  # type: ignore[misc]

@@ -19,8 +19,8 @@ class Policy:
     rounds, most_rounds : int
         Burn-in: at least so many fits of the proposal; more, up to the second number, while too few of its draws would
         be accepted or it leaves out a tail.
-    round_steps : int
-        A round takes as many draws as so many steps of all walkers, the first two a quarter and half of that.
+    round_draws : int
+        Draws of the proposal that a round takes; the first two take a quarter and half as many.
     tail : float
         A proposal leaves out a tail when the log of posterior over proposal, at its 99.9 % quantile over the posterior,
         lies this far above its median: walkers that reach such places stay there for very long.
@@ -33,16 +33,16 @@ class Policy:
     """
 
     ensembles: int = 4
-    walkers: int = 256
+    walkers: int = 128
     ess: float = 4000.0
     r_hat: float = 1.01
-    rounds: int = 4
-    round_steps: int = 4
+    rounds: int = 3
+    round_draws: int = 4096
     most_rounds: int = 9
     tail: float = 1.5
     acceptance: float = 0.05
     components: int = 6
-    block: int = 16
+    block: int = 32
     most_steps: int = 4000
 
     def __post_init__(self) -> None:

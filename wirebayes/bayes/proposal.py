@@ -67,6 +67,7 @@ def fit(
     *,
     most: int,
     points: int = ENOUGH,
+    before: Proposal | None = None,
 ) -> Proposal:
     """The proposal learned from the burn-in.
 
@@ -85,6 +86,8 @@ def fit(
         The most components of the close mixture; the wide ones, which need not resemble anything, have half as many.
     points : int
         About so many are looked at.
+    before : Proposal, optional
+        Of nearly these points: where the mixtures are sought from.
 
     Raises
     ------
@@ -94,8 +97,11 @@ def fit(
     hot, cold = hot[:: 1 + len(hot) // points], cold[:: 1 + len(cold) // points]
     straight = straighten.fit(cold, order)
     (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
-    close = mixture.fit(near, rng, most=most, degrees=_LIGHT)
-    wide, plain = (mixture.fit(part[::2], rng, most=most // 2) for part in (far, hot))
+    known = (before.close, before.wide, before.plain) if before else (None, None, None)
+    close = mixture.fit(near, rng, most=most, degrees=_LIGHT, before=known[0])
+    wide, plain = (
+        mixture.fit(part[::2], rng, most=most // 2, before=k) for part, k in zip((far, hot), known[1:], strict=True)
+    )
     return Proposal(shares, straight, close, wide, plain, start)
 
 

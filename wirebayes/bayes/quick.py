@@ -14,7 +14,7 @@ from wirebayes.bayes.optimum import Optimum
 from wirebayes.bayes.policy import Policy
 
 Array = NDArray[Any]
-_SHORT = Policy(ensembles=2, walkers=128, rounds=3, round_steps=16, most_rounds=5, tail=np.inf, block=24, most_steps=24)
+_SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, block=32, most_steps=32)
 
 
 def draws(target: Target, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:

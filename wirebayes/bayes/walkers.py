@@ -7,11 +7,12 @@ from typing import Any
 
 import emcee
 import numpy as np
+from emcee.moves.move import Move
 from numpy.typing import NDArray
 
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.mixture import Mixture
-from wirebayes.bayes.moves import EvolutionMove, IndependenceMove
+from wirebayes.bayes.moves import EvolutionMove, PoolMove
 from wirebayes.bayes.proposal import Proposal
 
 Array = NDArray[Any]
@@ -98,7 +99,8 @@ def advance(target: Target, state: State, steps: int, ensembles: int = 1, power:
     def density(z: Array) -> Array:
         return power * target(z)
 
-    sampler = emcee.EnsembleSampler(*state.positions.shape, density, moves=_moves(state, ensembles), vectorize=True)
+    move = _move(state, ensembles, steps)
+    sampler = emcee.EnsembleSampler(*state.positions.shape, density, moves=move, vectorize=True)
     before = target.evaluations
     start = emcee.State(state.positions, log_prob=power * state.values, random_state=state.random)
     end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
@@ -108,13 +110,12 @@ def advance(target: Target, state: State, steps: int, ensembles: int = 1, power:
     return sampler, used
 
 
-def _moves(state: State, ensembles: int) -> list[tuple[Any, float]]:
+def _move(state: State, ensembles: int, steps: int) -> Move:
     if not state.learned:
-        return [(EvolutionMove(ensembles), 1.0)]
-    share = _EVOLUTION if state.frozen else _EXPLORATION
+        return EvolutionMove(ensembles)
     straight = state.proposal.straight if isinstance(state.proposal, Proposal) else None
-    return [(IndependenceMove(state.proposal), 1.0 - share), (EvolutionMove(ensembles, straight), share)]
+    return PoolMove(state.proposal, EvolutionMove(ensembles, straight), steps, _POOL if state.frozen else _EXPLORING)
 
 
-_EVOLUTION = 0.05  # share of steps that do not trust the proposal
-_EXPLORATION = 0.4  # the same in burn-in, which looks for what the proposal leaves out
+_POOL = 64  # steps of which one does not trust the proposal; more gain little
+_EXPLORING = 3  # the same in burn-in, which looks for what the proposal leaves out

@@ -21,7 +21,7 @@ from wirebayes.output import write_json
 from wirebayes.workers import workers
 
 Array = NDArray[np.float64]
-POLICY = Policy(walkers=128, ess=2000.0, most_steps=1200)
+POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=1200)
 MEANINGFUL_ELPD, MEANINGFUL_SE = 4.0, 2.0  # below either, the difference may be chance (Sivula et al. 2020)
 
 

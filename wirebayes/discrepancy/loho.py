@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
 # a posterior without a hold may have a second mode that the one with it never visits, and k says little of that.
 LARGEST_K = 0.5
-REFIT = Policy(walkers=128, ess=1000.0, most_steps=400)
+REFIT = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=400)
 _DRAWS = 4000
 _statistics: Any = array_stats
 

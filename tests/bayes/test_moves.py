@@ -1,0 +1,79 @@
+"""Pools of draws: every place of a stretch has the target's law, and importance sampling's worth."""
+
+import emcee
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.bayes.convergence import autocorrelation_steps
+from wirebayes.bayes.mixture import Mixture
+from wirebayes.bayes.moves import PoolMove
+
+WIDE = Mixture(np.ones(1), np.zeros((1, 1)), np.full((1, 1, 1), 2.0), 1e6)  # normal, twice the target's width
+
+
+def density(x):
+    return -0.5 * x[:, 0] ** 2
+
+
+class Stay(emcee.moves.Move):
+    def propose(self, model, state):
+        return state, np.zeros(len(state.coords), bool)
+
+
+def walked(walkers, steps, most, seed=1):
+    """(steps, walkers) places, begun at exact draws; the move between pools does nothing."""
+    sampler = emcee.EnsembleSampler(walkers, 1, density, moves=PoolMove(WIDE, Stay(), steps, most), vectorize=True)
+    random = np.random.RandomState(seed)
+    sampler.random_state = random.get_state()
+    sampler.run_mcmc(random.normal(size=(walkers, 1)), steps, skip_initial_state_check=True)
+    return sampler
+
+
+@pytest.mark.parametrize("most", [2, 3, 8, 32])
+def test_every_place_of_a_pool_has_the_target_s_law(most):
+    places = walked(20_000, 32, most).get_chain()[..., 0]
+    for at in places:
+        assert stats.kstest(at, "norm").pvalue > 1e-4
+
+
+def test_a_circle_that_begins_where_the_walker_stands_fails(monkeypatch):
+    class Origin:
+        """A generator whose origins are all one; its draws are as ever."""
+
+        def __init__(self, random):
+            self.random = random
+
+        def __getattr__(self, name):
+            return getattr(self.random, name)
+
+        def uniform(self, size):
+            return np.zeros(size)
+
+    def biased(self, model, state, k, pooled=PoolMove._pooled):
+        return pooled(self, model._replace(random=Origin(model.random)), state, k)
+
+    monkeypatch.setattr(PoolMove, "_pooled", biased)
+    places = walked(20_000, 32, 8).get_chain()[..., 0]
+    assert min(stats.kstest(at, "norm").pvalue for at in places) < 1e-12
+
+
+def test_effective_draws_are_those_of_importance_sampling_and_reported_as_they_are():
+    """A sign does not know the weight: 1 / E_p[p/q] effective draws each, sqrt(7) / 4 here, less what the walker's own
+    place takes of its pool and what is drawn between pools."""
+    chain = walked(20_000, 256, 64).get_chain()
+    sign = np.sign(chain).reshape(256, 4, 5000, 1).swapaxes(0, 1)
+    found = 1.0 / autocorrelation_steps(sign)[0]
+    assert 0.85 * np.sqrt(7) / 4 < found < np.sqrt(7) / 4
+    # the spread of means over many runs of 100 walkers, in place of the walkers' own
+    runs = sign.reshape(4, 256, 50, 100).mean(axis=(1, 3)).ravel()
+    assert 1.0 / (256 * 100 * runs.var(ddof=1)) == pytest.approx(found, rel=0.3)
+
+
+def test_steps_that_moved_are_counted_and_the_steps_between_are_spread_evenly():
+    sampler = walked(50, 70, 32)
+    chain = sampler.get_chain()[..., 0]
+    still = np.flatnonzero((chain[1:] == chain[:-1]).all(axis=1)) + 1
+    assert list(still) == [24, 47]  # 24, 23 and 23 steps
+    assert np.array_equal(sampler.backend.accepted, (np.diff(chain, axis=0) != 0).sum(axis=0))
+    assert np.array_equal(sampler.get_log_prob(), -0.5 * chain**2)
