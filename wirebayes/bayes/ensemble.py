@@ -46,7 +46,7 @@ class Chains:
     evaluations, kept_evaluations : int
         Likelihood evaluations of everything, and of the kept steps alone.
     acceptance : float
-        Share of accepted moves among kept steps.
+        Share of kept steps that went to another place.
     learned : bool
         False when the learned move was given up.
     modes : int
