@@ -6,6 +6,7 @@ normal density factors hold by hold in linear time: a Kalman filter whose state 
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -228,6 +229,7 @@ def hold_courses(
     n = np.shape(theta["k1"])[0]
     walk = _Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)
     step = walk.closed_form if not model.effects else walk.complex_step
+    first_alone = partial(walk.closed_form, rows=slice(1)) if not model.effects else walk.complex_step
     fresh = np.zeros(n)
     out: list[tuple[Array, Array, Array] | None] = []
     for j in range(len(protocol.displacement_mm)):
@@ -242,7 +244,7 @@ def hold_courses(
         if model.law == "modified":
             stretched = protocol.length_mm / np.maximum(1.0 - target / walk.k1, 0.1)
         for _ in range(_NEWTON_STEPS):
-            tension, slope, *_ = step(j, stretched, fresh, {})
+            tension, slope, *_ = first_alone(j, stretched, fresh, {})
             # A slack guess has no slope: go out until it pulls.
             pulls = slope[0] > 0
             move = np.where(

@@ -192,8 +192,15 @@ class _Walk:
         after = {key: value.real for key, value in after.items()}
         return y_c.real, y_s.imag / _STEP, y_c.imag / _STEP, out_c.real, out_s.imag / _STEP, out_c.imag / _STEP, after
 
-    def closed_form(self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]) -> Any:
-        """The same without effects: eqs (4)-(6) differentiated by hand."""
+    def closed_form(
+        self,
+        j: int,
+        stretched: NDArray[Any],
+        creep: NDArray[Any],
+        beside: dict[str, NDArray[Any]],
+        rows: slice = slice(None),
+    ) -> Any:
+        """The same without effects, of some of the readings: eqs (4)-(6) differentiated by hand."""
         law, length, k1 = self.model.law, self.protocol.length_mm, self.k1
         zero = length + creep
         first = k1 * laws.strain(stretched, zero, law)
@@ -204,14 +211,14 @@ class _Walk:
         slope = self.U * target / safe * k1
         amount = target - self.kept * creep
         amount_s, amount_c = slope * by_s, slope * by_l - self.kept
-        fraction = self.fraction[self.where[j]]
+        fraction = self.fraction[self.where[j, rows]]
         zero = zero + amount * fraction
         tension = k1 * laws.strain(stretched, zero, law)
         by_s, by_l = laws.strain_slopes(stretched, zero, law)
         stiff = np.where(tension > 0, k1, 0.0)
         by_setting = stiff * (by_s + by_l * (amount_s * fraction))
         by_creep = stiff * (by_l * (1.0 + amount_c * fraction))
-        end = fraction[self.last[j]]
+        end = self.fraction[self.where[j, self.last[j]]]
         out = creep + amount * end
         return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end, beside
 
