@@ -139,6 +139,27 @@ def test_hold_by_hold_is_the_limit_of_a_wide_setting_error_given_the_first_readi
     assert found == pytest.approx(expected[1], rel=1e-5)
 
 
+@pytest.mark.parametrize("key", ["memory", "second_relaxation", "steady_creep", "toe"])
+def test_with_an_effect_too_every_hold_is_a_test_of_its_own_through_its_first_reading(key):
+    model = Model(effects=(named(key),))
+    theta = columns(PLAIN | STRONG)
+    first = np.linspace(1.0, 6.0, len(LOADING.displacement_mm))[:, None]
+    for j, course in enumerate(noise.hold_courses(LOADING, theta, model, first)):
+        if course is None:
+            continue
+        tension, slope, _ = course
+        assert tension[0] == pytest.approx(first[j], rel=1e-9)
+        # the preload by which a wire that was never pulled before comes to the same first reading
+        alone, low, high = protocol([0.0], [TIMES]), -600.0, 600.0
+        for _ in range(200):
+            middle = 0.5 * (low + high)
+            here = simulate(alone, theta | {"preload": np.array([middle])}, model)[0, :, 0]
+            low, high = (middle, high) if here[0] < first[j, 0] else (low, middle)
+        beside = [simulate(alone, theta | {"preload": np.array([middle + h])}, model)[0, :, 0] for h in (1e-4, -1e-4)]
+        assert tension[:, 0] == pytest.approx(here, rel=1e-7)
+        assert slope[:, 0] == pytest.approx((beside[0] - beside[1]) / 2e-4, rel=1e-4)
+
+
 def test_hold_by_hold_is_flat_along_k1_b_for_large_k1():
     theta = PLAIN | {"sensor_sd": 0.01, "U": 0.4}
     y = measured(LOADING, theta | {"setting_sd": 0.0})

@@ -6,7 +6,6 @@ normal density factors hold by hold in linear time: a Kalman filter whose state 
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -228,9 +227,6 @@ def hold_courses(
     """
     n = np.shape(theta["k1"])[0]
     walk = _Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)
-    step = walk.closed_form if not model.effects else walk.complex_step
-    first_alone = partial(walk.closed_form, rows=slice(1)) if not model.effects else walk.complex_step
-    fresh = np.zeros(n)
     out: list[tuple[Array, Array, Array] | None] = []
     for j in range(len(protocol.displacement_mm)):
         if not protocol.mask[j].any():
@@ -239,12 +235,11 @@ def hold_courses(
         target = np.broadcast_to(first[j], (n,))
         valid = target > 0
         target = np.where(valid, target, 1.0)
-        walk.past = []
         stretched = protocol.length_mm * (1.0 + target / walk.k1)
         if model.law == "modified":
             stretched = protocol.length_mm / np.maximum(1.0 - target / walk.k1, 0.1)
         for _ in range(_NEWTON_STEPS):
-            tension, slope, *_ = first_alone(j, stretched, fresh, {})
+            tension, slope = walk.fresh(j, stretched, slice(1))
             # A slack guess has no slope: go out until it pulls.
             pulls = slope[0] > 0
             move = np.where(
@@ -253,8 +248,7 @@ def hold_courses(
             stretched = stretched + move
             if np.max(np.abs(move)) < 1e-12 * protocol.length_mm:
                 break
-            walk.past = []
-        tension, slope, *_ = step(j, stretched, fresh, {})
+        tension, slope = walk.fresh(j, stretched)
         out.append((tension, slope, valid & (slope[0] > 0)))
     return out
 

@@ -192,6 +192,16 @@ class _Walk:
         after = {key: value.real for key, value in after.items()}
         return y_c.real, y_s.imag / _STEP, y_c.imag / _STEP, out_c.real, out_s.imag / _STEP, out_c.imag / _STEP, after
 
+    def fresh(self, j: int, stretched: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Some readings (r, n) of a hold without a past, and their derivatives by the stretched length."""
+        self.past = []
+        uncrept = np.zeros(len(stretched))
+        if not self.model.effects:
+            tension, slope, *_ = self.closed_form(j, stretched, uncrept, {}, rows)
+            return tension, slope
+        moved = self.hold(j, stretched + 1j * _STEP, uncrept, {})[0][rows]
+        return moved.real, moved.imag / _STEP
+
     def closed_form(
         self,
         j: int,
