@@ -17,7 +17,6 @@ from wirebayes.bayes.mixture import rows_by_weight, spread_rows
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3
-_ROUNDS = 2  # of climbs from places that no mode explains
 _LOOKED = 400  # places that are asked whether a mode explains them
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
@@ -197,8 +196,8 @@ def search(
 
     A population of prior draws is cooled to the posterior. Half of the starts, the highest place among them, are spread
     over all places it passed: where it ends, a mode of less weight may have died out, but on the way it lived. The
-    others are chosen among passed places that belong to the hill of no mode found by then, as long as there are any;
-    such a climb is given up where it comes so near to a known mode that it would count as that one.
+    others are chosen among passed places that belong to the hill of no mode found from these; such a climb is given up
+    where it comes so near to a known mode that it would count as that one.
 
     Parameters
     ----------
@@ -222,16 +221,12 @@ def search(
     looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     sag = _sag(target, passed, height, found)
-    for _ in range(_ROUNDS):
-        strange = np.flatnonzero(sag > _LEAST_SAG)
-        if not len(strange):
-            break
+    strange = np.flatnonzero(sag > _LEAST_SAG)
+    if len(strange):
         share = sag[strange] / sag[strange].sum()
-        chosen = rng.choice(strange, min(len(strange), starts // 2 // _ROUNDS), replace=False, p=share)
+        chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
         known = partial(_near, modes=found.z, curvature=found.curvature)
-        new = climb(lambda points, rows: target(points), passed[chosen], until=known)
-        sag[strange] = np.minimum(sag[strange], _sag(target, passed[strange], height[strange], _distinct([new])))
-        found = _distinct([found, new])
+        found = _distinct([found, climb(lambda points, rows: target(points), passed[chosen], until=known)])
     return Search(found, warm, cold)
 
 
