@@ -172,10 +172,14 @@ def _look(target: Target, state: State, policy: Policy) -> None:
 
 
 def _promises_more(state: State, policy: Policy) -> bool:
-    """Whether with a proposal as good as usual, learned once more, draws would be enough after fewer evaluations."""
+    """Whether with a proposal as good as usual, learned once more, draws would be enough after fewer evaluations.
+
+    Or the proposal is so poor that it may be about to find a mode, whose share walkers took from it when they began.
+    """
     going_on = state.kept_evaluations * (policy.ess / state.ess.min() - 1.0)
-    return bool(going_on > policy.ess / _USUAL + policy.round_draws)
+    poor = state.ess.min() < _POOR * state.kept_evaluations
+    return bool(poor or going_on > policy.ess / _USUAL + policy.round_draws)
 
 
 _LEAST_BLOCK = 8
-_USUAL = 0.4  # effective draws per kept evaluation
+_USUAL, _POOR = 0.4, 0.2  # effective draws per kept evaluation
