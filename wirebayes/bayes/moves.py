@@ -23,10 +23,9 @@ class PoolMove(Move):  # type: ignore[misc]
     taken from the pool by weight, systematically: K equal steps around a circle from a random origin, on which
     every member of the pool has an arc as long as its share of the weights. Given the pool, x is any of its members
     with these very shares, and so is each place, independent of which x is, because the origin is: with x from p,
-    every place is from p, and the last one starts the next pool. Neither q nor the size of a pool depends on the
-    walker or changes while draws are kept. q's tails (Student-t) are heavier than the target's, so that p/q is bounded
-    and the chain uniformly ergodic. To adapt q during kept draws would void the argument: fit it to the burn-in, then
-    freeze it.
+    every place is from p, and the last one starts the next pool. q's tails (Student-t) are heavier than the target's,
+    so that p/q is bounded and the chain uniformly ergodic. To adapt q during kept draws would void the argument: fit
+    it to the burn-in, then freeze it.
 
     Metropolis-Hastings compares a walker with one draw at a time and forgets the draw it refuses. Here all draws
     compete at once: nearly as many effective draws come as from importance sampling, on the paper's wires 1.3 to 1.5
