@@ -97,11 +97,9 @@ def fit(
     hot, cold = hot[:: 1 + len(hot) // points], cold[:: 1 + len(cold) // points]
     straight = straighten.fit(cold, order)
     (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
-    known = (before.close, before.wide, before.plain) if before else (None, None, None)
-    close = mixture.fit(near, rng, most=most, degrees=_LIGHT, before=known[0])
-    wide, plain = (
-        mixture.fit(part[::2], rng, most=most // 2, before=k) for part, k in zip((far, hot), known[1:], strict=True)
-    )
+    close = mixture.fit(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None)
+    wide = mixture.fit(far[::2], rng, most=most // 2, before=before.wide if before else None)
+    plain = mixture.fit(hot[::2], rng, most=most // 2, before=before.plain if before else None)
     return Proposal(shares, straight, close, wide, plain, start)
 
 
