@@ -1,5 +1,6 @@
 """Effects led up a ladder of amplitudes, and the global test over names."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,29 @@ def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, na
     truth = naming.refit([block], (0,), trials[best].effect, per_delta, float(data.amplitude[0, best]))
     assert truth.log_bayes > 5.0  # the case is worth testing
     assert max(float(v[0]) for v in found.values()) == pytest.approx(truth.log_bayes, abs=1.5)
+
+
+def test_a_wire_that_goes_slack_in_every_hold_is_climbed_past() -> None:
+    """No setting error moves a reading there, so that what setting errors do has no size to be measured in."""
+    experiments = read_experiments(Path(__file__).parents[1] / "data" / "all-slack.toml")
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
+    (way,) = ladders([block], trials, candidates, [data])
+    found = climb(block, way, block.modes.z[:1])
+    assert np.isfinite([found.log_bayes, found.amplitude, found.norm]).all() and found.log_bayes.max() > -2.0
+
+
+def test_a_data_set_without_a_tangent_says_nothing_and_changes_no_other(tmp_path: Path) -> None:
+    block = block_of(tmp_path, {}, [], 3)
+    trials, _ = screen.candidate_probes([block], {"toe": CATALOGUE["toe"]})
+    x = expand(block.target, np.repeat(block.modes.z[:1], 3, axis=0), trials)
+    for name in ("parameters", "residual", "flexible", "signatures"):
+        for wild in (np.nan, np.inf, 1e200):
+            part = getattr(x, name).copy()
+            part[1] = wild
+            found, before = scan(replace(x, **{name: part})), scan(x)
+            assert found.effects[1] == pytest.approx(0.0) and found.flexible[1] == pytest.approx(0.0)
+            np.testing.assert_allclose(found.effects[[0, 2]], before.effects[[0, 2]], rtol=1e-6, atol=1e-6)
 
 
 def test_rows_climb_alone(tmp_path: Path) -> None:

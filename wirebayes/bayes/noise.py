@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.linear_algebra import inv, log_determinant, solve
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, Model, Theta, _Walk
 
@@ -176,7 +177,7 @@ def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance:
     scaled = jac.reshape(n, holds * width, holds) * (setting_sd / np.sqrt(variance))[:, None, None]
     usable = np.asarray(np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(residual).all(axis=(1, 2)))
     scaled, residual = np.where(usable[:, None, None], scaled, 0.0), np.where(usable[:, None, None], residual, 0.0)
-    inner = np.linalg.inv(np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
+    inner = inv(np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
     r = residual.reshape(n, holds * width)
     along = np.einsum("nbj,nb->nj", scaled, r)
     pulled = (r - np.einsum("nai,ni->na", scaled, np.einsum("nij,nj->ni", inner, along))) / variance[:, None]
@@ -186,9 +187,10 @@ def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance:
         k = scaled[:, rows]
         block = (np.eye(len(rows)) - k @ inner @ np.swapaxes(k, 1, 2)) / variance[:, None, None]
         q = pulled[:, rows]
-        _, logdet = np.linalg.slogdet(block)
-        square = np.einsum("na,na->n", q, np.linalg.solve(block, q[..., None])[..., 0])
-        out[j] = np.where(usable, -0.5 * (square - logdet + len(rows) * _LOG_2PI), -np.inf)
+        logdet = log_determinant(block)
+        square = np.einsum("na,na->n", q, solve(block, q[..., None])[..., 0])
+        value = -0.5 * (square - logdet + len(rows) * _LOG_2PI)
+        out[j] = np.where(usable & np.isfinite(value), value, -np.inf)
     return out
 
 

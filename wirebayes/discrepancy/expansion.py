@@ -6,7 +6,7 @@ scale of the noise is integrated out, ρ is summed over a grid, so no test trust
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from wirebayes.bayes import noise
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.problem import Problem
 from wirebayes.discrepancy import flexible
+from wirebayes.linear_algebra import eigh, solve
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import Model, linearise, simulate
 
@@ -302,11 +303,12 @@ def _points(target: Target, z: Array, readings: Sequence[Array] | None, moving: 
 
 def _tangent(target: Target, z: Array, points: Sequence[_Point], moving: list[int]) -> Tangent:
     k = _block_diagonal([p.by_setting for p in points])
-    beyond = ~np.isfinite(k).all(axis=(1, 2))  # what the model cannot compute has no tangent
+    beyond = ~(np.abs(k) < _LARGEST).all(axis=(1, 2))  # what the model cannot compute has no tangent
     k[beyond] = 1.0
-    # K's size is what ρ measures: give it a typical column of length one.
+    # K's size is what ρ measures: give it a typical column of length one. It has none where the wire is slack
+    # throughout: then no setting error moves any reading.
     ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
-    left, singular, _ = np.linalg.svd(k / np.sqrt(ratio)[:, None, None], full_matrices=False)
+    left, singular, _ = np.linalg.svd(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None], full_matrices=False)
     gradient, precision = _prior(target, z, moving)
     residual = np.concatenate([p.residual for p in points], axis=1)
     residual[beyond] = np.nan
@@ -329,7 +331,8 @@ def signature(problem: Problem, own: dict[str, Array], model: Model, at: int, pr
 
 
 def scan(x: Expansion) -> Scan:
-    """Log Bayes factors of every probe and of the flexible reference."""
+    """Log Bayes factors of every probe and of the flexible reference; zero for a row that has no tangent."""
+    x = _without_tangent(x)
     p, m = x.parameters.shape[2], x.signatures.shape[2]
     degrees, least = x.degrees, x.least
     columns = np.concatenate([x.parameters, x.signatures, x.flexible, x.residual[..., None]], axis=2)
@@ -352,13 +355,17 @@ def scan(x: Expansion) -> Scan:
         mm = square - (levels[..., p : p + m] * weighted[..., p : p + m]).sum(axis=1)
         mr = mr0 - (levels[..., p : p + m] * weighted[..., -1:]).sum(axis=1)
         rr = rr0 - (levels[..., -1] * weighted[..., -1]).sum(axis=1)
-        solved = np.linalg.solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
+        solved = solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
+        # There may be a ratio at which the parameters cannot be told apart: it is left out.
+        regular = np.asarray(np.isfinite(solved).all(axis=(1, 2)))
+        solved = np.where(regular[:, None, None], solved, 0.0)
         sr, sm, sf = solved[..., 0], solved[..., 1 : m + 1], solved[..., m + 1 :]
         rss = rr - (pr * sr).sum(axis=1) + x.prior_square
         b = mr - np.einsum("npm,np->nm", pm, sr)
         c = mm - (pm * sm).sum(axis=1)
         c = np.where(c > ABSORBED * square, c, np.inf)
         shared = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
+        shared = np.where(regular, shared, -np.inf)
         for key, piece in (("shared", shared), ("rss", rss), ("along", b), ("square", c)):
             kept[key].append(piece)
         b = np.where(x.one_sided, np.maximum(b, 0.0), b)
@@ -370,7 +377,7 @@ def scan(x: Expansion) -> Scan:
         )
         ff = ff0 - np.swapaxes(levels[..., functions], 1, 2) @ weighted[..., functions] - np.swapaxes(pf, 1, 2) @ sf
         fr = fr0 - np.einsum("nhf,nh->nf", levels[..., functions], weighted[..., -1]) - np.einsum("npf,np->nf", pf, sr)
-        values, vectors = np.linalg.eigh(ff)
+        values, vectors = eigh(ff)
         values = np.maximum(values, 0.0)
         along = np.einsum("nfg,nf->ng", vectors, fr) ** 2
         variance = np.maximum(rss, least) / degrees
@@ -396,6 +403,19 @@ def scan(x: Expansion) -> Scan:
             x.one_sided,
         ),  # fmt: skip
     )
+
+
+def _without_tangent(x: Expansion) -> Expansion:
+    """Rows that have no tangent, where the model overflows or jumps, as rows in which nothing is seen."""
+    parts = {name: getattr(x, name) for name in ("parameters", "signatures", "flexible")} | {
+        "residual": x.residual[..., None]
+    }
+    with np.errstate(invalid="ignore"):
+        seen = np.all([(np.abs(a) < _LARGEST).all(axis=(1, 2)) for a in parts.values()], axis=0)
+    if seen.all():
+        return x
+    parts = {name: np.where(seen[:, None, None], a, 0.0) for name, a in parts.items()}
+    return replace(x, **parts | {"residual": parts["residual"][..., 0]})
 
 
 def projected(x: Expansion, ratio: float) -> Array:
@@ -443,7 +463,7 @@ def _prior(target: Target, z: Array, moving: list[int]) -> tuple[Array, Array]:
     values = prior_density(target, np.concatenate([z, *_shifted(z, moving, h), *_shifted(z, moving, -h)]))
     centre, plus, minus = values[:n, None], *values[n:].reshape(2, p, n).swapaxes(1, 2)
     # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
-    inside = np.isfinite(plus) & np.isfinite(minus)
+    inside = np.isfinite(plus) & np.isfinite(minus) & np.isfinite(centre)
     with np.errstate(invalid="ignore"):
         gradient = np.where(inside, (plus - minus) / (2 * h), 0.0)
         diagonal = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
@@ -469,5 +489,6 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 
 _STEP = 1e-5
+_LARGEST = 1e100  # of any derivative: the square of a larger one overflows
 _LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
 ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

@@ -13,6 +13,7 @@ from wirebayes.bayes.linear import completed
 from wirebayes.bayes.problem import Problem, build
 from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.experiment import Experiment
+from wirebayes.linear_algebra import log_determinant, solve
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import linearise
 
@@ -107,9 +108,10 @@ def held_out(
                 + variance[:, None, None] * np.eye(keep.sum())
             )
             r = (y - mean).T
-            _, logdet = np.linalg.slogdet(cov)
-            square = np.einsum("nr,nr->n", r, np.linalg.solve(cov, r[..., None])[..., 0])
-            elpd.append(logsumexp(-0.5 * (square + logdet + len(y) * np.log(2 * np.pi))) - np.log(len(theta)))
+            logdet = log_determinant(cov)
+            square = np.einsum("nr,nr->n", r, solve(cov, r[..., None])[..., 0])
+            log_p = -0.5 * (square + logdet + len(y) * np.log(2 * np.pi))
+            elpd.append(logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf)) - np.log(len(theta)))
             drawn = mean + rng.normal(size=mean.shape) * np.sqrt(variance + c**2 * p + s**2 * q)
             low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
             inside.append((y[:, 0] >= low) & (y[:, 0] <= high))

@@ -35,6 +35,7 @@ from wirebayes.discrepancy.expansion import (
 )
 from wirebayes.discrepancy.naming import occam
 from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
+from wirebayes.linear_algebra import solve
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import Each
 
@@ -263,7 +264,9 @@ def _weigh(
     for ratio in RATIOS:
         gram = whole - np.swapaxes(levels, 1, 2) @ (damp(x.singular, ratio)[..., None] * levels)
         pp, pr, pm = gram[:, :p, :p] + x.prior_precision, gram[:, :p, -1] + x.prior_gradient, gram[:, :p, p]
-        solved = np.linalg.solve(pp, np.stack([pr, pm], axis=-1))
+        solved = solve(pp, np.stack([pr, pm], axis=-1))
+        regular = np.asarray(np.isfinite(solved).all(axis=(1, 2)))
+        solved = np.where(regular[:, None, None], solved, 0.0)
         # Not less what a further step promises: far out, steps promise more than they keep.
         rss = gram[:, -1, -1]
         b = gram[:, p, -1] - (pm * solved[..., 0]).sum(axis=1)
@@ -272,7 +275,7 @@ def _weigh(
         a = np.clip(np.divide(b, c, out=np.zeros(n), where=c > 0), near, far)
         left = np.maximum(rss - 2.0 * a * b + a**2 * c, x.least)
         volume = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
-        height.append(volume - 0.5 * degrees * np.log(left))
+        height.append(np.where(regular, volume - 0.5 * degrees * np.log(left), -np.inf))
         move.append(a)
         norm.append(np.sqrt(c * degrees / left))
         steps.append(solved[..., 0])

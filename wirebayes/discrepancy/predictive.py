@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes import noise
 from wirebayes.bayes.problem import Problem, Sample
+from wirebayes.linear_algebra import eigh, solve
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model, Theta, _Walk, linearise
 
@@ -125,7 +126,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
         right += np.einsum("nrh,nr->nh", scaled, residual)
         carried = line.carry_by_creep[j] * carried
         carried[j] = line.carry_by_setting[j]
-    eigen, vectors = np.linalg.eigh(square)
+    eigen, vectors = eigh(square)
     precision = 1.0 + np.maximum(eigen, 0.0)
     along = np.einsum("nij,ni->nj", vectors, right) / precision + rng.normal(size=(n, holds)) / np.sqrt(precision)
     drawn: Array = np.einsum("nij,nj->in", vectors, along) * own["setting_sd"]
@@ -161,5 +162,8 @@ def _given_first(drawn: Array, question: Question) -> Array:
 def _regressed(drawn: Array, first: Array, observed_N: Array) -> Array:
     """Joint draws (R, n) moved to where `first` (m, n) takes its observed values (m,)."""
     centred = first - first.mean(axis=1, keepdims=True)
-    gain = np.linalg.solve(centred @ centred.T, centred @ (drawn - drawn.mean(axis=1, keepdims=True)).T).T
+    square, across = centred @ centred.T, centred @ (drawn - drawn.mean(axis=1, keepdims=True)).T
+    gain = solve(square, across).T
+    if not np.isfinite(gain).all() and np.isfinite(square).all():  # given readings that do not vary, or vary as one
+        gain = (np.linalg.pinv(square, hermitian=True) @ across).T
     return drawn + gain @ (observed_N[:, None] - first)
