@@ -129,6 +129,7 @@ def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | 
         duration_s=np.array([hold.duration_s for hold in holds]),
         number=np.array([-1 if hold.number is None else hold.number for hold in holds], dtype=np.int64),
         warming_K=warming,
+        reference_C=None if reference_C is None else float(reference_C),
     )
 
 

@@ -9,6 +9,7 @@ from wirebayes.bayes import jobs, result
 from wirebayes.bayes.fit import fit
 from wirebayes.bayes.jobs import Job
 from wirebayes.bayes.policy import Policy
+from wirebayes.bayes.problem import build
 from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.experiment import read_experiments
@@ -61,3 +62,17 @@ def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(
     (tmp_path / "long/final/summary.json").unlink()
     jobs.run([job], tmp_path, 0, policy=HASTY)
     assert [(tmp_path / folder / "summary.json").read_text() for folder in job.folders] == said
+
+
+def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):
+    """Later holds need it: their warming counts from a temperature that their protocol does not repeat."""
+    write(tmp_path, BENCHES, Truth(), 3)
+    table = (tmp_path / "long.csv").read_text().splitlines()
+    logged = [table[0] + ",temperature_C", *(f"{row},{21.5 + 0.1 * i}" for i, row in enumerate(table[1:]))]
+    (tmp_path / "long.csv").write_text("\n".join(logged) + "\n")
+    experiments = read_experiments(tmp_path / "experiments.toml")
+    result.save(fit(build(experiments), 1, policy=HASTY), tmp_path, {})
+    short, long = (result.load(tmp_path, e.name).sample.protocol for e in experiments)
+    assert short.reference_C is None and short.warming_K is None
+    assert long.reference_C == 21.5
+    assert np.array_equal(long.warming_K, experiments[1].protocol().warming_K)

@@ -75,15 +75,35 @@ def test_same_seed_same_bytes_and_another_seed_others(fits: Path, protocol: Call
     assert one == again != other
 
 
-def test_history_matters_and_its_absence_is_said(
+def test_later_holds_continue_the_tested_sample_unless_a_fresh_one_is_meant(
     fits: Path, protocol: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     after = predicted(fits, protocol([8, 12]))[5:]
-    assert not capsys.readouterr().err
-    fresh = predicted(fits, protocol([12]))
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "hold 12 predicted as a continuation of the tested sample" in said
+    assert "hold 8 of the training predicted as replicates" in said and "holds 9 to 11 not in its history" in said
+    alone = predicted(fits, protocol([12]))
+    assert alone == after
+    assert "hold 12 predicted as a continuation of the tested sample" in capsys.readouterr().err
+    fresh = predicted(fits, protocol([12]), "--fresh")
     assert "fresh sample" in capsys.readouterr().err
     # a wire pulled to 12 mm at once has crept less before its first reading there
     assert float(fresh[0]["mean_N"]) > float(after[0]["mean_N"])
+
+
+def test_a_fresh_sample_may_use_the_numbers_of_the_training(fits: Path, protocol: Callable[..., Path]) -> None:
+    same = predicted(fits, protocol([12]), "--fresh")
+    path = protocol([8], changes={f"8,8,{t}": f"8,12,{t}" for t in (0, 30, 60, 90, 120)})
+    assert [{**row, "hold": "12"} for row in predicted(fits, path, "--fresh")] == same
+
+
+def test_the_holds_to_come_are_met_without_repeating_the_training(fits: Path, protocol: Callable[..., Path]) -> None:
+    rows = predicted(fits, protocol([9, 10, 11, 12]))
+    measured = experiments()[1].tension()[8:].ravel()
+    miss = np.abs(measured - [float(r["mean_N"]) for r in rows]) / [float(r["sd_N"]) for r in rows]
+    fresh = predicted(fits, protocol([9, 10, 11, 12]), "--fresh")
+    far = np.abs(measured - [float(r["mean_N"]) for r in fresh]) / [float(r["sd_N"]) for r in fresh]
+    assert np.sqrt(np.mean(miss**2)) < 0.5 * np.sqrt(np.mean(far**2))
 
 
 def test_given_first_readings_narrow_what_follows(fits: Path, protocol: Callable[..., Path]) -> None:

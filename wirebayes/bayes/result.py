@@ -159,6 +159,9 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
             reference = float(np.exp(np.mean(np.log(lengths))))
             draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
             draws = _by_length(draws, model.effects, lengths[at], reference)
+        if "reference_C" not in constant.attrs:
+            raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+        reference_C = json.loads(constant.attrs["reference_C"])[at]
         here = constant["held"].values.astype(bool)
         protocol = Protocol(
             float(lengths[at]),
@@ -167,7 +170,8 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
             constant["mask"].values[here].astype(bool),
             constant["duration_s"].values[here],
             constant["number"].values[here].astype(np.int64),
-            constant["warming_K"].values[here] if "warming_K" in constant else None,
+            None if reference_C is None else constant["warming_K"].values[here],
+            reference_C,
         )
         tension = np.nan_to_num(observed["tension_N"].values[here])[..., None]
         resolutions = json.loads(about["resolutions_N"])
@@ -295,6 +299,7 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
         tree[group].attrs.clear()
         for name, variable in tree[group].data_vars.items():
             variable.attrs["units"] = unit_of(str(name), members[0].model.effects)
+    tree["constant_data"].attrs["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
     tree["posterior"].attrs.update(about)
     tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
     return tree

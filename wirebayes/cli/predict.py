@@ -19,6 +19,9 @@ ModelOption = Annotated[
     typer.Option("--model", help="In a folder of discover: the plain model or the final one (the default)."),
 ]
 Table = Annotated[Path, typer.Option("--output", metavar="FILE.csv", help="The table to write.")]
+Fresh = Annotated[
+    bool, typer.Option("--fresh", help="Predict a fresh sample with no history instead of the tested one.")
+]
 OwnEffects = Annotated[
     Path | None, typer.Option("--own-effects", metavar="FILE.py", help="Your own effects, where the fit used them.")
 ]
@@ -30,25 +33,26 @@ def predict(
     output: Table,
     experiment: ExperimentName = None,
     model: ModelOption = None,
+    fresh: Fresh = False,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
     """Predict the readings of holds not measured yet.
 
-    Holds of the training are answered as replicates, holds after them given all training readings; a protocol
-    without a hold of the training is that of a fresh sample with no history, its preload as uncertain as the fit's.
-    A first reading in tension_N conditions its hold and those after it.
+    Holds of the training are answered as replicates. Holds with later numbers continue the tested sample: they begin
+    when the last trained hold ended and are predicted given all training readings, whether or not PROTOCOL repeats
+    training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
+    fit's. A first reading in tension_N conditions its hold and those after it.
     """
     from wirebayes.discrepancy.question import read_question
     from wirebayes.discrepancy.table import HEADER, table
     from wirebayes.output import check_file, write_csv
 
     stored = find_posterior(folder, experiment, model, own_effects)
-    asked = read_question(protocol, stored)
+    asked = read_question(protocol, stored, fresh=fresh)
     check_file(output)
     write_csv(output, HEADER, table(asked, seed))
-    if asked.fresh:
-        typer.echo(f"{protocol}: repeats no trained hold, so predicted as a fresh sample with no history", err=True)
+    typer.echo(f"{protocol}: {asked.sentence}", err=True)
 
 
 def find_posterior(

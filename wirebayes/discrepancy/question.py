@@ -1,5 +1,6 @@
-"""What a protocol file asks of a stored posterior: replicates, holds to come, or a fresh sample."""
+"""What a protocol file asks of a stored posterior: replicates, holds that continue the test, or a fresh sample."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,21 +26,21 @@ class Asked:
     Attributes
     ----------
     stored : Stored
-        The posterior; without the one-off events where a fresh sample is asked for, as they happened to another.
+        The posterior; for a fresh sample without the one-off events, which happened to the tested one.
     question : Question
     holds : tuple of Hold
         As the file has them; the asked holds of the question in the same order.
-    fresh : bool
-        No hold of the training is repeated, so nothing went before.
+    sentence : str
+        Which sample is predicted, given what.
     """
 
     stored: Stored
     question: Question
     holds: tuple[Hold, ...]
-    fresh: bool
+    sentence: str
 
 
-def read_question(path: Path, stored: Stored) -> Asked:
+def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Asked:
     """Read a protocol file and check it against what was trained on.
 
     Parameters
@@ -48,6 +49,9 @@ def read_question(path: Path, stored: Stored) -> Asked:
         Columns ``hold,displacement_mm,time_s``, with ``temperature_C`` where the training data had it, and optionally
         ``tension_N``, filled only at a hold's first time.
     stored : Stored
+    fresh : bool
+        The file is the whole history of another sample. Otherwise its holds are those of the tested sample: repeated
+        ones are replicated, later ones begin when the last trained hold ended.
 
     Returns
     -------
@@ -60,28 +64,61 @@ def read_question(path: Path, stored: Stored) -> Asked:
     """
     trained = stored.sample.protocol
     file = _File(path, read_protocol(path, trained.length_mm))
-    file.check_temperature(trained.warming_K is not None)
+    file.check_temperature(trained.reference_C is not None)
     if stored.likelihood == "hold":
         file.check_first_readings()
-    row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     first = np.array([hold.tension_N[0] for hold in file.holds])
-    repeated = np.array([hold.number in row_of for hold in file.holds])
-    if not repeated.any():
+    if fresh:
         began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
         alone = protocol_of(file.holds, trained.length_mm, began_at)
-        return Asked(_without_events(stored), Question(alone, 0, np.ones(len(first), bool), first), file.holds, True)
+        question = Question(alone, 0, np.ones(len(first), bool), first)
+        return Asked(_without_events(stored), question, file.holds, _FRESH)
+    row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     file.check_repeats(trained, row_of)
-    rows = np.array([row_of[int(h.number or 0)] for h, known in zip(file.holds, repeated, strict=True) if known])
+    repeated = np.array([hold.number in row_of for hold in file.holds])
+    rows = np.array([row_of[int(h.number or 0)] for h, known in zip(file.holds, repeated, strict=True) if known], int)
     asked = np.zeros(len(trained.number), bool)
     asked[rows] = True
     given = np.full(len(trained.number), np.nan)
     given[rows] = first[repeated]
     after = tuple(h for h, known in zip(file.holds, repeated, strict=True) if not known)
-    reference = file.reference_C(trained, row_of)
-    whole = _joined(trained, protocol_of(after, trained.length_mm, reference)) if after else trained
+    whole = _joined(trained, protocol_of(after, trained.length_mm, trained.reference_C)) if after else trained
     everything = np.append(asked, np.ones(len(after), bool))
     question = Question(whole, len(trained.number), everything, np.append(given, first[~repeated]))
-    return Asked(stored, question, file.holds, False)
+    sentence = _tested(tuple(trained.number[rows]), [int(h.number or 0) for h in after], max(row_of), stored.likelihood)
+    return Asked(stored, question, file.holds, sentence)
+
+
+_FRESH = "predicted as a fresh sample with no history: the protocol is all that ever happened to it"
+
+
+def _tested(replicates: Sequence[int], later: Sequence[int], last: int, likelihood: str) -> str:
+    """Which holds of the tested sample are predicted, given what, and which hold numbers its history leaves out."""
+    parts = []
+    if replicates:
+        parts.append(f"{_listed(_ranges(replicates))} of the training predicted as replicates")
+    if later:
+        given = "all training readings" if likelihood == "chain" else "the first reading of each"
+        parts.append(
+            f"{_listed(_ranges(later))} predicted as a continuation of the tested sample from the end of "
+            f"hold {last} on, given {given} (--fresh for a fresh sample)"
+        )
+        skipped = [(a + 1, b - 1) for a, b in zip([last, *later], later, strict=False) if b > a + 1]
+        if skipped:
+            parts.append(f"nothing is assumed to have happened in between: {_listed(skipped)} not in its history")
+    return "; ".join(parts)
+
+
+def _ranges(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """First and last of each run of neighbours among rising numbers."""
+    ends = [i for i, n in enumerate(numbers) if i + 1 == len(numbers) or numbers[i + 1] != n + 1]
+    starts = [0, *(i + 1 for i in ends[:-1])]
+    return [(int(numbers[i]), int(numbers[j])) for i, j in zip(starts, ends, strict=True)]
+
+
+def _listed(ranges: Sequence[tuple[int, int]]) -> str:
+    several = len(ranges) > 1 or ranges[0][0] != ranges[0][1]
+    return f"hold{'s' * several} " + ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in ranges)
 
 
 @dataclass(frozen=True)
@@ -117,7 +154,7 @@ class _File:
             if number not in row_of:
                 if number < last:
                     known = ", ".join(str(n) for n in sorted(row_of))
-                    expected = f"one of the trained holds ({known}), or one after hold {last}"
+                    expected = f"one of the trained holds ({known}), or one after hold {last}, or --fresh"
                     raise self.complain(i, 0, "hold", str(number), expected)
                 continue
             row = row_of[number]
@@ -133,25 +170,13 @@ class _File:
                     listed = ", ".join(f"{t:g}" for t in times)
                     expected = f"the times hold {number} was trained on: {listed}"
                     raise self.complain(i, k, "time_s", f"{hold.time_s[k]:g}", expected)
-
-    def reference_C(self, trained: Protocol, row_of: dict[int, int]) -> float | None:
-        """The temperature that warming counts from: what the repeated holds' temperatures say it was."""
-        if self.holds[0].temperature_C is None or trained.warming_K is None:
-            return None
-        reference: float | None = None
-        for i, hold in enumerate(self.holds):
-            if hold.number not in row_of or hold.temperature_C is None:
-                continue
-            row = row_of[int(hold.number)]
-            warming = trained.warming_K[row][trained.mask[row]]
-            if reference is None:
-                reference = float(hold.temperature_C[0] - warming[0])
-            wrong = np.flatnonzero(np.abs(hold.temperature_C - reference - warming) > _SAME_K)
-            if len(wrong):
-                k = int(wrong[0])
-                expected = f"{reference + warming[k]:g}, as hold {hold.number} was trained on"
-                raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
-        return reference
+            if hold.temperature_C is not None and trained.warming_K is not None and trained.reference_C is not None:
+                logged = trained.reference_C + trained.warming_K[row][trained.mask[row]]
+                wrong = np.flatnonzero(np.abs(hold.temperature_C - logged) > _SAME_K)
+                if len(wrong):
+                    k = int(wrong[0])
+                    expected = f"{logged[k]:g}, as hold {number} was trained on"
+                    raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
 
 
 _SAME_K = 1e-6
@@ -175,6 +200,7 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
         duration_s=np.concatenate([before.duration_s, after.duration_s]),
         number=np.concatenate([before.number, after.number]),
         warming_K=warming,
+        reference_C=before.reference_C,
     )
 
 

@@ -29,6 +29,8 @@ class Protocol:
         The hold numbers of the readings' file; -1 for an unrecorded hold.
     warming_K : (H, R) array or None
         Logged temperature minus the first logged reading.
+    reference_C : float or None
+        That first logged reading; None where no temperature was logged.
     """
 
     length_mm: float
@@ -38,6 +40,7 @@ class Protocol:
     duration_s: Floats
     number: NDArray[np.int64]
     warming_K: Floats | None = None
+    reference_C: float | None = None
 
     @property
     def recorded(self) -> NDArray[np.bool_]:
