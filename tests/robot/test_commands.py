@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from wirebayes.cli import main
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 
+DOCS = Path(__file__).parents[2] / "docs" / "example"
 PROTOCOL = Protocol(
     length_mm=1000.0,
     displacement_mm=np.array([1.0, 13.0]),
@@ -168,13 +170,31 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
     assert "combinations of lengths" in page
 
 
-def test_the_documented_session_is_one():
-    from pathlib import Path
+def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(fitted, tmp_path, capsys):
+    """One hold read, its tensions five times too large: no lengths near their references make these."""
+    header, unread, read = (DOCS / "linear-7-session.csv").read_text().splitlines()[:3]
+    cells = read.split(",")
+    wrong = [str(5 * float(cell)) if name.startswith("tension_") else cell
+             for name, cell in zip(header.split(","), cells, strict=True)]  # fmt: skip
+    file, out = tmp_path / "session.csv", tmp_path / "out"
+    file.write_text("\n".join([header, unread, ",".join(wrong)]) + "\n")
+    arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]
+    for _ in range(2):  # a finished folder says it again
+        assert main(arguments) == 0
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("not converged with the creep model")
+    said = json.loads((out / "calibrate.json").read_text())
+    assert not said["with_creep_model"]["converged"]
+    assert said["joint_values_for_home_m"] is None and said["pose_now"] is None
+    assert main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text()
+    assert "Not converged" in page and "Joint values that bring" not in page
 
+
+def test_the_documented_session_is_one():
     from wirebayes.robot import schema, session_file
 
-    file = Path(__file__).parents[2] / "docs" / "example" / "linear-7-session.csv"
-    session, readings = session_file.read(file, schema.read("linear-7"), 0.02, 1e-3)
+    session, readings = session_file.read(DOCS / "linear-7-session.csv", schema.read("linear-7"), 0.02, 1e-3)
     assert session.read.tolist() == [False] + [True] * 8
     assert len(readings) == 8 * 7
 

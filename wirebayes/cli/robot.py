@@ -92,6 +92,7 @@ def calibrate(
     """Current zero-tension length of every wire from joint values and tensions, no external sensor needed."""
     from wirebayes.errors import InputError
     from wirebayes.output import open_run, write_json
+    from wirebayes.report.page import read_json
     from wirebayes.robot import schema, session_file
     from wirebayes.robot.calibration_answer import answer
     from wirebayes.robot.session import Prior
@@ -104,11 +105,17 @@ def calibrate(
     line = read_wires(wires, draws, experiment, own_effects)
     options = (experiment, tension_sd, tilt_sd, reference_sd, spread, _content(readings))
     run = open_run(output, _configuration("calibrate", robot, wires, draws, seed, own_effects, *options))
-    if run.state == "done":
-        return
-    prior = Prior(line, 1e-3 * reference_sd, spread)
-    write_json(run.directory / "calibrate.json", answer(machine, prior, session, values, seed))
-    run.finish()
+    file = run.directory / "calibrate.json"
+    if run.state != "done":
+        prior = Prior(line, 1e-3 * reference_sd, spread)
+        write_json(file, answer(machine, prior, session, values, seed))
+        run.finish()
+    found = read_json(file)
+    models = {"with_creep_model": "the creep model", "by_hooke_alone": "Hooke's law alone"}
+    astray = [words for key, words in models.items() if not found[key]["converged"]]
+    if astray:
+        advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
+        typer.echo(f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}", err=True)
 
 
 def export(

@@ -11,8 +11,11 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """Tell ``calibrate.json``."""
     found = read_json(folder / "calibrate.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
+    first: list[Block] = [Columns([_done(found), _known(found), _unknown(creep, hooke)])]
+    if not creep["converged"]:
+        first.insert(0, Text("Not converged: use none of these lengths.", strong=True))
     sections = [
-        Section("In a minute", [Columns([_done(found), _known(found), _unknown(creep, hooke)])]),
+        Section("In a minute", first),
         Section("Lengths", [_lengths(creep, hooke)]),
         Section("What to do", _next(found)),
     ]
@@ -30,6 +33,8 @@ def _done(found: dict[str, Any]) -> Points:
 
 
 def _known(found: dict[str, Any]) -> Points:
+    if found["pose_now"] is None:
+        return Points("What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]])
     sd = [1e3 * v for v in found["with_creep_model"]["length_m"]["sd"]]
     place = ", ".join(number(v) for v in found["pose_now"]["position_m"])
     text = f"Every length is known to {span(min(sd), max(sd), 2)} mm (standard error)."
@@ -69,10 +74,13 @@ def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
 
 
 def _next(found: dict[str, Any]) -> list[Block]:
-    joints = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])
+    joints = "No joint values are given: read more poses, or check the readings and their stated errors."
+    if found["joint_values_for_home_m"] is not None:
+        values = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])
+        joints = f"Joint values that bring the platform to its home pose now, m: {values}."
     rows = [[f"{v:.3f}" for v in place] for place in found["next_positions_m"]]
     caption = "Positions whose readings would shrink the lengths' uncertainty most, the most useful first."
     return [
-        Text(f"Joint values that bring the platform to its home pose now, m: {joints}."),
+        Text(joints),
         Table(["x, m", "y, m", "z, m"], rows, caption),
     ]

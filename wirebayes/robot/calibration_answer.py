@@ -31,7 +31,7 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
     Returns
     -------
     dict
-        The content of ``calibrate.json``.
+        The content of ``calibrate.json``; without a pose and joint values where the search did not converge.
     """
     known = calibrate(robot, prior, session, readings[None])
     plain = calibrate(robot, replace(prior, creeps=False), session, readings[None])
@@ -44,10 +44,12 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
         "with_creep_model": _lengths(robot, prior, known),
         "by_hooke_alone": _lengths(robot, prior, plain),
     }
-    poses = known.position_m, known.rotation
-    content["pose_now"] = {"position_m": poses[0][0], "rotation_vector_rad": rotation.vector(poses[1])[0]}
-    home = rotation.matrix(robot.home_rotation_rad)
-    content["joint_values_for_home_m"] = corrected(robot, prior, known, robot.home_m, home)[0]
+    content["pose_now"] = content["joint_values_for_home_m"] = None
+    if known.converged[0]:  # else nobody should send the robot anywhere by it
+        turn = rotation.vector(known.rotation)[0]
+        content["pose_now"] = {"position_m": known.position_m[0], "rotation_vector_rad": turn}
+        home = rotation.matrix(robot.home_rotation_rad)
+        content["joint_values_for_home_m"] = corrected(robot, prior, known, robot.home_m, home)[0]
     return content | _observed(robot, prior, session, np.random.default_rng(seed))
 
 
