@@ -7,7 +7,7 @@ from scipy import stats
 
 from wirebayes.bayes.convergence import autocorrelation_steps
 from wirebayes.bayes.mixture import Mixture
-from wirebayes.bayes.moves import PoolMove
+from wirebayes.bayes.moves import EvolutionMove, PoolMove
 
 WIDE = Mixture(np.ones(1), np.zeros((1, 1)), np.full((1, 1, 1), 2.0), 1e6)  # normal, twice the target's width
 
@@ -77,3 +77,45 @@ def test_steps_that_moved_are_counted_and_the_steps_between_are_spread_evenly():
     assert list(still) == [24, 47]  # 24, 23 and 23 steps
     assert np.array_equal(sampler.backend.accepted, (np.diff(chain, axis=0) != 0).sum(axis=0))
     assert np.array_equal(sampler.get_log_prob(), -0.5 * chain**2)
+
+
+def squared_jumps(before, proposed, log_factor, target):
+    """Mean squared distance a Metropolis step goes, refusals counted as zero."""
+    accepted = np.minimum(0.0, target(proposed) - target(before) + log_factor)
+    return np.mean(np.exp(accepted) * np.sum((proposed - before) ** 2, axis=1))
+
+
+@pytest.mark.parametrize("dimensions", [3, 8, 20])
+@pytest.mark.parametrize("straightened", [False, True])
+def test_steps_of_differential_evolution_are_nearly_the_best_length(dimensions, straightened):
+    """Against normal random walks of every length on a normal target; a tenth of the length goes a hundredth as far."""
+    random, n = np.random.RandomState(2), 20_000
+
+    def target(x):
+        return -0.5 * np.sum(x**2, axis=1)
+
+    x, others = random.normal(size=(2, n, dimensions))
+    step = random.normal(size=(n, dimensions))
+    walks = [squared_jumps(x, x + length * step, 0.0, target) for length in np.geomspace(0.05, 3.0, 60)]
+
+    class Round:  # a round cloud is straight already
+        def forward(self, x):
+            return x, np.zeros(len(x))
+
+        def inverse(self, u):
+            return u
+
+    move = EvolutionMove(1, Round() if straightened else None)
+    found = squared_jumps(x, *move.get_proposal(x, [others], random), target)
+    # the rest is spent on steps from mode to mode, or on short ones
+    assert found > 0.7 * max(walks)
+
+
+def test_without_straightening_some_steps_lead_from_mode_to_mode():
+    """Two modes a hundred widths apart: one step in five is a whole difference, a quarter of those leads across."""
+    random = np.random.RandomState(3)
+    x, others = (random.normal(size=(10_000, 2)) + 100.0 * (np.arange(10_000) % 2)[:, None] for _ in range(2))
+    proposed, _ = EvolutionMove(1).get_proposal(x, [others], random)
+    nearest = np.clip(np.round(proposed / 100.0), 0, 1) * 100.0
+    arrived = (np.abs(proposed - nearest) < 5.0).all(axis=1) & (np.abs(proposed - x) > 50.0).all(axis=1)
+    assert arrived.mean() == pytest.approx(0.05, abs=0.01)

@@ -9,7 +9,7 @@ from scipy import stats
 from wirebayes.bayes.fit import Fit, fit
 from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build
-from wirebayes.discrepancy.heldout import held_out, pit_band, train_counts, two_thirds
+from wirebayes.discrepancy.heldout import _scores, held_out, pit_band, train_counts, two_thirds
 from wirebayes.experiment import Experiment
 from wirebayes.paper import experiments
 from wirebayes.wire.staircase import simulate
@@ -73,6 +73,16 @@ def test_predictive_moments_and_transform_are_those_of_the_dense_normal(fitted: 
     assert np.abs(free.pit - stats.norm.cdf((measured - mean) / sd)).max() < 0.05
     inside = np.abs((measured - mean) / sd) < stats.norm.ppf(0.95)
     assert free.coverage()[0.9] == pytest.approx(inside.mean(), abs=0.11)
+
+
+def test_central_intervals_hold_the_share_they_name() -> None:
+    """Standard normal predictive; readings at 200 evenly spaced quantiles of it, so that the shares are known."""
+    draws = stats.norm.ppf((np.arange(4000) + 0.5) / 4000)
+    readings = stats.norm.ppf((np.arange(200) + 0.5) / 200)[:, None]
+    mask, times = np.ones((200, 1), bool), np.zeros((200, 1))
+    found = _scores(np.tile(draws, (200, 1, 1)), mask, np.arange(200), times, readings, np.zeros(200), 0.0)
+    assert found.coverage() == {0.5: 0.5, 0.9: 0.9, 0.99: 0.99}
+    assert found.pit == pytest.approx((np.arange(200) + 0.5) / 200, abs=1 / 4000)
 
 
 def test_hold_by_hold_has_no_free_prediction() -> None:

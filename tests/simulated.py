@@ -1,0 +1,19 @@
+"""Simulated tests as experiments, without files."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from wirebayes.experiment import Experiment
+from wirebayes.readings import frozen
+from wirebayes.simulate import Bench, Truth, draw
+
+
+def simulated_tests(benches: Sequence[Bench], truth: Truth, seed: int) -> list[Experiment]:
+    """What `simulate` would write, rounded as the benches say."""
+    out = []
+    samples = draw(benches, truth, seed).problem.samples
+    for bench, sample in zip(benches, samples, strict=True):
+        test = bench.experiment()
+        rows = zip(test.holds, sample.readings[..., 0], sample.protocol.mask, strict=True)
+        out.append(replace(test, holds=tuple(replace(h, tension_N=frozen(y[kept].tolist())) for h, y, kept in rows)))
+    return out
