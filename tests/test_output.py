@@ -23,6 +23,21 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["a.json"]
 
 
+def test_what_a_killed_run_was_writing_is_removed_by_the_next_command(tmp_path):
+    folder, table = tmp_path / "out", tmp_path / "predicted.csv"
+    open_run(folder, CONFIGURATION)
+    (folder / "wire-a").mkdir()
+    left = [folder / ".configuration.json.x.partial", folder / "wire-a" / ".posterior.nc.partial"]
+    left.append(tmp_path / ".predicted.csv.x.partial")
+    others = [folder / "wire-a" / "thesis.partial", tmp_path / ".other.csv.x.partial"]
+    for path in [*left, *others]:
+        path.write_text("half")
+    open_run(folder, CONFIGURATION)
+    check_file(table)
+    assert [path for path in left if path.exists()] == []
+    assert all(path.exists() for path in others)
+
+
 def test_files_are_readable_by_others_as_usual(tmp_path):
     (tmp_path / "usual").write_text("")
     write_bytes(tmp_path / "ours", b"")

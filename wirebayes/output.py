@@ -5,6 +5,7 @@ resumes there, another is refused; so nothing is ever mixed or overwritten.
 """
 
 import csv
+import glob
 import io
 import json
 import math
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from wirebayes.errors import InputError
+from wirebayes.interrupt import unfinished
 
 CONFIGURATION = "configuration.json"
 COMPLETE = "complete.json"
@@ -25,16 +27,13 @@ _PARTIAL = ".partial"
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a whole file or nothing: a reader, or a run killed half-way, never meets half of it."""
     handle, partial = tempfile.mkstemp(prefix=f".{path.name}.", suffix=_PARTIAL, dir=path.parent)
-    try:
+    with unfinished(Path(partial)):
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
         os.chmod(partial, 0o666 & ~_umask())  # mkstemp makes private files, results are for everyone
         os.replace(partial, path)
-    except BaseException:
-        Path(partial).unlink(missing_ok=True)
-        raise
 
 
 def write_text(path: Path, content: str) -> None:
@@ -80,8 +79,14 @@ def _umask() -> int:
     return mask
 
 
+def clear_leftovers(directory: Path, pattern: str = "**/.*") -> None:
+    """Remove what a killed run was writing: files of ours that were never finished."""
+    for path in directory.glob(pattern + _PARTIAL):
+        path.unlink(missing_ok=True)
+
+
 def check_file(path: Path) -> None:
-    """Refuse a file that could not be written, before the work that would be lost.
+    """Refuse a file that could not be written, before the work that would be lost; remove a killed run's leftovers.
 
     Raises
     ------
@@ -92,6 +97,7 @@ def check_file(path: Path) -> None:
         raise InputError(f"{path}: found a folder, expected the name of a file to write")
     if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
         raise InputError(f"{path}: found no writable folder {path.parent}, expected one to write the file in")
+    clear_leftovers(path.parent, f".{glob.escape(path.name)}.*")
 
 
 @dataclass(frozen=True)
@@ -142,6 +148,7 @@ def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Run:
             write_json(directory / CONFIGURATION, wanted)
         except OSError as error:
             raise InputError(f"{directory}: cannot be written ({error.strerror}), expected a writable folder") from None
+    clear_leftovers(directory)
     return Run(directory, state)
 
 

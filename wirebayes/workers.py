@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from wirebayes.interrupt import held_back, watch_silently
+
 Each = Callable[..., Iterable[Any]]  # as the built-in `map`
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -40,17 +42,43 @@ def workers(most: int | None = None, own_effects: Path | None = None) -> Iterato
         return
     # every command imports this module, few start processes
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    from multiprocessing import active_children, get_context
 
     one_thread_each()
+    # Python's tracker of semaphores removes those of a process that is gone; that it had to is nobody's business.
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"]))
     n = cores() if most is None else min(cores(), most)
-    with ProcessPoolExecutor(n, get_context("spawn"), _prepare, (own_effects,)) as pool:
-        for _ in range(n):
-            pool.submit(cores)  # processes start now, not when they are needed
+    before = active_children()
+    pool = ProcessPoolExecutor(n, get_context("spawn"), _prepare, (own_effects,))
+    try:
+        with held_back():
+            for _ in range(n):
+                pool.submit(cores)  # processes start now, not when they are needed
         yield pool.map
+    except BaseException:  # do not wait for work that nobody wants any more
+        for process in active_children():
+            if process not in before:
+                process.terminate()
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
 
 
 def _prepare(own_effects: Path | None) -> None:
+    from threading import Thread
+
     from wirebayes.effects import catalogue  # the command line imports this module before it knows what is asked
 
+    watch_silently()
+    Thread(target=_leave_with_parent, daemon=True).start()
     catalogue(own_effects)
+
+
+def _leave_with_parent() -> None:
+    """A process whose parent was killed would wait for work for ever."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

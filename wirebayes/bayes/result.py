@@ -21,6 +21,7 @@ from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.bayes.replicate import readings as replicate
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
+from wirebayes.interrupt import unfinished
 from wirebayes.output import write_bytes, write_json
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import creep_fraction, creep_target
@@ -55,9 +56,10 @@ def save(
         sample = fit.problem.samples[0]
     tree = _tree(fit, sample, provenance, np.random.default_rng(seed))
     partial = folder / ".posterior.nc.partial"
-    tree.to_netcdf(partial, engine="h5netcdf")
-    write_bytes(folder / "posterior.nc", partial.read_bytes())
-    partial.unlink()
+    with unfinished(partial):
+        tree.to_netcdf(partial, engine="h5netcdf")
+        write_bytes(folder / "posterior.nc", partial.read_bytes())
+        partial.unlink()
     summary = _summary(fit, sample, tree)
     write_json(folder / "summary.json", summary)
     return summary

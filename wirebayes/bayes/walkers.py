@@ -101,6 +101,7 @@ def advance(target: Target, state: State, steps: int, ensembles: int = 1, power:
 
     move = _move(state, ensembles, steps)
     sampler = emcee.EnsembleSampler(*state.positions.shape, density, moves=move, vectorize=True)
+    sampler.log_prob_fn = density  # without emcee's wrapper, which prints all points when an exception passes through
     before = target.evaluations
     start = emcee.State(state.positions, log_prob=power * state.values, random_state=state.random)
     end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)

@@ -6,13 +6,14 @@ Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wr
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import Annotated, NamedTuple
-
-import typer
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from wirebayes import __version__
 from wirebayes.errors import InputError
-from wirebayes.workers import one_thread_each
+from wirebayes.interrupt import watch
+
+if TYPE_CHECKING:
+    import typer
 
 
 class Command(NamedTuple):
@@ -94,16 +95,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Without the program's name; those of the process when not given.
+        Without the program's name; those of the process when not given. Then Ctrl-C and SIGTERM end the process, too
+        (`wirebayes.interrupt`).
 
     Returns
     -------
     int
         0 done, 2 bad input or usage.
     """
-    one_thread_each()  # small matrices: more threads only fight over them
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:
+        arguments = sys.argv[1:]
+        watch(arguments)
+    arguments = list(arguments)
     called = next((word for word in arguments if not word.startswith("-")), None)
+
+    import typer  # only now: Ctrl-C is welcome during imports, too
+
+    from wirebayes.workers import one_thread_each
+
+    one_thread_each()  # small matrices: more threads only fight over them
     try:
         typer.main.get_command(_application(called)).main(args=arguments, prog_name="wirebayes")
     except InputError as error:
@@ -114,11 +124,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _application(called: str | None) -> typer.Typer:
+def _application(called: str | None) -> "typer.Typer":
     """The whole command line, with only the called command's module loaded."""
+    import typer
+
     # rich_markup_mode None: errors are plain lines, also for a program that reads them
     application = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
-    application.callback()(_top)
+
+    def print_version(asked: bool) -> None:
+        if asked:
+            print(f"wirebayes {__version__}")
+            raise typer.Exit
+
+    shown = typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and stop.")
+
+    def top(version: Annotated[bool, shown] = False) -> None:
+        """A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."""
+
+    application.callback()(top)
     for name, command in COMMANDS.items():
         function: Callable[..., object] = _unloaded
         if name == called:
@@ -126,20 +149,6 @@ def _application(called: str | None) -> typer.Typer:
         # \b keeps the example on its own line, unwrapped
         application.command(name, short_help=command.summary, epilog=f"\b\nExample:\n  {command.example}")(function)
     return application
-
-
-def _print_version(asked: bool) -> None:
-    if asked:
-        print(f"wirebayes {__version__}")
-        raise typer.Exit
-
-
-def _top(
-    version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and stop.")
-    ] = False,
-) -> None:
-    """A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."""
 
 
 def _unloaded() -> None:

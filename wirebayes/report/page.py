@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from wirebayes import __version__
 from wirebayes.errors import InputError
-from wirebayes.output import CONFIGURATION, write_text
+from wirebayes.output import CONFIGURATION, check_file, write_text
 from wirebayes.report.blocks import Page
 
 # who knows how to tell a command's results; each module has ``page(folder, configuration)``
@@ -33,7 +33,9 @@ def write(folder: Path) -> Path:
         The folder is not one that a command of ours has written.
     """
     path = folder / "report.html"
-    write_text(path, render(tell(folder)))
+    content = render(tell(folder))
+    check_file(path)
+    write_text(path, content)
     return path
 
 

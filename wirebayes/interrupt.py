@@ -1,0 +1,114 @@
+"""Ctrl-C and SIGTERM: one line, no process and no unfinished file left behind, and the process is gone.
+
+A signal may arrive anywhere: in an import, in a C extension that swallows exceptions, in a library that prints what it
+was doing. So nothing is raised. Results are written whole (`wirebayes.output`) and fits leave checkpoints, therefore
+there is nothing to unwind: the handler tidies up and ends the process.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn
+
+_WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+_PATIENCE_S = 2.0  # for a worker to tidy up, before it is killed
+
+_unfinished: set[Path] = set()
+_held_back = False
+_arrived: list[int] = []
+
+
+def watch(arguments: Sequence[str]) -> None:
+    """End this process tidily on SIGINT and SIGTERM: exit codes 130 and 143, one line on stderr.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of the command line: they say where results may lie from which the same command goes on.
+    """
+
+    def last_words(number: int) -> str:
+        kept = "run the same command again to go on" if _begun(arguments) else "no results were kept"
+        return f"{_WORDS[signal.Signals(number)]}; {kept}\n"
+
+    _handle(signal.SIGINT, last_words)
+    _handle(signal.SIGTERM, last_words)
+
+
+def watch_silently() -> None:
+    """The same for a worker process: its parent speaks, and hears Ctrl-C for both."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _handle(signal.SIGTERM, lambda number: "")
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Let signals wait while processes start, which are not known yet and shall not hear Ctrl-C themselves."""
+    global _held_back
+    blocks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if blocks else set()
+    _held_back = True
+    try:
+        yield
+    finally:
+        _held_back = False
+        if blocks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number in _arrived:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def unfinished(path: Path) -> Iterator[None]:
+    """Remove a file that is being written if the block does not end."""
+    _unfinished.add(path)
+    try:
+        yield
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+    finally:
+        _unfinished.discard(path)
+
+
+def _handle(which: signal.Signals, last_words) -> None:  # type: ignore[no-untyped-def]
+    def handler(number: int, frame: FrameType | None) -> None:
+        if _held_back:
+            _arrived.append(number)
+        else:
+            _leave(number, last_words(number))
+
+    signal.signal(which, handler)
+
+
+def _leave(number: int, words: str) -> NoReturn:
+    for each in _WORDS:
+        signal.signal(each, signal.SIG_IGN)  # a second Ctrl-C must not cut this short
+    if "multiprocessing" in sys.modules:
+        from multiprocessing import active_children
+
+        children = active_children()
+        for child in children:
+            child.terminate()
+        for child in children:
+            child.join(_PATIENCE_S)
+            child.kill()
+    for path in list(_unfinished):
+        path.unlink(missing_ok=True)
+    if words:
+        show_cursor = "\r\x1b[?25h\x1b[K" if sys.stderr.isatty() else ""  # a progress bar hides it
+        os.write(2, (show_cursor + words).encode())
+    os._exit(128 + number)
+
+
+def _begun(arguments: Sequence[str]) -> bool:
+    """Whether the folder of results holds anything that the same command would not do again."""
+    words = [part for word in arguments for part in (word.split("=", 1) if word.startswith("--output=") else [word])]
+    folder = next((Path(after) for word, after in zip(words, words[1:], strict=False) if word == "--output"), None)
+    if folder is None or not (folder / "configuration.json").is_file() or (folder / "complete.json").exists():
+        return False
+    return any(path.is_file() and path.name != "configuration.json" for path in folder.rglob("*"))
