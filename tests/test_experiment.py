@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from wirebayes.bayes.problem import build
 from wirebayes.errors import InputError
 from wirebayes.experiment import read_experiments, select
 from wirebayes.readings import read_protocol, read_readings
@@ -140,6 +141,12 @@ BAD_CSV = [
     ("3,2.5,90", "3,2.5,20", "line 6, column 3 (time_s): found 20, expected a time after 30 s in hold 3"),
     ("1,1,60,0.90", "1,1.5,60,0.90", "line 3, column 2 (displacement_mm): found 1.5, expected 1 as before in hold 1"),
     ("4,0.5", "4,-1000", "line 7, column 2 (displacement_mm): found -1000, expected a displacement above -1000 mm"),
+    ("4,0.5", "4,8001", "line 7, column 2 (displacement_mm): found 8001, expected at most 8 times the wire's length"),
+    ("3,2.5,90,1.80", "3,2.5,90,1e308", "line 6, column 4 (tension_N): found '1e308', expected a number of at most"),
+    ("3,2.5,90,1.80", "3,2.5,1e300,1.80", "line 6, column 3 (time_s): found '1e300', expected a number of at most"),
+    (",tension_N", ",tension_kgf", "line 1, column 4: found 'tension_kgf' (another unit: 1 kgf = 9.80665 N;"),
+    ("displacement_mm", "displacement_m", "line 1, column 2: found 'displacement_m' (another unit: 1 m = 1000 mm;"),
+    (",tension_N", ",tension_V", "line 1, column 4: found 'tension_V', expected a header"),
     ("4,0.5", "1,0.5", "line 7, column 1 (hold): found 1, expected a hold number above 3 (its rows must stand"),
     ("4,0.5", "2,0.5", "line 7, column 1 (hold): found 2, expected a hold number above 3"),
     ("4,0.5", "4.5,0.5", "line 7, column 1 (hold): found '4.5', expected a whole number"),
@@ -154,7 +161,15 @@ def test_bad_readings_are_named_to_the_column(experiment_file, tmp_path, old, ne
 
 BAD_TOML = [
     ("length_mm = 1000.0", "length_mm = ", "found a TOML error", "line 4"),
-    ("[[experiment]]", "[experiment]", "key experiment: found a single table, expected at least one [[experiment]]"),
+    ("[{ before_hold = 3, displacement_mm = 2.0, duration_s = 45.0 }]", "[", "line 7, column 21: found the end of"),
+    ("1000.0", "1" * 9999, "line 4, column 13: found a TOML error"),
+    ("1000.0", "[" * 9999, "line 4: found values nested too deeply, expected valid TOML"),
+    ("length_mm = 1000.0", "length_m = 1.0", "line 4,", "(another unit: 1 m = 1000 mm; convert it to length_mm)"),
+    ("1000.0", "1e300", "line 4, experiment wire-a, key length_mm: found 1e+300, expected a length above"),
+    ("resolution_N = 0.01", "resolution_N = 1e300", "line 5, experiment wire-a, key resolution_N: found 1e+300"),
+    ("duration_s = 45.0", "duration_s = 1e300", "line 7, experiment wire-a, key unrecorded_holds[0].duration_s: found"),
+    ("length_mm = 1000.0\n", "", "line 1, experiment wire-a, key length_mm: found nothing"),
+    ("[[experiment]]", "[experiment]", "line 1, key experiment: found a single table, expected at least one [["),
     ("[[experiment]]", "[[experiments]]", "key experiments: found an unknown key (did you mean experiment?)"),
     ("length_mm", "lenght_mm", "line 4, experiment wire-a, key lenght_mm: found an unknown key (did you mean length"),
     ("length_mm = 1000.0\n", "", "experiment wire-a, key length_mm: found nothing, expected a length above 0 mm"),
@@ -192,7 +207,7 @@ BAD_TOML = [
     ("length_mm", '"a\\nb"', "key 'a\\nb': found an unknown key"),
     ('"wire-a"', '"wire\\na"', "experiment 'wire\\na', key name: found 'wire\\na'"),
     ("[[experiment]]", "prior = 3\n[[experiment]]", "key prior: found 3, expected a table of tables"),
-    ("[[experiment]]", "[prior]\nk1 = 3\n[[experiment]]", "key prior.k1: found 3, expected a table"),
+    ("[[experiment]]", "[prior]\nk1 = 3\n[[experiment]]", "line 2, key prior.k1: found 3, expected a table"),
 ]
 
 
@@ -230,7 +245,11 @@ def test_files_that_cannot_be_read_are_named(experiment_file, tmp_path):
     (tmp_path / "a.csv").write_bytes(b"hold\n\xff1\n")
     assert complaint(path) == f"{tmp_path / 'a.csv'}, line 2: found byte 0xff, expected UTF-8 text"
     (tmp_path / "a.csv").write_bytes(b"")
-    assert complaint(path).startswith(f"{tmp_path / 'a.csv'}: found an empty file")
+    empty = "line 1, column 1: found an empty file, expected a header of hold,displacement_mm,time_s,tension_N"
+    assert complaint(path).startswith(f"{tmp_path / 'a.csv'}, {empty}")
+    (tmp_path / "empty.toml").write_text(" \n")
+    said = complaint(tmp_path / "empty.toml")
+    assert said.endswith("line 1, column 1: found an empty file, expected TOML with at least one [[experiment]]")
     (tmp_path / "a.csv").write_text("hold,displacement_mm,time_s,tension_N\n\n")
     assert complaint(path).startswith(f"{tmp_path / 'a.csv'}, line 2: found no readings")
 
@@ -248,12 +267,102 @@ def test_a_link_does_not_lead_out_of_the_folder(experiment_file, tmp_path):
     assert len(read_experiments(inside / "e.toml")) == 1
 
 
+def test_fewer_than_two_holds_or_five_readings_are_refused(experiment_file, tmp_path):
+    path = experiment_file({"unrecorded_holds": "# unrecorded_holds"})
+    rows = (tmp_path / "a.csv").read_text().splitlines()
+    (tmp_path / "a.csv").write_text("\n".join(rows[:6]))
+    assert len(read_experiments(path)) == 1  # two holds, five readings
+    for kept, said in [
+        ([*rows[:5]], "2 holds with 4 readings"),
+        (rows[:2], "1 hold with 1 reading"),
+        ([rows[0], *(f"1,1,{time},1.0" for time in range(9))], "1 hold with 9 readings"),
+    ]:
+        (tmp_path / "a.csv").write_text("\n".join(kept))
+        expected = f"found {said} in a.csv, expected at least 2 recorded holds and 5 readings in all"
+        assert complaint(path) == f"{path}, line 6, experiment wire-a, key readings: {expected}"
+
+
+def test_training_asked_for_by_a_user_has_enough_readings_too(experiment_file):
+    (experiment,) = read_experiments(experiment_file())
+    assert len(experiment.first(2).recorded_holds) == 2
+    with pytest.raises(InputError, match="found 1 hold with 2 readings in the first 1 of 3 .*, expected at least 2"):
+        experiment.first(1)
+    with pytest.raises(InputError, match="found 4 training holds asked for, expected 1 to 3"):
+        experiment.first(4)
+
+
+def staircase(folder, times, tension=lambda hold, time: hold - 0.001 * time, holds=4):
+    """Readings of some holds, a millimetre a hold, as a CSV file."""
+    rows = [f"{h},{h},{t},{tension(h, t):.3f}" for h in range(1, holds + 1) for t in times(h)]
+    (folder / "a.csv").write_text("\n".join(["hold,displacement_mm,time_s,tension_N", *rows]))
+    return folder / "a.csv"
+
+
+def test_times_that_run_on_over_the_test_are_refused(tmp_path):
+    absolute = staircase(tmp_path, lambda h: [100 * h + t for t in (0, 30, 60, 90)])
+    with pytest.raises(InputError, match=r"line 6, column 3 \(time_s\): found 200, expected the time since hold 2"):
+        read_readings(absolute, 1000.0)
+    touching = staircase(tmp_path, lambda h: [90 * h + t for t in (0, 30, 60, 90)])
+    with pytest.raises(InputError, match=r"found 180, expected the time since hold 2 began"):
+        read_readings(touching, 1000.0)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        lambda h: [0, 30 * h, 60 * h],  # holds that last longer and longer
+        lambda h: [10.0**h],  # one reading at the end of each
+        lambda h: [100, 130, 160],  # nothing read for a while
+        lambda h: [0, 1] if h == 1 else [60, 90, 120],  # a first hold cut short
+        lambda h: [100 * h, 100 * h + 30] if h < 4 else [0, 30],
+    ],
+)
+def test_odd_times_that_restart_are_read(tmp_path, times):
+    assert len(read_readings(staircase(tmp_path, times), 1000.0)) == 4
+
+
+def test_a_chance_order_of_times_is_not_refused(tmp_path):
+    """Three holds of two readings at random times run on once in ninety tests: too often to be certain."""
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        times = np.sort(rng.uniform(0, 120, (3, 2)).round(3), axis=1)
+        if (np.diff(times) > 0).all():
+            assert len(read_readings(staircase(tmp_path, lambda h, t=times: t[h - 1], holds=3), 1000.0)) == 3
+
+
+def test_tensions_with_the_sign_flipped_are_refused(tmp_path):
+    flipped = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: -h + 0.001 * t)
+    with pytest.raises(InputError, match=r"line 11, column 4 \(tension_N\): found -4.000, expected a pull .*change"):
+        read_readings(flipped, 1000.0)
+    zeroed = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: h - 4.2 - 0.001 * t)
+    with pytest.raises(InputError, match=r"line 4, column 4 \(tension_N\): found -3.260, expected .* undo the zeroing"):
+        read_readings(zeroed, 1000.0)
+
+
+@pytest.mark.parametrize(
+    "tension",
+    [
+        lambda h, t: 0.0,  # slack throughout
+        lambda h, t: -0.02 + 0.01 * ((7 * h + t) % 3),  # slack, a sensor's noise and offset
+        lambda h, t: max(0.0, h - 2) - 0.01,  # slack at first
+        lambda h, t: 0.3 * h - 0.3,  # zeroed at the first hold
+        lambda h, t: 1e-4 * h,  # a thread of a few grams
+        lambda h, t: 1e5 * h,  # a steel rope
+    ],
+)
+def test_small_slack_and_large_tensions_are_read(tmp_path, tension):
+    assert len(read_readings(staircase(tmp_path, lambda h: (0, 30, 60), tension), 1000.0)) == 4
+
+
 def test_priors_are_kept_as_written_the_experiments_own_over_the_files(experiment_file):
     head = "[prior.k1]\nlow = 1.0\n[prior.U]\nlow = 0.1\n[[experiment]]"
     path = experiment_file({"[[experiment]]": head})
     path.write_text(path.read_text() + "[experiment.prior]\nk1 = { high = 9.0 }\n")
     (experiment,) = read_experiments(path)
     assert experiment.priors == {"k1": {"high": 9.0}, "U": {"low": 0.1}}
+    assert experiment.prior_lines == {"k1": 13, "U": 3}
+    with pytest.raises(InputError, match=rf"{path}, line 13: prior.k1.distribution: found no such key, expected"):
+        build([experiment])
 
 
 def test_an_experiment_is_selected_by_name():

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.keys import Keys
-from wirebayes.readings import Hold, frozen, nearest, read_readings, read_text, shown
+from wirebayes.keys import Keys, read_toml
+from wirebayes.readings import LARGEST, STRETCH, Hold, frozen, read_readings, read_text, shown
+from wirebayes.units import nearest
 from wirebayes.wire.protocol import Protocol
 
 __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
@@ -41,6 +42,8 @@ class Experiment:
         The TOML file it was read from.
     priors : dict
         ``[prior]`` tables by parameter name, as written: the file's, then the experiment's own over them.
+    prior_lines : dict
+        The line in `source` on which each of them stands.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Experiment:
     holds: tuple[Hold, ...]
     source: Path
     priors: dict[str, dict[str, Any]] = field(default_factory=dict)
+    prior_lines: dict[str, int] = field(default_factory=dict)
 
     @property
     def recorded_holds(self) -> tuple[Hold, ...]:
@@ -90,6 +94,22 @@ class Experiment:
         """The same test as if the unrecorded holds had never been."""
         return replace(self, holds=_in_sequence(self.recorded_holds))
 
+    def first(self, holds: int) -> "Experiment":
+        """`train`, for what a user asks to be fitted.
+
+        Raises
+        ------
+        InputError
+            When there are not that many holds, or too few readings in them for a fit.
+        """
+        trained = self.train(holds)
+        if not enough(trained.recorded_holds):
+            raise InputError(
+                f"{self.source}, experiment {self.name}: found {counted(trained.recorded_holds)} in the first {holds} "
+                f"of {len(self.recorded_holds)} recorded holds, expected {ENOUGH}"
+            )
+        return trained
+
     @property
     def data_hash(self) -> str:
         """SHA-256 of everything measured (not of the priors, nor of how the files spell it)."""
@@ -100,6 +120,23 @@ class Experiment:
             for hold in self.holds
         ]
         return hashlib.sha256(json.dumps([content, holds]).encode()).hexdigest()
+
+
+LEAST_HOLDS, LEAST_READINGS = 2, 5  # stiffness needs a step; level, slope and creep over time need readings
+ENOUGH = f"at least {LEAST_HOLDS} recorded holds and {LEAST_READINGS} readings in all"
+
+
+def enough(holds: Sequence[Hold]) -> bool:
+    """True where there are readings enough for a fit."""
+    recorded = [hold.time_s.size for hold in holds if hold.recorded]
+    return len(recorded) >= LEAST_HOLDS and sum(recorded) >= LEAST_READINGS
+
+
+def counted(holds: Sequence[Hold]) -> str:
+    """How many holds and readings there are, in words."""
+    recorded = [hold.time_s.size for hold in holds if hold.recorded]
+    many = [f"{n} {word}{'s' * (n != 1)}" for n, word in ((len(recorded), "hold"), (sum(recorded), "reading"))]
+    return " with ".join(many)
 
 
 def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | None = None) -> Protocol:
@@ -183,32 +220,28 @@ def read_experiments(path: str | Path) -> list[Experiment]:
         On anything wrong, with the file, the line and column or the key, what was found and what was expected.
     """
     source = Path(path)
-    text = read_text(source)
-    try:
-        document = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        raise InputError(f"{source}: found a TOML error, {_lower(str(error))}; expected valid TOML") from None
-    except RecursionError:
-        raise InputError(f"{source}: found values nested too deeply, expected an experiment file") from None
+    text = read_text(source, "TOML with at least one [[experiment]]")
+    document = read_toml(source, text)
     top = Keys(source, text, None, document)
     top.only(("experiment", "prior"))
     tables = document.get("experiment")
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         found = "nothing" if tables is None else "a single table" if isinstance(tables, dict) else shown(tables)
-        raise InputError(f"{source}, key experiment: found {found}, expected at least one [[experiment]]")
+        raise top.complain("experiment", found, "at least one [[experiment]]")
     shared = top.priors()
+    lines = {name: top.line(f"prior.{name}") for name in shared}
     experiments: list[Experiment] = []
     for index, table in enumerate(tables):
         name = table.get("name")
         keys = Keys(source, text, index, table, name if isinstance(name, str) else "")
-        experiment = _read_one(keys, shared)
+        experiment = _read_one(keys, shared, lines)
         if any(experiment.name == other.name for other in experiments):
             raise keys.complain("name", shown(experiment.name) + " a second time", "a name used once in the file")
         experiments.append(experiment)
     return experiments
 
 
-def _read_one(keys: Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
+def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[str, int]) -> Experiment:
     keys.only(_KEYS)
     expected = "a name of letters, digits, '.', '_' and '-' for a folder of results"
     name = keys.string("name", expected)
@@ -222,12 +255,21 @@ def _read_one(keys: Keys, shared: dict[str, dict[str, Any]]) -> Experiment:
         or any(c in "/\\" or not c.isprintable() for c in material)
     ):
         raise keys.complain("material", shown(material), expected)
-    length = keys.number("length_mm", "a length above 0 mm", above=0.0)
+    largest = LARGEST["displacement_mm"]
+    length = keys.number("length_mm", f"a length above 0 mm, at most {largest:.0e} mm", above=0.0, most=largest)
     resolution = 0.0
     if "resolution_N" in keys.table:
-        resolution = keys.number("resolution_N", "a step above 0 N, or no such key", above=0.0)
-    holds = _with_unrecorded(keys, read_readings(_readings_path(keys), length), length)
-    return Experiment(name, material, length, resolution, holds, keys.source, {**shared, **keys.priors()})
+        most = LARGEST["tension_N"]
+        expected = f"a step above 0 N, at most {most:.0e} N, or no such key"
+        resolution = keys.number("resolution_N", expected, above=0.0, most=most)
+    readings = _readings_path(keys)
+    recorded = read_readings(readings, length)
+    if not enough(recorded):
+        raise keys.complain("readings", f"{counted(recorded)} in {readings.name}", ENOUGH)
+    holds = _with_unrecorded(keys, recorded, length)
+    own = keys.priors()
+    lines = shared_lines | {parameter: keys.line(f"prior.{parameter}") for parameter in own}
+    return Experiment(name, material, length, resolution, holds, keys.source, shared | own, lines)
 
 
 def _readings_path(keys: Keys) -> Path:
@@ -262,10 +304,12 @@ def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float) -> t
         before = inner.value("before_hold", reach)
         if isinstance(before, bool) or not isinstance(before, int) or not 0 <= before <= numbers[-1]:
             raise inner.complain("before_hold", shown(before), reach)
-        displacement = inner.number(
-            "displacement_mm", f"a displacement above -{length_mm:g} mm, the wire's length", above=-length_mm
+        expected = f"a displacement above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
+        displacement = inner.number("displacement_mm", expected, above=-length_mm, most=STRETCH * length_mm)
+        longest = LARGEST["time_s"]
+        duration = inner.number(
+            "duration_s", f"a duration of 0 s or more, at most {longest:.0e} s", least=0.0, most=longest
         )
-        duration = inner.number("duration_s", "a duration of 0 s or more", least=0.0)
         if index and entry == entries[index - 1]:
             raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
         place = next(place for place, number in enumerate(numbers) if number >= before)
@@ -274,7 +318,3 @@ def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float) -> t
     for place, hold in enumerate(holds):
         ordered += [unrecorded for at, unrecorded in placed if at == place] + [hold]
     return _in_sequence(tuple(ordered))
-
-
-def _lower(message: str) -> str:
-    return message[:1].lower() + message[1:]

@@ -1,6 +1,7 @@
 """One TOML table asked for its keys, so that every complaint says where it stands."""
 
 import re
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.readings import nearest, shown
+from wirebayes.readings import shown
+from wirebayes.units import nearest
 
 
 @dataclass(frozen=True)
@@ -37,22 +39,14 @@ class Keys:
     prefix: str = ""
 
     def complain(self, key: str, found: str, expected: str) -> InputError:
-        place = str(self.source)
+        place = f"{self.source}, line {self.line(key)}"
         if self.index is not None:
-            line = self._line(key)
-            place += f", line {line}" if line else ""
             place += f", experiment {_printable(self.name) or self.index + 1}"
         return InputError(f"{place}, key {self.prefix}{_printable(key)}: found {found}, expected {expected}")
 
-    def _line(self, key: str) -> int | None:
-        """Line of a key in its [[experiment]]."""
-        top = (self.prefix + key).split("[")[0].split(".")[0]
-        seen = -1
-        for number, line in enumerate(self.text.split("\n"), start=1):
-            seen += line.strip().startswith("[[experiment]]")
-            if seen == self.index and re.match(rf"\s*[\"']?{re.escape(top)}[\"']?\s*[=.]", line):
-                return number
-        return None
+    def line(self, key: str) -> int:
+        """The line on which a key stands."""
+        return line_of(self.text, self.prefix + key, self.index)
 
     def only(self, known: tuple[str, ...]) -> None:
         for key in self.table:
@@ -71,7 +65,9 @@ class Keys:
             raise self.complain(key, shown(value), expected)
         return value
 
-    def number(self, key: str, expected: str, above: float | None = None, least: float | None = None) -> float:
+    def number(
+        self, key: str, expected: str, above: float = -np.inf, least: float = -np.inf, most: float = np.inf
+    ) -> float:
         value = self.value(key, expected)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.complain(key, shown(value), expected)
@@ -79,7 +75,7 @@ class Keys:
             number = float(value)
         except OverflowError:
             raise self.complain(key, shown(value), expected) from None
-        if not np.isfinite(number) or (above is not None and number <= above) or (least is not None and number < least):
+        if not (np.isfinite(number) and above < number and least <= number <= most):
             raise self.complain(key, shown(value), expected)
         return number
 
@@ -93,6 +89,61 @@ class Keys:
             if not isinstance(table, dict):
                 raise self.complain(f"prior.{name}", shown(table), "a table, such as { fixed = 1.0 }")
         return tables
+
+
+def line_of(text: str, key: str, index: int | None = None) -> int:
+    """The line of a TOML file on which a key stands; of the innermost table found on the way to it otherwise.
+
+    Parameters
+    ----------
+    text : str
+    key : str
+        With the names of its tables, such as ``prior.k1.sd``.
+    index : int, optional
+        The ``[[experiment]]`` to look in, from 0; without it the whole file.
+    """
+    lines = text.split("\n")
+    tables = [at for at, line in enumerate(lines) if line.strip().startswith("[[experiment]]")]
+    begin, end = 0, len(lines)
+    if index is not None and index < len(tables):
+        begin, end = tables[index], [*tables, end][index + 1]
+    for part in re.split(r"[.\[]", key):
+        word = rf"(?<![\w-]){re.escape(part)}(?![\w-])"
+        spelled = re.compile(rf"^\s*\[.*{word}.*\]|{word}[\"']?\s*[=.]")
+        begin = next((at for at in range(begin, end) if spelled.search(lines[at])), begin)
+    return begin + 1
+
+
+def read_toml(source: Path, text: str) -> dict[str, Any]:
+    """A TOML document.
+
+    Raises
+    ------
+    InputError
+        With the line and column of what is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        depth = [line.count("[") + line.count("{") for line in text.split("\n")]
+        place, found = f"line {int(np.argmax(depth)) + 1}", "values nested too deeply"
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
+        said = re.fullmatch(r"(.*?) \((?:at line (\d+), column (\d+)|at end of document)\)", str(error), re.DOTALL)
+        if said and said[2]:
+            place, found = f"line {said[2]}, column {said[3]}", f"a TOML error ({_lower(said[1])})"
+        elif said:
+            lines = text.rstrip().split("\n")
+            place, found = f"line {len(lines)}, column {len(lines[-1]) + 1}", f"the end of the file ({_lower(said[1])})"
+        else:
+            longest = max(re.finditer(r"\d+", text), key=lambda run: len(run[0]))
+            before = text[: longest.start()].split("\n")
+            place = f"line {len(before)}, column {len(before[-1]) + 1}"
+            found = "a TOML error (a number of thousands of digits)"
+    raise InputError(f"{source}, {place}: found {found}, expected valid TOML")
+
+
+def _lower(message: str) -> str:
+    return message[:1].lower() + message[1:]
 
 
 def _printable(text: str) -> str:

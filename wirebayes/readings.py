@@ -8,16 +8,25 @@ the end. There are no comments, no quotes and no empty cells.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
+from math import lgamma
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.units import nearest
 
 REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
 OPTIONAL = ("temperature_C",)
+
+# No bench comes near these: beyond them numbers are typing mistakes, and soon their squares overflow.
+LARGEST = {
+    "displacement_mm": 1e8,  # 100 km
+    "time_s": 1e10,  # three hundred years
+    "tension_N": 1e9,  # 100,000 t, several times the largest bridge's main cable
+    "temperature_C": 1e4,  # above the boiling point of every wire
+}
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"\d{1,9}", re.ASCII)
@@ -66,14 +75,8 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def nearest(word: str, known: Sequence[str]) -> str:
-    """A hint for a mistyped word, or nothing."""
-    match = get_close_matches(word, known, 1)
-    return f" (did you mean {match[0]}?)" if match else ""
-
-
-def read_text(path: Path) -> str:
-    """The text of a UTF-8 file, without its byte-order mark.
+def read_text(path: Path, expected: str = "text") -> str:
+    """The text of a UTF-8 file, without its byte-order mark; `expected` says what an empty file should hold.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def read_text(path: Path) -> str:
         found = f"byte 0x{error.object[error.start]:02x}"
         raise InputError(f"{path}, line {line}: found {found}, expected UTF-8 text") from None
     if not text.strip():
-        raise InputError(f"{path}: found an empty file, expected text")
+        raise InputError(f"{path}, line 1, column 1: found an empty file, expected {expected}")
     return text
 
 
@@ -120,8 +123,8 @@ class _Table:
         if not _NUMBER.fullmatch(text):
             raise self.complain(row, column, shown(text) if text else "an empty cell", "a finite decimal number")
         value = float(text)
-        if not np.isfinite(value):
-            raise self.complain(row, column, shown(text), "a finite decimal number")
+        if not abs(value) <= LARGEST[column]:
+            raise self.complain(row, column, shown(text), f"a number of at most {LARGEST[column]:.0e} in size")
         return value
 
     def whole(self, row: int, column: str) -> int:
@@ -132,12 +135,12 @@ class _Table:
 
 
 def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> _Table:
-    lines = _NEWLINE.split(read_text(path))
+    known = (*required, *optional)
+    expected = ",".join(required) + f" (and optionally {', '.join(optional)})"
+    lines = _NEWLINE.split(read_text(path, f"a header of {expected} and a line for each reading"))
     while not lines[-1].strip():
         lines.pop()
     header = [field.strip() for field in lines[0].split(",")]
-    known = (*required, *optional)
-    expected = ",".join(required) + f" (and optionally {', '.join(optional)})"
     for column, name in enumerate(header, start=1):
         if name not in known:
             hint = nearest(name, known)
@@ -184,7 +187,9 @@ def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
         With the file, line, column, what was found and what was expected.
     """
     table = _read_table(path, REQUIRED, OPTIONAL)
-    return _holds(table, length_mm, [table.number(row, "tension_N") for row in range(len(table.rows))])
+    holds = _holds(table, length_mm, [table.number(row, "tension_N") for row in range(len(table.rows))])
+    _check_sign(table, holds)
+    return holds
 
 
 def read_protocol(path: Path, length_mm: float) -> tuple[Hold, ...]:
@@ -227,6 +232,9 @@ def _holds(table: _Table, length_mm: float, tension: Sequence[float]) -> tuple[H
         if length_mm + displacement[row] <= 0:
             expected = f"a displacement above -{length_mm:g} mm, the wire's length"
             raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
+        if displacement[row] > STRETCH * length_mm:
+            expected = f"at most {STRETCH:g} times the wire's length of {length_mm:g} mm (is length_mm in mm?)"
+            raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
         if time[row] < 0:
             raise table.complain(row, "time_s", table.cell(row, "time_s"), "0 s or later")
         if row and number[row] == number[row - 1]:
@@ -256,7 +264,55 @@ def _holds(table: _Table, length_mm: float, tension: Sequence[float]) -> tuple[H
             )
         )
         start += time[end - 1]
+    if times_run_on(holds) < RUN_ON_CERTAIN:
+        expected = f"the time since hold {number[first[1]]} began, not since the test began (0 s at each hold's start)"
+        raise table.complain(first[1], "time_s", table.cell(first[1], "time_s"), expected)
     return tuple(holds)
+
+
+STRETCH = 8.0  # the most elastic thread breaks at seven times its length
+RUN_ON_CERTAIN = 1e-4  # three holds of four readings; two holds of five may still be an odd protocol (0.004)
+
+
+def times_run_on(holds: Sequence[Hold]) -> float:
+    """How likely the reading times would run on from hold to hold over the whole test, had they nothing to do with it.
+
+    Parameters
+    ----------
+    holds : sequence of Hold
+
+    Returns
+    -------
+    float
+        Share of the orders of all reading times in which every hold begins after the last reading of the one before;
+        1 where the times do not run on, or most holds have a single reading (durations may well grow).
+    """
+    recorded = [hold for hold in holds if hold.recorded]
+    counts = [hold.time_s.size for hold in recorded]
+    runs_on = all(b.time_s[0] >= a.time_s[-1] for a, b in zip(recorded, recorded[1:], strict=False))
+    if len(recorded) < 2 or not runs_on or float(np.median(counts)) < 2:
+        return 1.0
+    return float(np.exp(sum(lgamma(n + 1) for n in counts) - lgamma(sum(counts) + 1)))
+
+
+def _check_sign(table: _Table, holds: Sequence[Hold]) -> None:
+    """Refuse tensions that are clearly a push: a wire only pulls, and a slack one reads nothing but noise."""
+    tension = np.concatenate([hold.tension_N for hold in holds])
+    means = np.array([hold.tension_N.mean() for hold in holds])
+    place = np.array([hold.displacement_mm for hold in holds])
+    if len(holds) < 3 or np.ptp(place) == 0 or np.ptp(means) == 0 or -tension.min() < PUSH * max(tension.max(), 0.0):
+        return
+    within = np.sqrt(np.mean([hold.tension_N.var() for hold in holds]))
+    follows = float(np.corrcoef(place, means)[0, 1])
+    if abs(follows) > FOLLOWS and np.ptp(means) > PUSH * within:
+        row = int(tension.argmin())
+        change = "change the sign" if follows < 0 else "undo the zeroing"
+        expected = f"a pull counted positive: {change} of tension_N (a slack wire reads 0 N)"
+        raise table.complain(row, "tension_N", table.cell(row, "tension_N"), expected)
+
+
+PUSH = 5.0  # times the pull, and times the readings' spread in a hold: far beyond a sensor's noise or offset
+FOLLOWS = 0.9  # correlation with the displacement, which noise on a slack wire does not have
 
 
 def frozen(values: Sequence[float]) -> NDArray[np.float64]:

@@ -19,7 +19,8 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment
 from wirebayes.output import write_csv, write_json, write_text
-from wirebayes.readings import Hold, frozen, nearest
+from wirebayes.readings import Hold, frozen
+from wirebayes.units import nearest
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import simulate, tension_reference

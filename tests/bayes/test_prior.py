@@ -57,7 +57,7 @@ def test_tables_become_distributions_and_fixed_values():
     ("table", "said"),
     [
         (3.0, "expected a table"),
-        ({}, "prior.k1.distribution: found None"),
+        ({}, "prior.k1.distribution: found no such key, expected one of normal"),
         ({"distribution": "gamma"}, "expected one of normal, half-normal, log-normal, uniform"),
         ({"distribution": "normal", "mean": 1.0}, "takes mean, sd"),
         ({"distribution": "normal", "mean": 1.0, "sd": 1.0, "low": 0.0}, "takes mean, sd"),

@@ -17,6 +17,7 @@ TRAINED = """hold,displacement_mm,time_s,tension_N,temperature_C
 1,1,60,0.90,20.5
 3,2,0,2.00,21.0
 3,2,60,1.90,21.5
+4,3,0,2.90,22.0
 """
 TOML = """[[experiment]]
 name = "warm"
@@ -32,7 +33,8 @@ def stored(tmp_path: Path) -> Stored:
     (tmp_path / "warm.csv").write_text(TRAINED)
     (tmp_path / "warm.toml").write_text(TOML)
     effects = [named("thermal_expansion"), named("grip_slip@3")]
-    sample = build(read_experiments(tmp_path / "warm.toml"), effects).samples[0]
+    (experiment,) = read_experiments(tmp_path / "warm.toml")
+    sample = build([experiment.train(2)], effects).samples[0]
     return Stored({"k1": np.ones(3)}, sample, "chain")
 
 

@@ -8,8 +8,6 @@ from wirebayes.robot.wires import Wires
 
 from . import cases
 
-pytest.importorskip("flint")
-
 
 def _case(name, law, make=cases.commanded, seed=0):
     robot = schema.read(name)

@@ -8,8 +8,6 @@ from wirebayes.robot import forward, rotation, schema
 from wirebayes.robot.reach import apart, reach
 from wirebayes.robot.wires import Wires
 
-pytest.importorskip("flint")
-
 
 def _case(name, law, make=cases.commanded, seed=0):
     robot = schema.read(name)

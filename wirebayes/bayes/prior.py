@@ -134,8 +134,9 @@ def from_table(key: str, table: Any) -> Any:
     if set(table) == {"fixed"}:
         return _number(f"{key}.fixed", table["fixed"])
     form = table.get("distribution")
-    if form not in _FORMS:
-        raise InputError(f"{key}.distribution: found {form!r}, expected one of {', '.join(_FORMS)} (or fixed = VALUE)")
+    if not isinstance(form, str) or form not in _FORMS:
+        found = repr(form) if "distribution" in table else "no such key"
+        raise InputError(f"{key}.distribution: found {found}, expected one of {', '.join(_FORMS)} (or fixed = VALUE)")
     wanted, build = _FORMS[form]
     extra, missing = set(table) - {"distribution", *wanted}, set(wanted) - set(table)
     if extra or missing:

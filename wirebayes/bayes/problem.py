@@ -215,7 +215,8 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
     everything = set(MATERIAL) | set(SAMPLE) | {LENGTH_EXPONENT}
     for experiment in experiments:
         for name, table in experiment.priors.items():
-            key = f"{experiment.source}: prior.{name}"
+            line = experiment.prior_lines.get(name)
+            key = f"{experiment.source}{f', line {line}' if line else ''}: prior.{name}"
             wanted = from_table(key, table)
             hits = [
                 c for c in (f"{name}[{experiment.name}]", f"{name}[{experiment.material}]", name) if c in distributions

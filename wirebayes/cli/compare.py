@@ -55,8 +55,8 @@ def compare(
     known = catalogue(own_effects)
     tasks = []
     for one in experiments:
-        one.train(train_holds if train_holds is not None else 1)  # complains where there are not so many
         recorded = len(one.recorded_holds)
+        one.first(recorded if train_holds is None else train_holds)  # complains where there are not so many
         if recorded < 3:
             raise InputError(f"{file}, experiment {one.name}: found {recorded} recorded holds, expected 3 or more")
         problem_of(base, one, [])  # checks the file's priors

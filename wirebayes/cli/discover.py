@@ -49,7 +49,7 @@ def discover(
 
     experiments = select(read_experiments(file), experiment)
     if train_holds is not None:
-        experiments = [e.train(train_holds) for e in experiments]
+        experiments = [e.first(train_holds) for e in experiments]
     kinds = catalogue_without(without or (), catalogue(own_effects))
     configuration = {
         "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,

@@ -53,7 +53,7 @@ def fit(
 
     experiments = select(read_experiments(file), experiment)
     if train_holds is not None:
-        experiments = [e.train(train_holds) for e in experiments]
+        experiments = [e.first(train_holds) for e in experiments]
     keys = tuple(effect or ())
     known = catalogue(own_effects)
     effects = [named(key, known) for key in keys]

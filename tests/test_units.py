@@ -1,0 +1,59 @@
+"""Hints for unknown words: a unit is never taken for a typing mistake of another."""
+
+import pytest
+
+from wirebayes.readings import OPTIONAL, REQUIRED
+from wirebayes.units import nearest
+
+COLUMNS = (*REQUIRED, *OPTIONAL)
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("tension_kgf", "1 kgf = 9.80665 N; convert it to tension_N"),
+        ("tension_kN", "1 kN = 1000 N"),
+        ("tension [kN]", "1 kN = 1000 N"),
+        ("tension_mN", "1 mN = 0.001 N"),
+        ("tension_MN", "1 MN = 1000000 N"),
+        ("tensionkN", "1 kN = 1000 N"),
+        ("tension (lbf)", "1 lbf = 4.448221615 N"),
+        ("displacement_m", "1 m = 1000 mm; convert it to displacement_mm"),
+        ("displacement_um", "1 um = 0.001 mm"),
+        ("displacement_in", "1 in = 25.4 mm"),
+        ("time_ms", "1 ms = 0.001 s; convert it to time_s"),
+        ("time_min", "1 min = 60 s"),
+        ("temperature_K", "°C = K - 273.15; convert it to temperature_C"),
+        ("temperature_F", "°C = (°F - 32) / 1.8"),
+    ],
+)
+def test_another_unit_is_named_with_its_factor(word, said):
+    hint = nearest(word, COLUMNS)
+    assert said in hint
+    assert "did you mean" not in hint
+
+
+@pytest.mark.parametrize("word", ["tension_mn", "tension_V", "displacement_px", "time_samples", "force_kN", "hold_mm"])
+def test_a_unit_that_is_not_known_gets_no_suggestion_in_another(word):
+    assert nearest(word, COLUMNS) in ("", " (did you mean hold?)" if word == "hold_mm" else "")
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("tensoin_N", "tension_N"),
+        ("tension_n", "tension_N"),
+        ("Tension (N)", "tension_N"),
+        ("displ_mm", "displacement_mm"),
+        ("time", "time_s"),
+        ("holt", "hold"),
+        ("temprature_C", "temperature_C"),
+    ],
+)
+def test_typing_mistakes_are_still_recognised(word, meant):
+    assert nearest(word, COLUMNS) == f" (did you mean {meant}?)"
+
+
+def test_words_without_units_are_compared_as_before():
+    assert nearest("wire_a", ["wire_b", "kite"]) == " (did you mean wire_b?)"
+    assert nearest("kite-15m", ["kite-1.5m"]) == " (did you mean kite-1.5m?)"
