@@ -56,7 +56,7 @@ def test_the_product_of_stiffness_and_amount_has_a_verdict_of_its_own():
 
 def test_creep_of_the_published_parameters_is_equation_5_by_hand():
     draws = {name: np.full(3, value) for name, value in TABLE_4["kite-1.5m"].items()}
-    rows = verdicts.creep_rows("kite-1.5m", "chain", draws, TABLE_4["kite-1.5m"], 6.0)
+    rows = verdicts.creep_rows("kite-1.5m", "chain", draws, TABLE_4["kite-1.5m"], 6.0, 1500.0)
     assert [row["time_s"] for row in rows] == [120.0, 3600.0, 86400.0]
     for row in rows:
         expected = 0.4681 * 6.0**0.5123 * (1 - np.exp(-0.05855 * row["time_s"] ** 0.41))

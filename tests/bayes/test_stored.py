@@ -40,6 +40,32 @@ def test_what_is_read_back_predicts_as_the_joint_fit_does(fitted, sample, apart,
     assert simulate(stored.sample.protocol, read, stored.sample.model) == pytest.approx(expected, rel=1e-9)
 
 
+def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire(fitted, tmp_path):
+    """Each written out here, for the sample at its own length."""
+    joint = fitted.problem
+    here = joint.samples[1]
+    summary = result.save(fitted, tmp_path, {}, sample=here)
+    said, load = summary["derived"], summary["derived"]["tension_N"]
+
+    def creep(own, t):
+        mode = own["second_relaxation.A"] * load * (1 - np.exp(-t / own["second_relaxation.T2"]))
+        slow = own["B"] * load ** own["U"] * (1 - np.exp(-own["k2"] * t ** own["N"]))
+        return slow + mode + own["steady_creep.a"] * load * t
+
+    draws = joint.parameters(fitted.flat, here)
+    for key, time in result.CREEP_TIMES_S.items():
+        values = creep(draws, time)
+        assert [said[key][q] for q in ("q05", "q50", "q95")] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]))
+        assert said[key]["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert said["final_creep_mm"] is None and said["median_creep_time_s"] is None  # steady creep never ends
+    stiffness = draws["k1"] * (1700.0 / here.model.length_ref_mm) ** draws["length_dependence.p"]
+    assert said["stiffness_N"]["q50"] == pytest.approx(np.median(stiffness), rel=1e-12)
+    ahead = summary["extrapolation"]
+    rows = fitted.flat[np.linspace(0, len(fitted.flat) - 1, min(4000, len(fitted.flat))).round().astype(int)]
+    expected = [np.median(creep(joint.parameters(rows, here), t)) for t in ahead["time_s"]]
+    assert list(ahead["posterior_mm"]["q50"]) == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_sample_twice_as_long_moved_twice_as_far_reads_the_same():
     """Creep and what flows beside it are strains of the whole wire."""
     effects = [SecondRelaxation(), SteadyCreep()]

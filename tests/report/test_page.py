@@ -189,6 +189,18 @@ def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp
     assert "from summary.json alone" in read(write(copy)).words
 
 
+def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_path):
+    summary = json.loads((fitted / "chain" / "summary.json").read_text())
+    derived = summary["derived"] | {"tension_N": 4.25, "final_creep_mm": None, "median_creep_time_s": None}
+    copy = folder_of(tmp_path / "out", "fit")
+    (copy / "chain").mkdir()
+    (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
+    (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"derived": derived}))
+    words = read(write(copy)).words
+    assert "A fresh sample under a constant 4.25 N, with all fitted effects of the wire" in words
+    assert "grows without end" in words and "stiffness there, N per unit strain" in words
+
+
 DISCOVERY = {
     "verdict": "named",
     "effects": ["strain_stiffening"],

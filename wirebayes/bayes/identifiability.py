@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.fit import Fit
 from wirebayes.bayes.prior import fast_logpdf
-from wirebayes.wire.laws import creep_fraction, creep_target
+from wirebayes.wire.fresh import FreshSample
 
 Array = NDArray[Any]
 SENSITIVE = 0.05
@@ -202,7 +202,7 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
     Parameters
     ----------
     fitted : Fit
-        Without a rival time law: eq (5) is what is extrapolated.
+        Its own time law is extrapolated, with all effects of the wire.
     tension_N : float
     times_s : (t,) array
     sample : int
@@ -217,9 +217,8 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
     weight = np.exp(log_weight - log_weight.max())
 
     def creep(rows: Array) -> Array:
-        own = problem.parameters(rows, here)
-        target = creep_target(np.full((1, 1), tension_N), own["B"], own["U"])
-        return np.asarray(target * creep_fraction(times_s[:, None], own["k2"], own["N"]))
+        wire = FreshSample(problem.parameters(rows, here), here.model, here.protocol.length_mm)
+        return wire.creep_mm(tension_N, times_s)
 
     courses, before = creep(theta), creep(problem.prior.rvs(_DRAWS, np.random.default_rng(0)))
     levels = [0.05, 0.5, 0.95]

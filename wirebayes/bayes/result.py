@@ -24,7 +24,7 @@ from wirebayes.errors import InputError
 from wirebayes.interrupt import unfinished
 from wirebayes.output import write_bytes, write_json
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.laws import creep_fraction, creep_target
+from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 
@@ -343,14 +343,23 @@ def unit_of(name: str, effects: tuple[Effect, ...] = ()) -> str:
     return units.get(name, "1")
 
 
-def derived(draws: Mapping[str, Array], tension_N: float) -> dict[str, Array]:
-    """Quantities people compare: creep at a tension after some times, and the median creep time, per draw."""
-    target = creep_target(np.asarray(tension_N), draws["B"], draws["U"])
-    out = {key: target * creep_fraction(np.asarray(t), draws["k2"], draws["N"]) for key, t in CREEP_TIMES_S.items()}
-    out["final_creep_mm"] = target
-    with np.errstate(over="ignore"):
-        out["median_creep_time_s"] = (np.log(2.0) / draws["k2"]) ** (1.0 / draws["N"])
-    return out
+def derived(wire: FreshSample, tension_N: float) -> dict[str, Array]:
+    """Quantities people compare, per draw: creep at a tension after some times and in the end, its speed, stiffness."""
+    creep = wire.creep_mm(tension_N, np.array(list(CREEP_TIMES_S.values())))
+    return {
+        **dict(zip(CREEP_TIMES_S, creep, strict=True)),
+        "final_creep_mm": wire.final_creep_mm(tension_N),
+        "median_creep_time_s": wire.median_creep_time_s(tension_N),
+        "stiffness_N": wire.stiffness_N(tension_N),
+    }
+
+
+def band(values: Array) -> dict[str, float] | None:
+    """Mean, sd and quantiles of draws; None where a draw has no finite value (creep that never ends)."""
+    if not np.isfinite(values).all():
+        return None
+    low, middle, high = (float(q) for q in np.quantile(values, [0.05, 0.5, 0.95]))
+    return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
 
 
 def statistics(values: Array) -> dict[str, float]:
@@ -376,15 +385,8 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
             for i, s in enumerate(fit.problem.samples):
                 parameters[f"{name}[{s.name}]"] = statistics(variable.values[..., i])
     tension = round(first.model.tension_ref_N, 3)
-    draws = fit.problem.parameters(fit.flat, first)
-    quantities = {
-        key: {
-            k: v
-            for k, v in statistics(value.reshape(fit.theta.shape[:2])).items()
-            if k in ("mean", "sd", "q05", "q50", "q95")
-        }
-        for key, value in derived(draws, tension).items()
-    }
+    wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
+    quantities = {key: band(value) for key, value in derived(wire, tension).items()}
     chains = fit.chains
     return {
         "experiment": sample.name if sample else first.material.replace(" ", "-"),

@@ -130,37 +130,36 @@ def export(
     seed: Seed = 0,
 ) -> None:
     """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
-    import numpy as np
-
     from wirebayes.errors import InputError
     from wirebayes.output import open_run, write_csv, write_text
     from wirebayes.robot import export as files
-    from wirebayes.robot import inverse, schema
-    from wirebayes.robot.draws import for_robot
-    from wirebayes.robot.mujoco_model import mjcf
-    from wirebayes.robot.rotation import matrix
+    from wirebayes.robot import schema
 
     machine = schema.read(robot)
     loads, moments = numbers("--tensions", tensions), rising_times(times)
     if loads.min() <= 0:
         raise InputError(f"--tensions: found {tensions!r}; expected numbers above 0")
     line = read_wires(wires, draws, experiment, own_effects)
+    contents: dict[str, str] = {}
+    if files.is_hangprinter(machine):
+        contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
+        contents["klipper.cfg"] = files.klipper(machine, line)
+    model = files.mujoco(machine, line)
+    if model is not None:
+        contents["robot.xml"] = model
+    table = files.creep_table(machine, line, loads, moments)
     run = open_run(
         output, _configuration("export", robot, wires, draws, seed, own_effects, experiment, tensions, times)
     )
     if run.state == "done":
         return
-    write_csv(run.directory / "creep-table.csv", files.TABLE, files.creep_table(machine, line, loads, moments))
-    if files.is_hangprinter(machine):
-        write_text(run.directory / "reprapfirmware.g", files.reprapfirmware(machine, line))
-        write_text(run.directory / "klipper.cfg", files.klipper(machine, line))
-    else:
+    write_csv(run.directory / "creep-table.csv", files.TABLE, table)
+    for name, text in contents.items():
+        write_text(run.directory / name, text)
+    if not files.is_hangprinter(machine):
         typer.echo("no firmware settings: they exist for four or five drums with a position-only platform", err=True)
-    x, R = machine.home_m[None], matrix(machine.home_rotation_rad)[None]
-    told = inverse.commands(machine, for_robot(machine, line.centre()), x, R, inverse.tensions(machine, x, R))
-    if told.feasible.all() and line.law == "hooke":
-        k1 = np.broadcast_to(for_robot(machine, line.centre()).theta["k1"][:, 0], machine.legs)
-        write_text(run.directory / "robot.xml", mjcf(machine, k1, told.zero_m[0], told.offset_m[0]))
+    if model is None:
+        typer.echo("no robot.xml: no tensions within the bounds hold the platform at its home pose", err=True)
     run.finish()
 
 

@@ -23,11 +23,11 @@ def wire_draws(stored: "Stored", count: int) -> "WireDraws":
     """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
     import numpy as np
 
-    from wirebayes.robot.draws import CORE, LENGTH_EXPONENT, PLACES, WireDraws
+    from wirebayes.robot.draws import CORE, LENGTH_EXPONENT, WireDraws, material
 
     sample = stored.sample
     effects = tuple(sample.model.effects)
-    names = [*CORE, *(c for e in effects if e.scope == "material" and e.place in PLACES for c in e.columns())]
+    names = [*CORE, *(c for e in material(effects) for c in e.columns())]
     pick = np.unique(np.linspace(0, len(stored.draws["k1"]) - 1, count).round().astype(int))
     protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
     parameters = {name: stored.draws[name][pick] for name in names}

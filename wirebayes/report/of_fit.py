@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.result import CREEP_TIMES_S, Stored, experiments_in, load, prior_draws, unit_of
+from wirebayes.bayes.result import Stored, experiments_in, load, prior_draws, unit_of
 from wirebayes.discrepancy.predictive import Question, predict
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
@@ -139,10 +139,19 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tupl
 
 
 def _derived(derived: dict[str, Any]) -> Table:
-    told = {key: derived[key] for key in CREEP_TIMES_S}
-    lines = [[_SPOKEN[key], number(s["q50"]), span(s["q05"], s["q95"])] for key, s in told.items()]
-    caption = f"Creep of a fresh sample at a constant {derived['tension_N']:g} N; extrapolated beyond the longest hold."
-    return Table(["after", "creep, mm", "90 % interval"], lines, caption)
+    names = {key: f"creep after {text}, mm" for key, text in _SPOKEN.items()}
+    names |= {"final_creep_mm": "final creep, mm", "median_creep_time_s": "half of it after, s"}
+    names |= {"stiffness_N": "stiffness there, N per unit strain"}
+    lines = []
+    for key, name in names.items():
+        band = derived[key]
+        endless = "grows without end" if key == "final_creep_mm" else "–"
+        lines.append([name, number(band["q50"]), span(band["q05"], band["q95"])] if band else [name, endless, "–"])
+    caption = (
+        f"A fresh sample under a constant {derived['tension_N']:g} N, with all fitted effects of the wire and without "
+        "those of the bench; extrapolated beyond the longest hold."
+    )
+    return Table(["quantity", "median", "90 % interval"], lines, caption)
 
 
 def _residuals(stored: Stored) -> Any:

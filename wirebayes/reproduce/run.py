@@ -122,7 +122,9 @@ def _tables_and_pictures(
             prior = _prior_draws(e, likelihood, seed)
             posterior += verdicts.rows(e.name, likelihood, full[likelihood].draws, prior, table_4[e.name])
             tension = round(full[likelihood].sample.model.tension_ref_N, 3)
-            creep += verdicts.creep_rows(e.name, likelihood, full[likelihood].draws, table_4[e.name], tension)
+            creep += verdicts.creep_rows(
+                e.name, likelihood, full[likelihood].draws, table_4[e.name], tension, e.length_mm
+            )
             rng = np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
             seen[likelihood] = held_out(first[likelihood], e, rng)
             forecasts.append(_forecast_row(e.name, likelihood, seen[likelihood]))

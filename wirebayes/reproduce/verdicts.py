@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes.problem import MATERIAL
-from wirebayes.bayes.result import CREEP_TIMES_S, derived, unit_of
+from wirebayes.bayes.result import CREEP_TIMES_S, unit_of
+from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.staircase import Model
 
 Array = NDArray[Any]
 Verdict = Literal["inside", "outside", "not determined"]
@@ -80,21 +82,27 @@ def rows(
 
 
 def creep_rows(
-    experiment: str, likelihood: str, draws: Mapping[str, Array], published: Mapping[str, float], tension_N: float
+    experiment: str,
+    likelihood: str,
+    draws: Mapping[str, Array],
+    published: Mapping[str, float],
+    tension_N: float,
+    length_mm: float,
 ) -> list[dict[str, Any]]:
     """Creep elongation at a tension after 2 min, 1 h and 1 day: published parameters beside the posterior."""
-    ours = derived(draws, tension_N)
-    theirs = derived({name: np.asarray(value) for name, value in published.items()}, tension_N)
+    times = np.array(list(CREEP_TIMES_S.values()))
+    table = {name: np.array([value]) for name, value in published.items()}
+    ours, theirs = (FreshSample(theta, Model(), length_mm).creep_mm(tension_N, times) for theta in (draws, table))
     out = []
-    for key, time_s in CREEP_TIMES_S.items():
-        low, middle, high = interval(ours[key])
+    for time_s, mine, published_mm in zip(times.tolist(), ours, theirs[:, 0], strict=True):
+        low, middle, high = interval(mine)
         out.append(
             {
                 "experiment": experiment,
                 "likelihood": likelihood,
                 "tension_N": tension_N,
                 "time_s": time_s,
-                "published_mm": float(theirs[key]),
+                "published_mm": float(published_mm),
                 "q05_mm": low,
                 "q50_mm": middle,
                 "q95_mm": high,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.wires import Wires, hold_context
-from wirebayes.wire import laws
+from wirebayes.wire.creep import Creep
 
 Floats = NDArray[np.float64]
 Follow = Literal["current", "start"]
@@ -34,6 +34,8 @@ class CreepState:
         Time since the first hold began.
     past : tuple of (start_s, amount, k2)
         The clocks of earlier holds, for effects that remember them.
+    elongation_mm : (w, n) array or float
+        All that the zero-tension length of the tested sample has grown by.
     """
 
     creep_mm: Floats
@@ -41,10 +43,11 @@ class CreepState:
     holds: int = 0
     clock_s: float = 0.0
     past: tuple[tuple[float, Floats, Floats], ...] = ()
+    elongation_mm: Floats | float = 0.0
 
     def strain(self, wires: Wires) -> Floats:
         """Creep as a strain of the whole wire, (w, n)."""
-        return np.asarray(sum(self.beside_mm.values(), self.creep_mm) / wires.length_mm)
+        return np.asarray((self.elongation_mm + np.zeros_like(self.creep_mm)) / wires.length_mm)
 
 
 def fresh(legs: int, draws: int) -> CreepState:
@@ -70,44 +73,48 @@ class HoldCreep:
         self.wires, self.carried, self.follow = wires, carried, follow
         self.hold = hold_context(wires, carried.holds, carried.clock_s, tension_N, carried.creep_mm)
         self.hold.past.extend(carried.past)
-        self.kept = 1.0 if wires.history == "saturating" else 0.0
-        self.k2 = self._pass("rate", wires.theta["k2"])
-        self.amount = self._amount(tension_N)
+        self.law = Creep(wires.placed, wires.theta, wires.history)
+        self.k2 = self.law.rate(self.hold)
+        self.amount = self.law.amount(tension_N, self.hold)
         self.grown = np.zeros_like(carried.creep_mm)
         self.time_s = 0.0
+        self.reached, self.counted = np.zeros((1, 1)), np.zeros((1, 1))  # share of the creep, and its own clock
         self.before: tuple[Floats, Floats] | None = None  # tension and progress of the step before
 
     def advance(self, time_s: float, tension_N: Floats) -> CreepState:
         """Creep to a later time of the hold; `tension_N` reigns where the last step ended, and is followed onward."""
-        N = self.wires.theta["N"]
-        if self.follow == "current":
-            self.amount = self._amount(self._onward(time_s, tension_N))
-            # The share of what is left: composes to eq (5) exactly when the tension stays.
-            share = -np.expm1(-self.k2 * (np.power(time_s, N) - np.power(self.time_s, N)))
-            self.grown = self.grown + (self.amount - self.grown) * share
+        hold, law, carried = self.hold, self.law, self.carried
+        hold.time_s, hold.duration_s, self.time_s = np.full((1, 1), time_s), time_s, time_s
+        reached, clock = law.fraction(self.k2, hold), law.clock(hold)
+        progress = reached - self.reached
+        if self.follow == "start":
+            self.grown = self.amount * reached
         else:
-            self.grown = self.amount * laws.creep_fraction(np.asarray(time_s), self.k2, N)
-        self.time_s = time_s
-        self.hold.time_s = np.full((1, 1), time_s)
-        self.hold.duration_s = time_s
-        beside = {
-            e.key: e.apply(self.carried.beside_mm.get(e.key, np.zeros((1, 1))), self.wires.own(e), self.hold)
-            for e in self.wires.at("elongation")
-        }
-        carried = self.carried
-        past = (*carried.past, (carried.clock_s, self.amount, self.k2))
-        grown = self._pass("creep", carried.creep_mm + self.grown)
-        return CreepState(grown, beside, carried.holds + 1, carried.clock_s + time_s, past)
+            self.amount = law.amount(self._onward(progress, tension_N), hold)
+            if "fraction" in law.effects.at:
+                # A law of time without a plateau: what each step adds is that step's share of the amount.
+                self.grown = self.grown + self.amount * progress
+            else:
+                # The share of what is left: composes to eq (5) exactly when the tension stays.
+                share = -np.expm1(-self.k2 * (np.power(clock, law.N) - np.power(self.counted, law.N)))
+                self.grown = self.grown + (self.amount - self.grown) * share
+        self.reached, self.counted = reached, clock
+        beside = law.beside(carried.beside_mm, hold)
+        creep = law.creep(carried.creep_mm + self.grown, hold)
+        return CreepState(
+            creep,
+            beside,
+            carried.holds + 1,
+            carried.clock_s + time_s,
+            (*carried.past, (carried.clock_s, self.amount, self.k2)),
+            law.elongation(creep, beside, hold),
+        )
 
-    def _onward(self, time_s: float, tension_N: Floats) -> Floats:
+    def _onward(self, progress: Floats, tension_N: Floats) -> Floats:
         """Tension half-way through the step: it goes on as over the step before, per share of creep done.
 
         Second order in the step, without solving the robot twice.
         """
-        N = self.wires.theta["N"]
-        progress = laws.creep_fraction(np.asarray(time_s), self.k2, N) - laws.creep_fraction(
-            np.asarray(self.time_s), self.k2, N
-        )
         ahead = tension_N
         if self.before is not None:
             last, done = self.before
@@ -115,13 +122,3 @@ class HoldCreep:
             ahead = np.maximum(tension_N + np.minimum(lead, 2.0) * (tension_N - last), 0.0)
         self.before = tension_N, progress
         return ahead
-
-    def _amount(self, tension_N: Floats) -> Floats:
-        theta = self.wires.theta
-        target = laws.creep_target(self._pass("drive", tension_N), theta["B"], theta["U"])
-        return self._pass("amount", target - self.kept * self.carried.creep_mm)
-
-    def _pass(self, place: str, value: Floats) -> Floats:
-        for effect in self.wires.at(place):
-            value = effect.apply(value, self.wires.own(effect), self.hold)
-        return value

@@ -3,7 +3,7 @@
 Bench quantities, instrument effects and one-off events are dropped here and go no further.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,12 +13,11 @@ from wirebayes.robot.description import GivenWire, Robot
 from wirebayes.robot.rotation import matrix
 from wirebayes.robot.wires import Wires
 from wirebayes.wire import laws
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
 
 Floats = NDArray[np.float64]
 CORE = ("k1", "B", "U", "k2", "N")
 LENGTH_EXPONENT = "length_exponent"  # creep elongation grows as length to this power; 1, a strain, unless fitted
-PLACES = ("strain", "drive", "amount", "rate", "creep", "elongation")  # where a material effect changes a robot's wire
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class WireDraws:
 
     def material(self) -> tuple[Effect, ...]:
         """The effects that the robot's wires show too."""
-        return tuple(e for e in self.effects if e.scope == "material" and e.place in PLACES)
+        return material(self.effects)
 
     def part(self, index: NDArray[np.intp] | slice) -> "WireDraws":
         """Some of the draws, each with all its parameters."""
@@ -66,6 +65,11 @@ class WireDraws:
     def centre(self) -> "WireDraws":
         """One wire with the posterior mean of every parameter: what a controller would be told."""
         return replace(self, parameters={k: np.array([v.mean()]) for k, v in self.parameters.items()})
+
+
+def material(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Those effects that a wire shows wherever it hangs."""
+    return tuple(e for e in effects if e.scope == "material" and e.place not in OF_THE_BENCH)
 
 
 def given(wire: GivenWire) -> WireDraws:
@@ -97,7 +101,8 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     effects = line.material()
     names = CORE + tuple(c for e in effects for c in e.columns())
     exponent = line.parameters.get(LENGTH_EXPONENT)
-    shared = spread == 0 and not robot.given and exponent is None
+    by_length = [e for e in effects if e.place == "sample"]
+    shared = spread == 0 and not robot.given and exponent is None and not by_length
     theta: dict[str, Floats] = {}
     for name in names:
         if shared:
@@ -111,10 +116,13 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         for name in ("k1", "B", "k2"):
             theta[name] = theta[name] * np.exp(spread * rng.standard_normal((robot.legs, n)))
     length = np.array([wire.length_mm for wire in lines])[:, None]
+    longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
     if exponent is not None:
-        longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
         theta["B"] = theta["B"] * longer ** (exponent - 1.0)
-    return Wires(line.law, line.history, theta, length, effects, line.tension_ref_N)
+    hold = steady_hold(theta, length * longer, line.tension_ref_N, length_ref_mm=length)
+    theta = dict(Placed(by_length, theta).change("sample", theta, hold))
+    others = tuple(e for e in effects if e.place != "sample")
+    return Wires(line.law, line.history, theta, length, others, line.tension_ref_N)
 
 
 def nominal_length(robot: Robot) -> Floats:
@@ -159,7 +167,13 @@ def warnings(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) 
         out.append(
             f"wires of {lengths.min():.0f} to {lengths.max():.0f} mm, tested at {line.length_mm:.0f} mm: creep {rule}"
         )
-    dropped = [e.name for e in line.effects if e.scope == "material" and e.place not in PLACES]
+    kept = line.material()
+    out.extend(
+        f"the robot knows no temperature: the effect {e.name} sees none, as at the first reading of the test"
+        for e in kept
+        if e.place == "zero_length"
+    )
+    dropped = [e.name for e in line.effects if e.scope == "material" and e not in kept]
     out.extend(f"the material effect {name} has no place in the robot and is left out" for name in dropped)
     if any(e.name == "discrepancy" for e in line.effects):
         out.append("what the fit could not name is not in the robot: its wires follow the named model only")

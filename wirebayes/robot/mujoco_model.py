@@ -21,6 +21,7 @@ def mjcf(
     offset_m: Floats,
     damping_N_s_m: float = 1.0,
     timestep_s: float = 1e-3,
+    remark: str = "",
 ) -> str:
     """MuJoCo model (MJCF) of a robot with given lengths.
 
@@ -32,6 +33,8 @@ def mjcf(
     damping_N_s_m : float
         Of the platform's displacements; of its rotations times the platform's size squared.
     timestep_s : float
+    remark : str
+        A comment at the head of the model.
     """
     m, arm2 = robot.mass_kg, robot.size_m**2
     stiffness = k1_N * robot.lines**2 / zero_m
@@ -47,9 +50,10 @@ def mjcf(
         f'<site site="exit{i}"/><site site="point{i}"/></spatial>'
         for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
     )
+    comment = f"<!-- {remark} -->" if remark else ""
     inertia = _row(np.full(3, m * arm2))
     return (
-        f'<mujoco model="{robot.name}"><option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
+        f'<mujoco model="{robot.name}">{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}<body>{slides}{ball}'
         f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
         f"</body></worldbody><tendon>{tendons}</tendon></mujoco>\n"

@@ -5,15 +5,18 @@ Arrays are batch-last: ``(w, n)`` or anything that broadcasts to it. Lengths in 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.wire import laws
-from wirebayes.wire.effect import Effect, HoldContext
+from wirebayes.wire.effect import Effect, HoldContext, Placed, steady_hold
+from wirebayes.wire.elastic import bent, strain_of
+from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.staircase import Model
 
 Floats = NDArray[np.float64]
-_STEP = 1e-30
 _GAUSS = np.polynomial.legendre.leggauss(8)
 
 
@@ -41,13 +44,20 @@ class Wires:
     effects: tuple[Effect, ...] = ()
     tension_ref_N: float = 1.0
 
+    @cached_property
+    def placed(self) -> Placed:
+        """The effects by place, with their amplitudes."""
+        return Placed(self.effects, self.theta)
+
     def at(self, place: str) -> list[Effect]:
         """The effects at one place, in the order they compose."""
-        return [effect for effect in self.effects if effect.place == place]
+        return self.placed.at.get(place, [])
 
-    def own(self, effect: Effect) -> dict[str, Floats]:
-        """An effect's amplitudes by their short names."""
-        return {a.name: self.theta[c] for a, c in zip(effect.amplitudes, effect.columns(), strict=True)}
+    def sample(self, leg: int) -> FreshSample:
+        """A fresh sample of one leg's wire, with whatever depends on its length in the robot."""
+        theta = {k: v[min(leg, len(v) - 1)] for k, v in self.theta.items()}
+        model = Model(self.law, self.history, self.effects, self.tension_ref_N)
+        return FreshSample(theta, model, float(self.length_mm[min(leg, len(self.length_mm) - 1), 0]))
 
     def part(self, index: slice | NDArray[np.intp]) -> "Wires":
         """The same wires for some of the draws."""
@@ -58,39 +68,23 @@ class Wires:
 def hold_context(
     wires: Wires, hold: int = 0, clock_s: float = 0.0, tension_N: Floats | None = None, carried_mm: Floats | None = None
 ) -> HoldContext:
-    """What an effect may look at, as on the bench: a robot's hold begins with a command and has no displacement."""
-    zero = np.zeros((1, 1))
-    return HoldContext(
+    """What an effect may look at: a robot's hold begins with a command and has no displacement."""
+    alike = np.ptp(wires.length_mm) == 0
+    length = float(wires.length_mm.flat[0]) if alike else wires.length_mm
+    return steady_hold(
+        wires.theta,
+        length,
+        wires.tension_ref_N,
         index=hold,
-        recorded=True,
-        order=float(hold),
-        displacement_mm=0.0,
-        previous_mm=0.0,
-        direction=1,
-        first_direction=1,
         start_s=clock_s,
-        duration_s=0.0,
-        time_s=zero,
-        warming_K=zero,
-        length_mm=float(np.mean(wires.length_mm)),
-        length_ref_mm=float(np.mean(wires.length_mm)),
-        tension_ref_N=wires.tension_ref_N,
-        theta=dict(wires.theta),
-        initial_tension=zero if tension_N is None else tension_N,
-        carried=zero if carried_mm is None else carried_mm,
+        tension_N=tension_N,
+        carried_mm=carried_mm,
     )
 
 
 def bent_strain(wires: Wires, strain: Floats) -> tuple[Floats, Floats]:
-    """Effective strain whose product with k1 is the tension, and its slope by the strain (a complex step)."""
-    bends = wires.at("strain")
-    if not bends:
-        return strain, np.ones_like(strain)
-    value = strain + 1j * _STEP
-    context = hold_context(wires)
-    for effect in bends:
-        value = effect.apply(value, wires.own(effect), context)
-    return np.asarray(value.real), np.asarray(value.imag / _STEP)
+    """Effective strain whose product with k1 is the tension, and its slope by the strain."""
+    return bent(wires.placed, strain, hold_context(wires))
 
 
 def tension(wires: Wires, stretched_m: Floats, zero_m: Floats) -> tuple[Floats, Floats]:
@@ -136,14 +130,8 @@ def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
 def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) -> Floats:
     """Zero-tension length that gives a tension at a stretched length, m; NaN where the law cannot reach the tension."""
     goal = tension_N / wires.theta["k1"]
-    strain = goal + np.zeros(np.broadcast_shapes(goal.shape, stretched_m.shape))
-    if wires.at("strain"):
-        for _ in range(50):
-            value, slope = bent_strain(wires, strain)
-            move = (value - goal) / np.where(slope > 0, slope, np.nan)
-            strain = strain - move
-            if not np.any(np.abs(move) > 1e-15):
-                break
+    effective = goal + np.zeros(np.broadcast_shapes(goal.shape, stretched_m.shape))
+    strain = strain_of(wires.placed, effective, hold_context(wires))
     with np.errstate(invalid="ignore"):
         length = stretched_m / (1.0 + strain) if wires.law == "hooke" else stretched_m * (1.0 - strain)
         return np.where(length > 0, length, np.nan)

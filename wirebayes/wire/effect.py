@@ -3,7 +3,7 @@
 The staircase calls effects by place and knows none by name; a user's own effect is a subclass in the user's file.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -28,6 +28,7 @@ Place = Literal[
     "reading",  # what the sensor says, N
 ]
 Scope = Literal["material", "instrument", "environment", "event"]
+OF_THE_BENCH = ("position", "wait", "reading")  # places that a wire away from the bench does not have
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,85 @@ class Effect:
         Most effects have one form; one that happened at a single hold has one a hold.
         """
         return [cls()]
+
+
+class Placed:
+    """The effects of a model by place, each with its own amplitudes.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Those at one place compose in this order.
+    theta : mapping of name to array
+        Holds ``effect_name.parameter`` of every effect.
+
+    Attributes
+    ----------
+    at : dict of place to list of Effect
+        Only places that have an effect.
+    own : dict of effect key to its amplitudes by their short names
+    """
+
+    def __init__(self, effects: Sequence[Effect], theta: Mapping[str, NDArray[Any]]) -> None:
+        self.at: dict[str, list[Effect]] = {}
+        for effect in effects:
+            self.at.setdefault(effect.place, []).append(effect)
+        self.own = {
+            e.key: {a.name: theta[c] for a, c in zip(e.amplitudes, e.columns(), strict=True)} for e in effects
+        }
+
+    def change(self, place: Place, value: Any, hold: HoldContext) -> Any:
+        """A quantity after all effects at its place."""
+        for effect in self.at.get(place, ()):
+            value = effect.apply(value, self.own[effect.key], hold)
+        return value
+
+
+def steady_hold(
+    theta: Mapping[str, NDArray[Any]],
+    length_mm: Any,
+    tension_ref_N: float,
+    *,
+    length_ref_mm: Any = None,
+    index: int = 0,
+    start_s: float = 0.0,
+    tension_N: NDArray[Any] | None = None,
+    carried_mm: NDArray[Any] | None = None,
+) -> HoldContext:
+    """A hold away from the bench: no displacement, no temperature, no earlier holds unless `index` says so.
+
+    Parameters
+    ----------
+    theta : mapping of name to array
+        All parameters of the model.
+    length_mm, length_ref_mm : float or array
+        The reference is the length itself when left out.
+    tension_ref_N : float
+    index, start_s : int, float
+        Number of earlier holds, and the time since the first of them began.
+    tension_N, carried_mm : array, optional
+        When the hold begins; zero when left out.
+    """
+    zero = np.zeros((1, 1))
+    return HoldContext(
+        index=index,
+        recorded=True,
+        order=float(index),
+        displacement_mm=0.0,
+        previous_mm=0.0,
+        direction=1,
+        first_direction=1,
+        start_s=start_s,
+        duration_s=0.0,
+        time_s=zero,
+        warming_K=zero,
+        length_mm=length_mm,
+        length_ref_mm=length_mm if length_ref_mm is None else length_ref_mm,
+        tension_ref_N=tension_ref_N,
+        theta=dict(theta),
+        initial_tension=zero if tension_N is None else tension_N,
+        carried=zero if carried_mm is None else carried_mm,
+    )
 
 
 @dataclass(frozen=True)

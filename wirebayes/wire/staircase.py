@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.wire import laws
-from wirebayes.wire.effect import Effect, HoldContext, Place
+from wirebayes.wire.creep import Creep
+from wirebayes.wire.effect import Effect, HoldContext, Placed
 from wirebayes.wire.protocol import Protocol
 
 Theta = Mapping[str, NDArray[Any]]
@@ -132,16 +133,16 @@ class _Walk:
         self.start = protocol.start_s
         self.directions = _directions(protocol.displacement_mm)
         self.past: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
-        self.at = {effect.place: model.at(effect.place) for effect in model.effects}
-        self.own = {e.key: {a.name: theta[c] for a, c in zip(e.amplitudes, e.columns(), strict=True)}
-                    for e in model.effects}  # fmt: skip
+        self.effects = Placed(model.effects, theta)
+        self.at, self.change = self.effects.at, self.effects.change
         self.theta: dict[str, NDArray[Any]] = dict(theta)
         if "sample" in self.at:
-            self.theta = self._pass("sample", self.theta, self._context(0))
+            self.theta = self.change("sample", self.theta, self._context(0))
+        self.creep = Creep(self.effects, self.theta, model.history)
         self.k1, self.B, self.U = self.theta["k1"], self.theta["B"], self.theta["U"]
         self.k2, self.N = self.theta["k2"], self.theta["N"]
         self.base = protocol.length_mm + self.theta["preload"]
-        self.kept = 1.0 if model.history == "saturating" else 0.0
+        self.kept = self.creep.kept
         # Holds mostly share their reading times, so the exponentials are few.
         times, where = np.unique(self.time, return_inverse=True)
         self.fraction = laws.creep_fraction(times[:, None], self.k2, self.N)
@@ -154,30 +155,26 @@ class _Walk:
         self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
     ) -> tuple[NDArray[Any], NDArray[Any], dict[str, NDArray[Any]]]:
         """Readings (R, n), creep carried out (n,), other elongations carried out; real or complex."""
-        hold = self._context(j)
-        position = self._pass("position", stretched[None], hold)
-        carried = creep[None]
+        hold, law = self._context(j), self.creep
+        position = self.change("position", stretched[None], hold)
+        hold.carried = creep[None]
         extra = sum((beside.get(e.key, 0.0) for e in self.at.get("elongation", ())), 0.0)
-        first = self._tension(position, carried + extra, hold, row=0)
+        hold.initial_tension = self._first(position, hold.carried + extra, hold)
         if "wait" in self.at:
-            wait = self._pass("wait", np.zeros((1, 1)), hold)
-            carried = carried + self._amount(first, carried, hold)[0] * laws.creep_fraction(wait, self.k2, self.N)
-            first = self._tension(position, carried + extra, hold, row=0)
-        amount, k2 = self._amount(first, carried, hold)
-        if self.at.keys() & {"rate", "clock", "fraction"}:
-            clock = self._pass("clock", hold.time_s, hold)
-            fraction = self._pass("fraction", laws.creep_fraction(clock, k2, self.N), hold)
-        else:
-            fraction = self.fraction[self.where[j]]
-        grown = self._pass("creep", carried + amount * fraction, hold)
+            wait = self.change("wait", np.zeros((1, 1)), hold)
+            waited = law.amount(hold.initial_tension, hold) * laws.creep_fraction(wait, self.k2, self.N)
+            hold.carried = hold.carried + waited
+            hold.initial_tension = self._first(position, hold.carried + extra, hold)
+        amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
+        own_time = self.at.keys() & {"rate", "clock", "fraction"}
+        fraction = law.fraction(k2, hold) if own_time else self.fraction[self.where[j]]
+        grown = law.creep(hold.carried + amount * fraction, hold)
         self.past.append((float(self.start[j]), amount, k2))
-        total, after = grown, {}
-        for effect in self.at.get("elongation", ()):
-            course = effect.apply(beside.get(effect.key, np.zeros((1, 1))), self.own[effect.key], hold)
-            after[effect.key] = course[self.last[j]][None]
-            total = total + course
-        readings = self._pass("reading", self._tension(position, total, hold), hold)
-        return readings, grown[self.last[j]], after
+        courses = law.beside(beside, hold)
+        total = sum(courses.values(), grown)
+        readings = self.change("reading", self._tension(position, total, hold), hold)
+        last = self.last[j]
+        return readings, grown[last], {key: course[last][None] for key, course in courses.items()}
 
     def complex_step(
         self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
@@ -232,30 +229,18 @@ class _Walk:
         out = creep + amount * end
         return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end, beside
 
-    def _amount(
-        self, first: NDArray[Any], carried: NDArray[Any], hold: HoldContext
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
-        hold.initial_tension, hold.carried = first, carried
-        target = laws.creep_target(self._pass("drive", first, hold), self.B, self.U)
-        amount = self._pass("amount", target - self.kept * carried, hold)
-        return amount, self._pass("rate", self.k2, hold)
+    def _first(self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
+        """Tension (1, n) when the hold begins: effects see its first time only."""
+        times, warming = hold.time_s, hold.warming_K
+        hold.time_s, hold.warming_K = times[:1], warming[:1]
+        first = self._tension(position, elongation, hold)
+        hold.time_s, hold.warming_K = times, warming
+        return first
 
-    def _tension(
-        self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext, row: int | None = None
-    ) -> NDArray[Any]:
-        if row is not None:
-            whole = hold.warming_K
-            hold.warming_K = whole[row : row + 1]
-        zero = self._pass("zero_length", self.protocol.length_mm + elongation, hold)
-        strain = self._pass("strain", laws.strain(position, zero, self.model.law), hold)
-        if row is not None:
-            hold.warming_K = whole
+    def _tension(self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
+        zero = self.change("zero_length", self.protocol.length_mm + elongation, hold)
+        strain = self.change("strain", laws.strain(position, zero, self.model.law), hold)
         return np.where(strain.real > 0, self.k1 * strain, 0.0)
-
-    def _pass(self, place: Place, value: Any, hold: HoldContext) -> Any:
-        for effect in self.at.get(place, ()):
-            value = effect.apply(value, self.own[effect.key], hold)
-        return value
 
     def _context(self, j: int) -> HoldContext:
         p = self.protocol

@@ -1,0 +1,92 @@
+"""Stiffness that firmware and simulator are given: the tangent at the tensions the robot works at."""
+
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from wirebayes.effects import named
+from wirebayes.errors import InputError
+from wirebayes.robot import draws, export, inverse, rotation, schema
+from wirebayes.robot.wires import tension
+
+CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
+BENT = [
+    ("hooke", "strain_stiffening", {"strain_stiffening.c": 15.0}),
+    ("hooke", "toe", {"toe.c": 0.004}),
+    ("modified", None, {}),
+    ("modified", "strain_stiffening", {"strain_stiffening.c": 15.0}),
+]
+
+
+def _line(law, effect, amplitudes, count=40):
+    spread = np.exp(0.05 * np.random.default_rng(2).standard_normal((len(CORE) + len(amplitudes), count)))
+    values = {k: v * f for (k, v), f in zip((CORE | amplitudes).items(), spread, strict=True)}
+    return draws.WireDraws(values, 1000.0, law, effects=(named(effect),) if effect else (), tension_ref_N=3.0)
+
+
+def _home(robot):
+    x, R = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
+    return x, R, inverse.tensions(robot, x, R)
+
+
+@pytest.mark.parametrize(("law", "effect", "amplitudes"), BENT)
+def test_the_spring_constant_is_the_slope_of_the_whole_law_at_the_working_tension(law, effect, amplitudes):
+    robot, line = schema.read("hangprinter-4"), _line(law, effect, amplitudes)
+    wires = draws.for_robot(robot, line)
+    load = _home(robot)[2].mean()
+    low, high = np.ones((1, line.count)), np.full((1, line.count), 1.5)
+    for _ in range(60):  # the stretched length of a wire of 1 m under that tension
+        middle = 0.5 * (low + high)
+        below = tension(wires, middle, np.ones_like(middle))[0] < load
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    step = 1e-7
+    up, down = (tension(wires, high + move, np.ones_like(high))[0] for move in (step, -step))
+    slope = (up - down) / (2 * step)
+    spring = export.working_spring(robot, line)
+    np.testing.assert_allclose(spring.stiffness_N, slope[0], rtol=1e-6)
+    assert np.abs(slope[0] / line.parameters["k1"] - 1).min() > 1e-3  # k1 would be wrong
+    for text, setting in (
+        (export.reprapfirmware(robot, line), f"M666 S{slope.mean():.0f} "),
+        (export.klipper(robot, line), f"winch_spring_constant: {slope.mean():.0f} "),
+    ):
+        assert setting in text
+        assert f"it is the tangent at {load:.4g} N, the mean tension of the lines at the home pose" in text
+
+
+@pytest.mark.parametrize("name", ["hangprinter-4", "linear-6"])
+@pytest.mark.parametrize(("law", "effect", "amplitudes"), BENT)
+def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amplitudes):
+    robot, line = schema.read(name), _line(law, effect, amplitudes)
+    wires = draws.for_robot(robot, line.centre())
+    x, R, tau = _home(robot)
+    told = inverse.commands(robot, wires, x, R, tau)
+    text = export.mujoco(robot, line)
+    assert "tangent stiffness of the home pose, where the wires carry " + f"{tau[0, 0]:.4g}, " in text
+    springs = ElementTree.fromstring(text).findall("./tendon/spatial")
+    stiffness = np.array([float(s.get("stiffness")) for s in springs])
+    rest = np.array([float(s.get("springlength").split()[1]) for s in springs])
+    points = x[0] + robot.platform_m @ R[0].T
+    distance = np.linalg.norm(points - robot.exit_m, axis=1)
+
+    def pull(move):
+        """Force of all lines of each wire on the platform, its point moved away by `move`."""
+        stretched = robot.lines * (distance + move) + told.offset_m[0]
+        return robot.lines * tension(wires, stretched[:, None], told.zero_m.T)[0][:, 0]
+
+    step = 1e-7
+    np.testing.assert_allclose(stiffness * (distance - rest), robot.lines * tau[0], rtol=1e-8)
+    np.testing.assert_allclose(stiffness, (pull(step) - pull(-step)) / (2 * step), rtol=1e-5)
+
+
+def test_a_line_of_one_stiffness_is_exported_as_it_is():
+    amplitudes = {"second_relaxation.A": 0.05, "second_relaxation.T2": 30.0}
+    robot, line = schema.read("hangprinter-4"), _line("hooke", "second_relaxation", amplitudes)
+    assert f"M666 S{line.parameters['k1'].mean():.0f} " in export.reprapfirmware(robot, line)
+    assert "tangent" not in export.reprapfirmware(robot, line) + export.mujoco(robot, line)
+
+
+def test_a_line_that_cannot_carry_the_platform_has_no_spring_constant():
+    robot = schema.read("hangprinter-4")
+    with pytest.raises(InputError, match="cannot carry"):
+        export.reprapfirmware(robot, _line("hooke", "strain_stiffening", {"strain_stiffening.c": -2000.0}))

@@ -1,0 +1,32 @@
+"""Elasticity with effects: the strain whose product with k1 is the tension, its slope, and the way back."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.wire.effect import HoldContext, Placed
+
+Array = NDArray[Any]
+_STEP = 1e-30  # a complex step has no truncation error, so it may be this small
+
+
+def bent(effects: Placed, strain: Array, hold: HoldContext) -> tuple[Array, Array]:
+    """Effective strain, and its slope by the strain (a complex step)."""
+    if "strain" not in effects.at:
+        return strain, np.ones_like(strain)
+    value = effects.change("strain", strain + 1j * _STEP, hold)
+    return np.asarray(value.real), np.asarray(value.imag / _STEP)
+
+
+def strain_of(effects: Placed, effective: Array, hold: HoldContext) -> Array:
+    """Strain that has an effective strain, by Newton's steps; NaN where none has."""
+    strain = effective
+    if "strain" in effects.at:
+        for _ in range(50):
+            value, slope = bent(effects, strain, hold)
+            move = (value - effective) / np.where(slope > 0, slope, np.nan)
+            strain = strain - move
+            if not np.any(np.abs(move) > 1e-15):
+                break
+    return strain
