@@ -11,11 +11,13 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from wirebayes import __version__
 from wirebayes.errors import InputError
 from wirebayes.interrupt import unfinished
 
@@ -54,6 +56,49 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     for row in rows:
         writer.writerow(["" if value is None else value for value in plain(list(row))])
     write_text(path, text.getvalue())
+
+
+def read_json(path: Path, otherwise: str = "") -> Any:
+    """A JSON file that a command of ours wrote.
+
+    Parameters
+    ----------
+    path : Path
+    otherwise : str
+        What to say where it is absent.
+
+    Raises
+    ------
+    InputError
+        It is absent or not JSON.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        raise InputError(otherwise or f"{path}: no such file, expected the results of a finished command") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{path}: found no valid JSON, expected what the command wrote") from None
+
+
+@contextmanager
+def stored_results(path: Path) -> Iterator[None]:
+    """Blame what is stored, not the code, when something cannot be taken out of it: it was damaged or is another's.
+
+    Libraries raise whatever they like on a damaged file, so every exception counts; it stays the error's cause.
+
+    Raises
+    ------
+    InputError
+        Instead of any other exception within the block.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        found = f"{type(error).__name__}: {error}"
+        expected = f"what wirebayes {__version__} wrote there, unchanged; run its command again in a new folder"
+        raise InputError(f"{path}: cannot be used ({_short(found, 120)}), expected {expected}") from error
 
 
 def plain(value: Any) -> Any:
@@ -170,7 +215,7 @@ def check_run(directory: Path, configuration: Mapping[str, Any]) -> Literal["new
         raise InputError(f"{directory}: found {present[0]} but no {CONFIGURATION}, expected {expected}")
     try:
         found = json.loads(stored.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         raise InputError(f"{stored}: found no readable configuration, expected {expected}") from None
     different = differences(found, plain(configuration))
     if different:
@@ -193,6 +238,6 @@ def differences(found: Any, wanted: Any, key: str = "") -> list[str]:
     return [f"{key or 'content'} is {_short(found)} there, {_short(wanted)} here"]
 
 
-def _short(value: Any) -> str:
+def _short(value: Any, most: int = 40) -> str:
     text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 40 else text[:37] + "..."
+    return text if len(text) <= most else text[: most - 3] + "..."

@@ -19,10 +19,11 @@ from wirebayes.bayes.identifiability import extrapolation, identifiability, told
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.bayes.replicate import readings as replicate
+from wirebayes.bayes.stored_check import check
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.interrupt import unfinished
-from wirebayes.output import write_bytes, write_json
+from wirebayes.output import stored_results, write_bytes, write_json
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.protocol import Protocol
@@ -106,11 +107,8 @@ class Stored:
 
 def experiments_in(path: Path) -> tuple[str, ...]:
     """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
-    try:
-        with xr.open_dataset(path, group="posterior", engine="h5netcdf") as posterior:
-            return tuple(json.loads(posterior.attrs["experiments"]))
-    except (OSError, KeyError, ValueError):
-        raise InputError(f"{path}: not a posterior of wirebayes") from None
+    with stored_results(path), xr.open_dataset(path, group="posterior", engine="h5netcdf") as posterior:
+        return tuple(str(name) for name in json.loads(posterior.attrs["experiments"]))
 
 
 def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
@@ -133,11 +131,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
     path = folder / "posterior.nc"
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the posterior of a fit")
-    try:
-        tree = xr.open_datatree(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as netCDF ({error})") from None
-    with tree:
+    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
         about, constant = tree["posterior"].attrs, tree["constant_data"].to_dataset()
         if "wirebayes_version" not in about:
             raise InputError(f"{path}: not a posterior of wirebayes")
@@ -178,12 +172,14 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         tension = np.nan_to_num(observed["tension_N"].values[here])[..., None]
         resolutions = json.loads(about["resolutions_N"])
         sample = Sample(names[at], about["material"], protocol, tension, float(resolutions[at]), model)
+        check(draws, sample, about["likelihood"])
         return Stored(draws, sample, about["likelihood"], exponent)
 
 
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
     """What was believed before the fit: draws of the prior of one experiment's parameters, each (n,)."""
-    with xr.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
+    path = folder / "posterior.nc"
+    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
         prior, names = tree["prior"].to_dataset(), json.loads(tree["posterior"].attrs["experiments"])
         if "experiment" in prior.dims:
             prior = prior.isel(experiment=names.index(experiment or names[0]))

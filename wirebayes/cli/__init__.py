@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         typer.main.get_command(_application(called)).main(args=arguments, prog_name="wirebayes")
     except InputError as error:
-        print(error, file=sys.stderr)
+        print(_one_line(str(error)), file=sys.stderr)
         return 2
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
@@ -149,6 +149,15 @@ def _application(called: str | None) -> "typer.Typer":
         # \b keeps the example on its own line, unwrapped
         application.command(name, short_help=command.summary, epilog=f"\b\nExample:\n  {command.example}")(function)
     return application
+
+
+def _one_line(text: str) -> str:
+    """What was found may be long or hold line feeds and control characters: a terminal gets one plain line."""
+    line = "".join(c if c.isprintable() else " " for c in text)
+    return line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE // 2]} … {line[-_LONGEST_LINE // 2 :]}"
+
+
+_LONGEST_LINE = 2000
 
 
 def _unloaded() -> None:

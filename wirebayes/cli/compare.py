@@ -1,6 +1,5 @@
 """`wirebayes compare`: laws, histories, likelihoods and effects side by side."""
 
-import json
 from typing import Annotated, Any
 
 import typer
@@ -44,10 +43,10 @@ def compare(
     from wirebayes.cli.progress import progress
     from wirebayes.discrepancy.candidates import BASE, Candidate, candidates, problem_of
     from wirebayes.discrepancy.compare import Task, run, side_by_side
-    from wirebayes.effects import catalogue
+    from wirebayes.effects import catalogue, source_of
     from wirebayes.errors import InputError
     from wirebayes.experiment import read_experiments, select
-    from wirebayes.output import open_run, write_json
+    from wirebayes.output import open_run, read_json, stored_results, write_json
     from wirebayes.report import compare as pictures
 
     experiments = select(read_experiments(file), experiment)
@@ -69,7 +68,7 @@ def compare(
     configuration = {
         "command": "compare", "version": __version__, "seed": seed, "train_holds": train_holds,
         "elastic_law": elastic_law, "history": history, "likelihood": likelihood,
-        "own_effects": own_effects.read_text() if own_effects else None,
+        "own_effects": source_of(own_effects),
         "models": {one.name: [t.candidate.name for t in tasks if t.experiment is one] for one in experiments},
         "priors": {one.name: one.priors for one in experiments},
         "data_sha256": {one.name: one.data_hash for one in experiments},
@@ -81,8 +80,9 @@ def compare(
         run(tasks, output, seed, report=report)
     content: dict[str, Any] = {"version": 1, "seed": seed, "experiments": {}}
     for one in experiments:
-        models = [json.loads((output / t.file).read_text(encoding="utf-8")) for t in tasks if t.experiment is one]
-        content["experiments"][one.name] = side_by_side(models, BASE)
+        with stored_results(output / one.name):
+            models = [read_json(output / t.file) for t in tasks if t.experiment is one]
+            content["experiments"][one.name] = side_by_side(models, BASE)
         pictures.save(output / one.name, one.name, content["experiments"][one.name], models)
     write_json(output / "comparison.json", content)
     opened.finish()

@@ -1,6 +1,5 @@
 """``wirebayes discover``: what the plain model is missing, added to it where it has a name."""
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -42,9 +41,9 @@ def discover(
     from wirebayes.cli.progress import progress
     from wirebayes.discrepancy.discover import catalogue_without, investigate
     from wirebayes.discrepancy.settings import Settings
-    from wirebayes.effects import catalogue
+    from wirebayes.effects import catalogue, source_of
     from wirebayes.experiment import read_experiments, select
-    from wirebayes.output import open_run, write_json
+    from wirebayes.output import open_run, read_json, stored_results, write_json
     from wirebayes.workers import workers
 
     experiments = select(read_experiments(file), experiment)
@@ -53,7 +52,7 @@ def discover(
     kinds = catalogue_without(without or (), catalogue(own_effects))
     configuration = {
         "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
-        "without": sorted(without or ()), "own_effects": own_effects.read_text() if own_effects else None,
+        "without": sorted(without or ()), "own_effects": source_of(own_effects),
         "train_holds": train_holds, "priors": {e.name: e.priors for e in experiments},
         "data_sha256": {e.name: e.data_hash for e in experiments},
     }  # fmt: skip
@@ -70,9 +69,11 @@ def discover(
     write_json(output / "discovery.json", findings.report)
     opened.finish()
     for folder in (folder for job in jobs for folder in job.folders):
-        summary = json.loads((output / folder / "summary.json").read_text())
-        if not summary["converged"]:
-            print(f"{folder}: {summary['convergence']}", file=sys.stderr)
+        file = output / folder / "summary.json"
+        with stored_results(file):
+            summary = read_json(file)
+            if not summary["converged"]:
+                print(f"{folder}: {summary['convergence']}", file=sys.stderr)
 
 
 def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type: ignore[no-untyped-def]
@@ -93,8 +94,10 @@ def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type
 
 def _say_posterior(findings: "Findings", output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
+    from wirebayes.output import read_json
+
     for e in (e for block in findings.final for e in block.experiments):
-        parameters = json.loads((output / e.name / "final" / "summary.json").read_text())["parameters"]
+        parameters = read_json(output / e.name / "final" / "summary.json")["parameters"]
         for name, amplitude in findings.report["experiments"][e.name]["amplitudes"].items():
             column = next(c for c in parameters if c.startswith(f"{name}."))
             amplitude |= {key: parameters[column][key] for key in ("mean", "q05", "q95")}

@@ -1,6 +1,5 @@
 """``wirebayes fit``: the posterior of each experiment, or of all samples of a material together."""
 
-import json
 import sys
 from typing import Annotated
 
@@ -46,10 +45,10 @@ def fit(
     from wirebayes.bayes.jobs import Job, run
     from wirebayes.bayes.problem import build
     from wirebayes.cli.progress import progress
-    from wirebayes.effects import catalogue, named
+    from wirebayes.effects import catalogue, named, source_of
     from wirebayes.errors import InputError
     from wirebayes.experiment import read_experiments, select
-    from wirebayes.output import open_run
+    from wirebayes.output import open_run, read_json, stored_results
 
     experiments = select(read_experiments(file), experiment)
     if train_holds is not None:
@@ -80,7 +79,7 @@ def fit(
         jobs.append(Job(folder, members, keys, own_effects, elastic_law, history, likelihood, exponent, provenance))
     configuration = {
         "command": "fit", "version": __version__, "seed": seed, "likelihood": likelihood, "elastic_law": elastic_law,
-        "history": history, "effects": list(keys), "own_effects": own_effects.read_text() if own_effects else None,
+        "history": history, "effects": list(keys), "own_effects": source_of(own_effects),
         "train_holds": train_holds, "together": together,
         "priors": {e.name: e.priors for members in groups.values() for e in members},
         "data_sha256": {e.name: e.data_hash for members in groups.values() for e in members},
@@ -91,9 +90,11 @@ def fit(
             run(jobs, output, seed, report=report)
         opened.finish()
     for job in jobs:
-        summary = json.loads((output / job.folder / "summary.json").read_text())
-        if not summary["converged"]:
-            print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
+        file = output / job.folder / "summary.json"
+        with stored_results(file):
+            summary = read_json(file)
+            if not summary["converged"]:
+                print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
 
 
 def _check_possible(effect, members, file, known) -> None:  # type: ignore[no-untyped-def]

@@ -91,8 +91,7 @@ def calibrate(
 ) -> None:
     """Current zero-tension length of every wire from joint values and tensions, no external sensor needed."""
     from wirebayes.errors import InputError
-    from wirebayes.output import open_run, write_json
-    from wirebayes.report.page import read_json
+    from wirebayes.output import open_run, read_json, stored_results, write_json
     from wirebayes.robot import schema, session_file
     from wirebayes.robot.calibration_answer import answer
     from wirebayes.robot.session import Prior
@@ -110,9 +109,10 @@ def calibrate(
         prior = Prior(line, 1e-3 * reference_sd, spread)
         write_json(file, answer(machine, prior, session, values, seed))
         run.finish()
-    found = read_json(file)
     models = {"with_creep_model": "the creep model", "by_hooke_alone": "Hooke's law alone"}
-    astray = [words for key, words in models.items() if not found[key]["converged"]]
+    with stored_results(file):
+        found = read_json(file)
+        astray = [words for key, words in models.items() if not found[key]["converged"]]
     if astray:
         advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
         typer.echo(f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}", err=True)
@@ -176,13 +176,14 @@ def _configuration(
 ) -> dict[str, Any]:
     """Everything that decides the results; files by their content, not by where they lie."""
     from wirebayes import __version__
+    from wirebayes.effects import source_of
 
     return {
         "command": command,
         "version": __version__,
         "robot": _content(Path(robot)),
         "wires": _content(wires / POSTERIOR),
-        "own_effects": own_effects and own_effects.read_text(encoding="utf-8"),
+        "own_effects": source_of(own_effects),
         "draws": draws,
         "seed": seed,
         "options": list(rest),

@@ -40,7 +40,7 @@ def simulate(
 ) -> None:
     """Write synthetic tests: DIR/experiments.toml, a CSV for each test, and DIR/truth.json."""
     from wirebayes import __version__
-    from wirebayes.effects import catalogue
+    from wirebayes.effects import catalogue, source_of
     from wirebayes.errors import InputError
     from wirebayes.output import check_run, open_run
     from wirebayes.simulate import Bench, Truth, draw, effect_option, number, write
@@ -80,7 +80,7 @@ def simulate(
         "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
         "displacements_mm": path, "times_s": moments, "unrecorded": sorted(gaps), "temperatures_C": warmth,
         "resolution_N": resolution, "parameters": chosen, "effects": list(effects),
-        "own_effects": own_effects.read_text() if own_effects else None,
+        "own_effects": source_of(own_effects),
         "elastic_law": elastic_law, "history": history,
     }  # fmt: skip
     if check_run(output, configuration) == "new":

@@ -55,7 +55,7 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     sys.modules[spec.name] = module  # so that other processes can be sent its effects
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever the user's file raises is told in one line
+    except (Exception, SystemExit) as error:  # whatever the user's file raises is told in one line
         raise InputError(f"{own}: cannot be run: {type(error).__name__}: {error}") from None
     found = [
         v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Effect) and v.__module__ == spec.name
@@ -71,6 +71,11 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     if not effects:
         raise InputError(f"{own}: no effect in it, expected a class derived from wirebayes.wire.effect.Effect")
     return CATALOGUE | effects
+
+
+def source_of(own: Path | None) -> str | None:
+    """The text of a user's file of effects, whatever its encoding, for the configuration it belongs to."""
+    return None if own is None else own.read_text(encoding="utf-8", errors="backslashreplace")
 
 
 def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:

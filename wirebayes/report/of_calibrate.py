@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.output import read_json
 from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, number, span
-from wirebayes.report.page import read_json
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:

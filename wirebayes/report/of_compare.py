@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+from wirebayes.output import read_json
 from wirebayes.report.blocks import Block, Page, Pictures, Section, Table, Text, number, pictures_in
-from wirebayes.report.page import read_json
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.output import read_json
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -18,7 +19,6 @@ from wirebayes.report.blocks import (
     pictures_in,
     span,
 )
-from wirebayes.report.page import read_json
 from wirebayes.report.paper_summary import listed
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.result import Stored, experiments_in, load, prior_draws, unit_of
 from wirebayes.discrepancy.predictive import Question, predict
+from wirebayes.output import read_json
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
     Block,
@@ -24,7 +25,6 @@ from wirebayes.report.blocks import (
     span,
     unit_text,
 )
-from wirebayes.report.page import read_json
 from wirebayes.report.paper_summary import listed
 from wirebayes.reproduce.verdicts import LEAST_CONTRACTION, contraction
 

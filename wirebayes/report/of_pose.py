@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.output import read_json
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -17,7 +18,6 @@ from wirebayes.report.blocks import (
     number,
     span,
 )
-from wirebayes.report.page import read_json
 from wirebayes.report.robot import CONTROLLERS
 
 _CAPTIONS = {

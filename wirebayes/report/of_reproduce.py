@@ -4,9 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from wirebayes.output import read_json
 from wirebayes.report import paper_tables
 from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded
-from wirebayes.report.page import read_json
 from wirebayes.report.paper_summary import in_a_minute, listed, of_table_4, unbroken
 from wirebayes.report.paper_tables import LEAST_COVERAGE, Rows
 

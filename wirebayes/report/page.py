@@ -1,6 +1,5 @@
 """One self-contained page of whatever a folder of results holds."""
 
-import json
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -10,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from wirebayes import __version__
 from wirebayes.errors import InputError
-from wirebayes.output import CONFIGURATION, check_file, write_text
+from wirebayes.output import CONFIGURATION, check_file, read_json, stored_results, write_text
 from wirebayes.report.blocks import Page
 
 # who knows how to tell a command's results; each module has ``page(folder, configuration)``
@@ -44,11 +43,12 @@ def tell(folder: Path) -> Page:
     absent = f"{folder}: found no {CONFIGURATION}, expected a folder of results"
     configuration = read_json(folder / CONFIGURATION, absent)
     command = configuration.get("command") if isinstance(configuration, dict) else None
-    if command not in _TELLERS:
+    if not isinstance(command, str) or command not in _TELLERS:
         known = ", ".join(_TELLERS)
         raise InputError(f"{folder / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
     teller: Callable[[Path, dict[str, Any]], Page] = import_module(_TELLERS[command]).page
-    return teller(folder, configuration)
+    with stored_results(folder):
+        return teller(folder, configuration)
 
 
 def render(page: Page) -> str:
@@ -56,19 +56,3 @@ def render(page: Page) -> str:
     environment = Environment(loader=PackageLoader("wirebayes.report", "."), undefined=StrictUndefined)
     environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template("page.html.jinja").render(page=page, version=__version__) + "\n"
-
-
-def read_json(path: Path, otherwise: str = "") -> Any:
-    """A JSON file of ours.
-
-    Raises
-    ------
-    InputError
-        It is absent or not JSON.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        raise InputError(otherwise or f"{path}: no such file, expected the results of a finished command") from None
-    except ValueError:
-        raise InputError(f"{path}: found no valid JSON, expected what the command wrote") from None

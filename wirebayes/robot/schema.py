@@ -41,7 +41,7 @@ def read(name_or_file: str | Path) -> Robot:
     text, where = _text(str(name_or_file))
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also what Python refuses: an integer of thousands of digits
         raise InputError(f"{where}: not valid TOML: {error}") from None
     return _robot(_Table(table, where, ""))
 
@@ -88,20 +88,20 @@ class _Table:
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
         value = self.take(key, f"a number{bound}", default)
         if not _is_number(value) or not value > above or not value >= least:
-            raise self.fail(key, f"found {value!r}", f"a finite number{bound}")
+            raise self.fail(key, f"found {_shown(value)}", f"a finite number{bound}")
         return float(value)
 
     def triple(self, key: str, default: list[float] | None = None) -> np.ndarray[Any, np.dtype[np.float64]]:
         value = self.take(key, "three numbers", default)
         if not isinstance(value, list) or len(value) != 3 or not all(_is_number(v) for v in value):
-            raise self.fail(key, f"found {value!r}", "a list of three finite numbers")
+            raise self.fail(key, f"found {_shown(value)}", "a list of three finite numbers")
         return np.array(value, float)
 
     def text(self, key: str, default: str | None = None, among: tuple[str, ...] = ()) -> str:
         expected = "one of " + ", ".join(among) if among else "a text"
         value = self.take(key, expected, default)
         if not isinstance(value, str) or (among and value not in among):
-            raise self.fail(key, f"found {value!r}", expected)
+            raise self.fail(key, f"found {_shown(value)}", expected)
         return value
 
     def table(self, key: str, default: dict[str, Any] | None = None) -> "_Table":
@@ -117,7 +117,7 @@ class _Table:
 def _robot(t: _Table) -> Robot:
     version = t.take("version", "the number 1")
     if version != 1 or isinstance(version, bool):
-        raise t.fail("version", f"found {version!r}", "the number 1")
+        raise t.fail("version", f"found {_shown(version)}", "the number 1")
     name, description = t.text("name"), t.text("description")
     source = t.text("source")
     freedom = t.text("freedom", "pose", ("pose", "position"))
@@ -188,10 +188,23 @@ def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    return -_LARGEST < value < _LARGEST  # an integer may be too large for any float
+
+
+_LARGEST = 1e12
 
 
 def _kind(value: Any) -> str:
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    return f"{type(value).__name__} {value!r}"
+    return f"{type(value).__name__} {_shown(value)}"
+
+
+def _shown(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python does not write integers of thousands of digits
+        return f"a huge {type(value).__name__}"
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -41,13 +41,16 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a UTF-8 text file") from None
-    lines = csv.reader(io.StringIO(text))
-    numbered = [(lines.line_num, row) for row in lines if row]
+    lines = csv.reader(io.StringIO(text, newline=""))
+    try:
+        numbered = [(lines.line_num, row) for row in lines if row]
+    except csv.Error as error:
+        raise InputError(f"{path}: line {lines.line_num}: not CSV ({error}); expected cells with commas") from None
     rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
     wanted = columns(robot, tilted)
     if not rows or rows[0] != wanted:
-        found = ",".join(rows[0]) if rows else "nothing"
+        found = ",".join(rows[0])[:200] if rows else "nothing"
         raise InputError(f"{path}: line 1: found {found}; expected the header {','.join(wanted)}")
     table = np.array([_row(path, line, row, wanted) for line, row in numbered[1:]]).reshape(-1, len(wanted))
     if not len(table):
@@ -94,6 +97,6 @@ def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]
         elif name in NORMAL:
             allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
         if not np.isfinite(value) or not allowed:
-            raise InputError(f"{path}: line {line}, column {name}: found {cell!r}; expected {kind}")
+            raise InputError(f"{path}: line {line}, column {name}: found {cell[:60]!r}; expected {kind}")
         out.append(value)
     return out
