@@ -165,9 +165,10 @@ def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     assert "Tensions from 1.21 to 15.92 N." in page.words
     assert len(page.images) == 2 * 3 + 8 + 6
     assert "What the data taught" in page.words and "Creep after 24 h at" in page.words
-    sections = re.split("What is known well", page.words)[1:]
-    known = [re.split("What is not", section)[0] for section in sections]
-    loose = [re.split("What is not", section)[1].split("parameter")[0] for section in sections]
+    assert page.words.count("not checked against the readings") == 2
+    sections = re.split("What the readings determine .90", page.words)[1:]
+    known = [re.split("What the prior still decides", section)[0] for section in sections]
+    loose = [re.split("What the prior still decides", section)[1].split("parameter")[0] for section in sections]
     assert any("k1:" in text for text in known) and any("k1:" in text for text in loose)
 
 
@@ -179,6 +180,13 @@ def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
     for converged in (True, False):
         (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"converged": converged}))
         assert ("do not believe these intervals" in read(write(copy)).words) is not converged
+    for check in ({"passed": True, "sentence": "good"}, {"passed": False, "sentence": "bad"}):
+        (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"model_check": check}))
+        words = read(write(copy)).words
+        assert check["sentence"] in words.split("What was measured")[0]
+        for claim in ("What the readings determine (90", summary["extrapolation"]["sentence"]):
+            assert (claim in words) is check["passed"]
+        assert summary["extrapolation"]["warning"] in words
 
 
 def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp_path):

@@ -156,6 +156,8 @@ class Extrapolation:
         5 %, 50 % and 95 %: as fitted; with the prior's logarithm halved; without any data.
     pareto_k : float
         Of the weights that make the prior weaker; above 0.7 that band is a guess.
+    longest_hold_s : float
+        The longest that a position was held in the test.
     """
 
     time_s: Array
@@ -164,6 +166,18 @@ class Extrapolation:
     weaker_prior_mm: Array
     prior_mm: Array
     pareto_k: float
+    longest_hold_s: float
+
+    @property
+    def warning(self) -> str:
+        """How far the longest time lies beyond the longest hold; empty where it does not."""
+        factor = float(self.time_s[-1] / self.longest_hold_s) if self.longest_hold_s else np.inf
+        if factor <= 1.0:
+            return ""
+        return (
+            f"{self.time_s[-1] / 3600.0:g} h is {factor:.3g} times the longest hold ({self.longest_hold_s:g} s): this "
+            "far out the answer rests on the model's form alone, and no reading checks it."
+        )
 
     @property
     def prior_share(self) -> Array:
@@ -189,7 +203,7 @@ class Extrapolation:
             verdict = f"the data hold it together: with the prior counted half the band is {100 * share:.0f} % wider"
         sentence = f"Creep after {hours:g} h at {self.tension_N:g} N: {verdict}."
         return {"tension_N": self.tension_N, "time_s": self.time_s, **bands, "prior_share": self.prior_share,
-                "pareto_k": self.pareto_k, "sentence": sentence}  # fmt: skip
+                "pareto_k": self.pareto_k, "sentence": sentence, "warning": self.warning}  # fmt: skip
 
 
 TIMES_S = np.array([10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0, 14400.0, 28800.0, 86400.0])
@@ -229,6 +243,7 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
         np.stack([_weighted_quantiles(course, weight, levels) for course in courses], axis=1),
         np.quantile(before, levels, axis=1),
         float(k),
+        float(max(s.protocol.duration_s.max() for s in problem.samples)),
     )
 
 

@@ -37,6 +37,10 @@ def fit(
     together: Annotated[
         str | None, typer.Option("--together", metavar="MATERIAL", help="Fit all samples of this material at once.")
     ] = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check/--no-check", help="Check each fit against 999 refitted simulations (some 5 to 20 s)."),
+    ] = True,
 ) -> None:
     """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
     from scipy import stats
@@ -45,6 +49,7 @@ def fit(
     from wirebayes.bayes.jobs import Job, run
     from wirebayes.bayes.problem import build
     from wirebayes.cli.progress import progress
+    from wirebayes.discrepancy.model_check import write_checks
     from wirebayes.effects import catalogue, named, source_of
     from wirebayes.errors import InputError
     from wirebayes.experiment import read_experiments, select
@@ -80,7 +85,7 @@ def fit(
     configuration = {
         "command": "fit", "version": __version__, "seed": seed, "likelihood": likelihood, "elastic_law": elastic_law,
         "history": history, "effects": list(keys), "own_effects": source_of(own_effects),
-        "train_holds": train_holds, "together": together,
+        "train_holds": train_holds, "together": together, "check": check,
         "priors": {e.name: e.priors for members in groups.values() for e in members},
         "data_sha256": {e.name: e.data_hash for members in groups.values() for e in members},
     }  # fmt: skip
@@ -88,13 +93,18 @@ def fit(
     if opened.state != "done":
         with progress() as report:
             run(jobs, output, seed, report=report)
+            if check:
+                write_checks(jobs, output, seed, report)
         opened.finish()
     for job in jobs:
-        file = output / job.folder / "summary.json"
-        with stored_results(file):
-            summary = read_json(file)
+        path = output / job.folder / "summary.json"
+        with stored_results(path):
+            summary = read_json(path)
             if not summary["converged"]:
                 print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
+            found = summary.get("model_check", {})
+            if found.get("passed") is False or found.get("gross_errors"):
+                print(f"{job.folder}: {found['sentence']}", file=sys.stderr)
 
 
 def _check_possible(effect, members, file, known) -> None:  # type: ignore[no-untyped-def]

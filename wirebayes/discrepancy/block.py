@@ -42,6 +42,8 @@ class Block:
     sober : (k, d) array
         Where the best fit calls setting error what is larger than half a step of the test, the best one with setting
         errors as they are expected: a large effect is easily taken in by a setting error without bounds. Else no row.
+    exponent : float or scipy frozen distribution
+        See `fitted`.
     """
 
     experiments: tuple[Experiment, ...]
@@ -51,6 +53,7 @@ class Block:
     target: Target
     modes: Optimum
     sober: Array
+    exponent: Any = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,6 +79,11 @@ class Block:
         z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
         return self.target.coordinates.to_natural(z)[:, column]
 
+    def problem_with(self, effect: Effect) -> Problem:
+        """The same samples with one more effect, nothing integrated out."""
+        effects = (*self.effects, effect)
+        return build(self.experiments, effects, law=self.law, history=self.history, length_exponent=self.exponent)
+
     @property
     def log_evidence(self) -> float:
         return float(self.modes.log_evidence.max())
@@ -88,15 +96,17 @@ def fitted(
     history: History,
     rng: np.random.Generator,
     near: Array | None = None,
+    exponent: Any = 1.0,
 ) -> Block:
     """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given.
 
-    What the readings depend on linearly is integrated out (see `wirebayes.bayes.linear`).
+    What the readings depend on linearly is integrated out (see `wirebayes.bayes.linear`). The `exponent` is that of
+    the creep amount's growth with length, or its prior (see `wirebayes.bayes.problem.build`).
     """
-    target = Target(integrated(build(experiments, effects, law=law, history=history)))
+    target = Target(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
-    return Block(tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng))
+    return Block(tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng), exponent)
 
 
 def _sober(target: Target, found: Optimum, rng: np.random.Generator) -> Array:
@@ -126,7 +136,7 @@ class Pinned:
     """
 
     def __init__(self, block: Block, effect: Effect) -> None:
-        problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
+        problem = block.problem_with(effect)
         self.column = column_of(problem, effect)
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
         self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes.fit import seed_of
-from wirebayes.discrepancy import choose, gap, gross, locate, power, screen
+from wirebayes.discrepancy import choose, gap, locate, power, screen
 from wirebayes.discrepancy.block import Block, fitted
 from wirebayes.discrepancy.choose import Choice
-from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand, scan
-from wirebayes.discrepancy.outward import outward
-from wirebayes.discrepancy.screen import Candidate, GlobalTest, Replicates
-from wirebayes.discrepancy.settings import Settings
+from wirebayes.discrepancy.expansion import Expansion, Probe, Scan, expand
+from wirebayes.discrepancy.gate import examine
+from wirebayes.discrepancy.screen import Candidate, GlobalTest
+from wirebayes.discrepancy.settings import ALPHA, Settings
 from wirebayes.discrepancy.sharing import informed
 from wirebayes.discrepancy.verdict import KEEP_ELPD, Accepted, decide
 from wirebayes.effects import CATALOGUE
@@ -30,8 +30,6 @@ from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import Each
 
 Array = NDArray[Any]
-ALPHA = 0.04
-PLAIN_TO_SEE = 0.002  # p of the linear scan at which no look from further out could change the verdict
 
 
 @dataclass(frozen=True)
@@ -100,49 +98,27 @@ def investigate(
     for e in experiments:
         groups.setdefault(e.material, []).append(e)
     laws = repeat(settings.law), repeat(settings.history)
-    plain = list(each(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
-    trials, candidates = screen.candidate_probes(plain, settings.kinds)
-    if not candidates:
-        raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
-    struck: list[dict[str, Any]] = []
-    for i, block in enumerate(plain):
-        plain[i], gone = _strike_gross_errors(block, trials, candidates, i, settings, rng)
-        struck += gone
-    data, simulated, patterns, expansions = [], list[Replicates](), [], []
-    for block in plain:
-        listed, columns = locate.patterns(block.target.problem)
-        x = expand(block.target, block.modes.z[:1], trials, columns=columns)
-        expansions.append(x)
-        data.append(scan(x))
-        patterns.append(listed)
-    of_each = repeat(trials), repeat(settings.simulations), rng.spawn(len(plain))
-    for replicates in each(_simulated, plain, *of_each):
-        simulated.append(replicates)
-        report("simulations", len(simulated), len(plain))
-    nulls = [s.scan for s in simulated]
-    test = screen.global_test(candidates, data, nulls)
-    further: dict[Candidate, float] = {}
-    if test.p > max(PLAIN_TO_SEE, 1.0 / (1 + settings.simulations)):
-        report("larger effects", 0, 1)
-        test, further = outward(plain, trials, candidates, data, simulated, test, each)
-        report("larger effects", 1, 1)
+    start = list(each(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
+    gate = examine(start, settings.kinds, settings.simulations, rng, report=report, each=each)
+    plain, trials, candidates, data, nulls = gate.blocks, gate.trials, gate.candidates, gate.data, gate.nulls
+    test = gate.test
     where = [
         locate.findings(p, len(trials), d, n, ", ".join(b.names))
-        for p, d, n, b in zip(patterns, data, nulls, plain, strict=True)
+        for p, d, n, b in zip(gate.patterns, data, nulls, plain, strict=True)
     ]
     if test.p > ALPHA:
         verdict, choice, accepted = "nothing-missing", None, list[Accepted]()
         final = plain
     else:
         report("naming", 0, 1)
-        choice = choose.choose(plain, trials, candidates, data, further, each)
+        choice = choose.choose(plain, trials, candidates, data, gate.further, each)
         verdict, accepted, final, choice = decide(plain, choice, settings, rng, each)
         for a in accepted:
             if len(a.effects) > 1 and settings.kinds[a.name].scope in screen.FILE_WIDE:
                 final = informed(final, a.effects, rng)
         report("naming", 1, 1)
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
-    alike = power.similarity([_only(x, len(trials)) for x in expansions], trials, ratios)
+    alike = power.similarity([_only(x, len(trials)) for x in gate.expansions], trials, ratios)
     out: dict[str, Any] = {}
     for i, block in enumerate(plain):
         report("held-out holds", i, len(plain))
@@ -154,7 +130,7 @@ def investigate(
             out[e.name] = common | {
                 "held_out": check,
                 "residual_rms_N": _left_over(block, e.name),
-                "gross_errors": [g for g in struck if g["experiment"] == e.name],
+                "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
             }
     report("held-out holds", len(plain), len(plain))
     return Findings({"version": 1, "experiments": out}, tuple(final))
@@ -186,29 +162,6 @@ def final_models(findings: Findings) -> list[Joint]:
             effects = (_discrepancy(e, float(report["residual_rms_N"])),) if flexible else ()
             out.append(Joint((e,), effects, block.parameters(e.name)))
     return out
-
-
-def _simulated(block: Block, trials: list[Probe], n: int, rng: np.random.Generator) -> Replicates:
-    return screen.replicated(block, trials, n, rng, locate.patterns(block.target.problem)[1])
-
-
-def _strike_gross_errors(
-    block: Block, trials: list[Probe], candidates: list[Candidate], i: int, settings: Settings, rng: np.random.Generator
-) -> tuple[Block, list[dict[str, Any]]]:
-    struck: list[dict[str, Any]] = []
-    most = max(1, int(gross.MOST * gross.readings_of(block.experiments)))
-    while len(struck) < most:
-        own = [c for c in candidates if i in c.blocks]
-        here = scan(expand(block.target, block.modes.z[:1], trials))
-        rival = max((float(here.effects[0, c.probe]) for c in own), default=0.0)
-        found = gross.suspect(block, max(rival, float(here.flexible[0])))
-        if found is None:
-            break
-        name, hold, reading, value = found
-        members = [gross.without(e, hold, reading) if e.name == name else e for e in block.experiments]
-        block = fitted(members, (), settings.law, settings.history, rng)
-        struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
-    return block, struck
 
 
 def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:

@@ -18,7 +18,6 @@ from scipy.special import logsumexp
 
 from wirebayes.bayes import noise
 from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.problem import build
 from wirebayes.discrepancy.block import Block, column_of
 from wirebayes.discrepancy.expansion import (
     ABSORBED,
@@ -218,7 +217,7 @@ def _with_effect(block: Block, ladder: Ladder, places: Sequence[Array]) -> tuple
     `places` (n, d) are points of the density without the effect.
     """
     effect = ladder.effect
-    problem = build(block.experiments, (*block.effects, effect), law=block.law, history=block.history)
+    problem = block.problem_with(effect)
     column = column_of(problem, effect)
     # A prior that is not felt, in whose standard deviations the column counts.
     wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))

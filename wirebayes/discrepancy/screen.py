@@ -143,6 +143,12 @@ def replicated(
     return Replicates(joined(parts), found.z, y)
 
 
+def joined_replicates(parts: Sequence[Replicates]) -> Replicates:
+    """Several lots of replicates of one block as one."""
+    readings = [np.concatenate(y, axis=-1) for y in zip(*(p.readings for p in parts), strict=True)]
+    return Replicates(joined([p.scan for p in parts]), np.concatenate([p.z for p in parts]), readings)
+
+
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
     """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks.
 

@@ -54,7 +54,8 @@ def _told(summary: dict[str, Any]) -> Section:
     lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
     words = Text("Fitted with effects from a file of the user's own, so this is told from summary.json alone.")
     table = Table(["parameter", "median", "90 % interval"], lines)
-    return Section(summary["experiment"], [words, table, _derived(summary["derived"]), Text(_sampled(summary))])
+    blocks = [*_cautions(summary), words, table, _derived(summary), Text(_sampled(summary))]
+    return Section(summary["experiment"], blocks)
 
 
 def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) -> Section:
@@ -62,9 +63,9 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     sample, draws = stored.sample, stored.draws
     sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
     shrunk = {name: shrinkage(draws[name], prior[name]) for name in sampled}
-    blocks: list[Block] = [Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects)])]
-    if not summary["converged"]:
-        blocks.insert(0, Text("Not converged: do not believe these intervals.", strong=True))
+    trusted = summary["converged"] and _check(summary)["passed"] is not False
+    blocks: list[Block] = _cautions(summary)
+    blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects, trusted)]))
     alt = f"Measured minus predicted tension of {sample.name}, hold after hold, inside the 90 % band."
     measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
     pictures = [Picture(drawn(measured), f"Tension of {sample.name} against displacement.")]
@@ -76,12 +77,29 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     blocks.append(Pictures(told, small=True))
     taught = [t["sentence"] for t in summary["identifiability"].values()]
     blocks.append(Columns([Points("What the data taught", taught)]))
-    blocks.append(_derived(summary["derived"]))
+    blocks.append(_derived(summary))
     ahead = summary["extrapolation"]
     alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior counted half, prior alone."
-    blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, ahead["sentence"])]))
+    caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
+    caption = f"{caption} {ahead['warning']}".strip()
+    blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, caption)]))
     blocks.append(Text(_sampled(summary)))
     return Section(sample.name, blocks)
+
+
+def _check(summary: dict[str, Any]) -> dict[str, Any]:
+    """The result of the model check, or why there is none."""
+    absent = {"passed": None, "sentence": "The model was not checked against the readings: the check was left out."}
+    return dict(summary.get("model_check", absent))
+
+
+def _cautions(summary: dict[str, Any]) -> list[Block]:
+    """What a reader must know before anything else."""
+    check = _check(summary)
+    out: list[Block] = [Text(check["sentence"], strong=check["passed"] is not True or bool(check.get("gross_errors")))]
+    if not summary["converged"]:
+        out.insert(0, Text("Not converged: do not believe these intervals.", strong=True))
+    return out
 
 
 def _sampled(summary: dict[str, Any]) -> str:
@@ -114,15 +132,23 @@ def _measured(stored: Stored) -> Points:
     return Points("What was measured", points)
 
 
-def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...]) -> list[Points]:
+def _known(
+    draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...], trusted: bool
+) -> list[Points]:
+    """What the readings determine and what they do not; only the model's own words where it is not to be trusted."""
     known: list[str] = []
     loose: list[str] = []
     for name, share in shrunk.items():
         unit = unit_text(unit_of(name, effects))
         told = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
         (known if share >= LEAST_CONTRACTION else loose).append(told)
-    nothing = ["Nothing to speak of."]
-    return [Points("What is known well (90 % intervals)", known or nothing), Points("What is not", loose or nothing)]
+    if not trusted:
+        return [Points("90 % intervals, if the model were right", known + loose)]
+    nothing = ["No parameter."]
+    return [
+        Points("What the readings determine (90 % intervals)", known or nothing),
+        Points("What the prior still decides", loose or nothing),
+    ]
 
 
 def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...]) -> Table:
@@ -138,7 +164,8 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tupl
     return Table(["parameter", "unit", "median", "90 % interval", "shrunk by"], lines, caption)
 
 
-def _derived(derived: dict[str, Any]) -> Table:
+def _derived(summary: dict[str, Any]) -> Table:
+    derived = summary["derived"]
     names = {key: f"creep after {text}, mm" for key, text in _SPOKEN.items()}
     names |= {"final_creep_mm": "final creep, mm", "median_creep_time_s": "half of it after, s"}
     names |= {"stiffness_N": "stiffness there, N per unit strain"}
@@ -149,8 +176,9 @@ def _derived(derived: dict[str, Any]) -> Table:
         lines.append([name, number(band["q50"]), span(band["q05"], band["q95"])] if band else [name, endless, "–"])
     caption = (
         f"A fresh sample under a constant {derived['tension_N']:g} N, with all fitted effects of the wire and without "
-        "those of the bench; extrapolated beyond the longest hold."
+        "those of the bench."
     )
+    caption = f"{caption} {summary['extrapolation']['warning']}".strip()
     return Table(["quantity", "median", "90 % interval"], lines, caption)
 
 
