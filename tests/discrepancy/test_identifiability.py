@@ -10,6 +10,7 @@ from scipy import stats
 from wirebayes.bayes.identifiability import SENSITIVE, extrapolation, identifiability, sensitivity, told
 from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import build
+from wirebayes.effects import named
 from wirebayes.paper import experiments
 
 
@@ -76,3 +77,12 @@ def test_extrapolation_says_whose_work_the_band_is() -> None:
     taught = rows * np.exp(0.02 * np.random.default_rng(4).normal(size=rows.shape)) / rows * rows[:1]
     known = extrapolation(SimpleNamespace(problem=problem, flat=taught), 2.0).told()  # type: ignore[arg-type]
     assert "the data hold it together" in known["sentence"] and known["prior_share"][-1] < 0.05
+
+
+def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
+    problem = build([experiments()[0]], [named("creep_threshold")])
+    rows = problem.prior.rvs(1000, np.random.default_rng(3))
+    rows[:200, problem.names.index("creep_threshold.tau_c")] = 2.5
+    band = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0)  # type: ignore[arg-type]
+    assert (band.posterior_mm[0] == 0.0).all()
+    assert "do not creep at this tension" in band.told()["sentence"]

@@ -3,7 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.wire.test_fresh import Shrinking, Waking
 from wirebayes.effects import named
+from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot import draws, drift, forward, inverse, rotation, schema
 from wirebayes.robot.creep import HoldCreep, fresh
 from wirebayes.robot.wires import Wires, tension
@@ -53,11 +55,18 @@ def _bench_with_the_robots_wire(line, displacement_mm, duration_s, follow):
         ("tension_dependent_rate", {"tension_dependent_rate.m": 0.4}),
         ("creep_threshold", None),
         ("memory", {"memory.omega": 0.5}),
+        ("ageing", {"ageing.a": 0.6}),
+        ("steady_creep@carried", {"steady_creep.a": 1e-4}),
+        (Logarithmic(), {"logarithmic.t0": 7.0}),
+        (PowerLaw(), {"power_law.n": 0.3}),
+        (TwoModes(), {"two_modes.slow_share": 0.3, "two_modes.slower": 12.0}),
+        (Waking(), {"waking.p": 0.3}),
+        (Shrinking(), {"shrinking.w": 0.2}),
     ],
 )
 def test_a_wire_in_the_robot_creeps_as_on_the_bench(law, history, effect):
     name, amplitudes = effect or (None, {})
-    effects = () if name is None else (named(name),)
+    effects = () if name is None else (named(name) if isinstance(name, str) else name,)
     if amplitudes is None:
         amplitudes = dict.fromkeys(effects[0].columns(), 0.5)
     line = _line(law=law, history=history, effects=effects, **amplitudes)

@@ -39,7 +39,7 @@ class Shrinking(Effect):
     sentence = "The wire shrinks by itself once it hangs."
 
     def apply(self, value, own, hold):
-        return value - own["w"] * -np.expm1(-hold.time_s / 500.0)
+        return value - own["w"] * -np.expm1(-(hold.start_s + hold.time_s) / 500.0)
 
 
 def rival(kind, **amplitudes):

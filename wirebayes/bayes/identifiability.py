@@ -183,9 +183,11 @@ class Extrapolation:
     def prior_share(self) -> Array:
         """(t,) how much the 90 % band widens (in logarithms) when the prior is made weaker: 0 is not at all."""
         def width(band: Array) -> Array:
-            return np.asarray(np.log(band[2] / band[0]))
+            with np.errstate(divide="ignore", invalid="ignore"):  # draws without creep have no logarithm
+                return np.asarray(np.log(band[2] / band[0]))
 
-        return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
 
 
     def told(self) -> dict[str, Any]:
@@ -195,7 +197,9 @@ class Extrapolation:
             for name in ("posterior_mm", "weaker_prior_mm", "prior_mm")
         }
         share, hours = float(self.prior_share[-1]), self.time_s[-1] / 3600.0
-        if self.pareto_k > TRUSTED_K:
+        if not np.isfinite(share):
+            verdict = "more than a twentieth of the draws do not creep at this tension"
+        elif self.pareto_k > TRUSTED_K:
             verdict = "how much of it is the prior's cannot be told from these draws"
         elif share > 0.1:
             verdict = f"the prior holds it together: counted half, the band is {100 * share:.0f} % wider"
