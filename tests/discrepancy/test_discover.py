@@ -67,7 +67,7 @@ def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
     assert size["q05"] < 0.0015 < size["q95"] and size["unit"] == "-"
     held = found["held_out"]
     assert held["final"]["rmse_N"] < 0.5 * held["plain"]["rmse_N"] and held["gap_closed"] > 0.8 and held["shrinks"]
-    # A smooth curve follows, but does not foretell as well.
+    # A smooth curve follows, but does not predict as well.
     assert held["plain"]["rmse_N"] > held["flexible"]["rmse_N"] > held["final"]["rmse_N"]
     assert held["leave_one_hold_out"]["elpd_difference"] > held["leave_one_hold_out"]["flexible_elpd_difference"]
     # Without it in the catalogue, no certainty about another name that does not look like it.

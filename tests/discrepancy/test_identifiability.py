@@ -35,8 +35,8 @@ def test_contraction_is_the_share_of_variance_taken_away() -> None:
         posterior = 1.0 / (1.0 + noise**-2)
         assert taught[name].contraction == pytest.approx(1.0 - posterior, abs=0.05)
         assert taught[name].posterior_range == pytest.approx(2 * 1.645 * np.sqrt(posterior), rel=0.06)
-    assert "the data decide" in taught["sharp"].sentence
-    assert "share the answer" in taught["even"].sentence
+    assert "the data determine it" in taught["sharp"].sentence
+    assert "data and prior both determine it" in taught["even"].sentence
     assert "next to nothing" in taught["vague"].sentence
     assert taught["sharp"].prior_sensitivity < 0.02 < SENSITIVE < taught["vague"].prior_sensitivity
     assert taught["vague"].likelihood_sensitivity < 0.02 < SENSITIVE < taught["sharp"].likelihood_sensitivity
@@ -46,7 +46,7 @@ def test_a_sum_alone_is_a_ridge() -> None:
     taught = identifiability(normal_model({"a": 1.0, "b": 1.0}, total=0.05))
     # the sum is known, the difference has the prior's variance: correlation (0.0025 - 2) / (0.0025 + 2) nearly
     assert taught[0].ridges["b"] < -0.98
-    assert "moves together with b" in taught[0].sentence
+    assert "correlated with b" in taught[0].sentence
     assert set(told(taught)) == {"a", "b"}
 
 
@@ -73,10 +73,10 @@ def test_extrapolation_says_whose_work_the_band_is() -> None:
     rows = problem.prior.rvs(4000, np.random.default_rng(3))
     rows[:, problem.names.index("k1")] = 700.0
     whole = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0).told()  # type: ignore[arg-type]
-    assert "the prior holds it together" in whole["sentence"] and "24 h at 2 N" in whole["sentence"]
+    assert ": it depends on the prior" in whole["sentence"] and "24 h at 2 N" in whole["sentence"]
     taught = rows * np.exp(0.02 * np.random.default_rng(4).normal(size=rows.shape)) / rows * rows[:1]
     known = extrapolation(SimpleNamespace(problem=problem, flat=taught), 2.0).told()  # type: ignore[arg-type]
-    assert "the data hold it together" in known["sentence"] and known["prior_share"][-1] < 0.05
+    assert "hardly depends on the prior" in known["sentence"] and known["prior_share"][-1] < 0.05
 
 
 def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:

@@ -164,7 +164,7 @@ def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     assert "8 holds and 1 not recorded, 40 readings." in page.words
     assert "Tensions from 1.21 to 15.92 N." in page.words
     assert len(page.images) == 2 * 3 + 8 + 6
-    assert "What the data taught" in page.words and "Creep after 24 h at" in page.words
+    assert "What the data determine" in page.words and "Creep after 24 h at" in page.words
     assert page.words.count("not checked against the readings") == 2
     sections = re.split("What the readings determine .90", page.words)[1:]
     known = [re.split("What the prior still decides", section)[0] for section in sections]
@@ -179,7 +179,7 @@ def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
     (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
     for converged in (True, False):
         (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"converged": converged}))
-        assert ("do not believe these intervals" in read(write(copy)).words) is not converged
+        assert ("do not trust these intervals" in read(write(copy)).words) is not converged
     for check in ({"passed": True, "sentence": "good"}, {"passed": False, "sentence": "bad"}):
         (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"model_check": check}))
         words = read(write(copy)).words
@@ -194,7 +194,7 @@ def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp
     (copy / "configuration.json").write_text(json.dumps({"command": "fit", "own_effects": "raise SystemExit(7)"}))
     (copy / "chain").mkdir()
     (copy / "chain" / "summary.json").write_bytes((fitted / "chain" / "summary.json").read_bytes())
-    assert "from summary.json alone" in read(write(copy)).words
+    assert "shows summary.json alone" in read(write(copy)).words
 
 
 def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_path):
@@ -238,8 +238,8 @@ DISCOVERY = {
     [
         ({}, "What is missing: strain stiffening."),
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "Nothing is missing"),
-        ({"verdict": "unknown", "effects": []}, "that no effect of the catalogue explains"),
-        ({"verdict": "ambiguous", "set": ["toe", "memory"]}, "cannot tell toe and memory apart"),
+        ({"verdict": "unknown", "effects": []}, "that no effect in the catalogue explains"),
+        ({"verdict": "ambiguous", "set": ["toe", "memory"]}, "cannot distinguish between toe and memory"),
     ],
 )
 def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, said, tmp_path):

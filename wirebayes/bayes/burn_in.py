@@ -1,6 +1,6 @@
 """Burn-in: from a search for modes to a proposal worth freezing, and walkers in their places.
 
-The search's cooled population gives the first proposal. Then, round by round, the proposal is fitted to weighted draws
+The annealed population of the search gives the first proposal. Then, round by round, it is fitted to weighted draws
 of itself, which also tell how good it is: the acceptance it would have, and how far the log of posterior over proposal,
 at its 99.9 % quantile over the posterior, lies above its median. Until it is frozen it draws more from its wide parts
 than it will then, for what lies far out is learned from few draws. While hardly a draw would be accepted, walkers of

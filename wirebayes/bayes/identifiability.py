@@ -58,15 +58,15 @@ class Taught:
     def sentence(self) -> str:
         """The same in words."""
         sign = "×" if self.is_factor else ""
-        ranges = f"its 90 % range is {sign}{self.posterior_range:.3g}, before the test {sign}{self.prior_range:.3g}"
+        ranges = f"its 90 % range is {sign}{self.posterior_range:.3g}, the prior's {sign}{self.prior_range:.3g}"
         if self.contraction < 0.3:
-            verdict = "the data taught next to nothing, what is said of it is the prior's"
+            verdict = "the data say next to nothing about it, the interval is the prior's"
         elif self.prior_sensitivity > SENSITIVE or self.contraction < 0.9:
-            verdict = f"data and prior share the answer (sensitivity to the prior {self.prior_sensitivity:.2f})"
+            verdict = f"data and prior both determine it (sensitivity to the prior {self.prior_sensitivity:.2f})"
         else:
-            verdict = "the data decide"
+            verdict = "the data determine it"
         with_whom = " and ".join(f"{other} (r = {r:+.2f})" for other, r in self.ridges.items())
-        along = f"; it moves together with {with_whom}, and their combination is known better" if with_whom else ""
+        along = f"; it is correlated with {with_whom}, and their combination is known better" if with_whom else ""
         return f"{self.name}: {verdict}; {ranges}{along}."
 
 
@@ -182,13 +182,13 @@ class Extrapolation:
     @property
     def prior_share(self) -> Array:
         """(t,) how much the 90 % band widens (in logarithms) when the prior is made weaker: 0 is not at all."""
+
         def width(band: Array) -> Array:
             with np.errstate(divide="ignore", invalid="ignore"):  # draws without creep have no logarithm
                 return np.asarray(np.log(band[2] / band[0]))
 
         with np.errstate(invalid="ignore"):
             return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
-
 
     def told(self) -> dict[str, Any]:
         """The same as plain values, for JSON, with a sentence for the longest time."""
@@ -200,11 +200,13 @@ class Extrapolation:
         if not np.isfinite(share):
             verdict = "more than a twentieth of the draws do not creep at this tension"
         elif self.pareto_k > TRUSTED_K:
-            verdict = "how much of it is the prior's cannot be told from these draws"
+            verdict = "these draws cannot show how much it depends on the prior"
         elif share > 0.1:
-            verdict = f"the prior holds it together: counted half, the band is {100 * share:.0f} % wider"
+            verdict = f"it depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
         else:
-            verdict = f"the data hold it together: with the prior counted half the band is {100 * share:.0f} % wider"
+            verdict = (
+                f"it hardly depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
+            )
         sentence = f"Creep after {hours:g} h at {self.tension_N:g} N: {verdict}."
         return {"tension_N": self.tension_N, "time_s": self.time_s, **bands, "prior_share": self.prior_share,
                 "pareto_k": self.pareto_k, "sentence": sentence, "warning": self.warning}  # fmt: skip

@@ -194,7 +194,7 @@ def search(
 ) -> Search:
     """Look for the modes of a posterior: good ones among many prior draws, each climbed.
 
-    A population of prior draws is cooled to the posterior. Half of the starts, the highest place among them, are spread
+    Prior draws are annealed to the posterior. Half of the starts, the highest place among them, are spread
     over all places it passed: where it ends, a mode of less weight may have died out, but on the way it lived. The
     others are chosen among passed places that belong to the hill of no mode found from these; such a climb is given up
     where it comes so near to a known mode that it would count as that one.

@@ -29,7 +29,7 @@ COMMANDS = {
     "reproduce": Command(
         "wirebayes.cli.reproduce",
         "reproduce",
-        "Everything the paper shows, on its own tables, with posteriors.",
+        "Reproduce the paper from its own tables, with posteriors.",
         "wirebayes reproduce --output out/reproduce",
     ),
     "fit": Command(
@@ -41,7 +41,7 @@ COMMANDS = {
     "compare": Command(
         "wirebayes.cli.compare",
         "compare",
-        "Laws, histories, likelihoods and effects side by side, on readings they have not seen.",
+        "Compare laws, histories, likelihoods and effects on readings that the fits have not seen.",
         "wirebayes compare data/paper/experiments.toml --experiment nylon-1.5m --output out/compare",
     ),
     "discover": Command(
@@ -71,19 +71,19 @@ COMMANDS = {
     "calibrate": Command(
         "wirebayes.cli.robot",
         "calibrate",
-        "Zero-tension lengths of a robot's wires from readings along its poses.",
+        "Estimate the zero-tension lengths of a robot's wires from readings at several poses.",
         "wirebayes calibrate linear-7 session.csv --wires out/fit/roc-line-1m --output out/calibrate",
     ),
     "export": Command(
         "wirebayes.cli.robot",
         "export",
-        "A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.",
+        "Export a robot with its wires: firmware settings, creep table, MuJoCo model.",
         "wirebayes export hangprinter-4 --wires out/fit/roc-line-1m --output out/export",
     ),
     "report": Command(
         "wirebayes.cli.report",
         "report",
-        "One self-contained page of what a folder of results holds.",
+        "Write one self-contained page from a folder of results.",
         "wirebayes report out/reproduce",
     ),
 }

@@ -18,7 +18,7 @@ from wirebayes.cli.options import (
 
 Only = Annotated[
     list[str] | None,
-    typer.Option("--only", metavar="NAME", help="Only this model beside the plain one; may be repeated."),
+    typer.Option("--only", metavar="NAME", help="Compare only this model with the plain one; may be repeated."),
 ]
 
 
@@ -34,7 +34,7 @@ def compare(
     only: Only = None,
     own_effects: OwnEffects = None,
 ) -> None:
-    """Compare models on readings they have not seen: DIR/comparison.json and pictures.
+    """Compare models on readings that their fits have not seen: DIR/comparison.json and pictures.
 
     Every model is judged twice: each hold left out in turn, and the last third of the holds (with --train-holds K, all
     after the K-th, and none of them is used before) predicted from the rest.

@@ -15,22 +15,28 @@ def _seed(value: int) -> int:
     return value
 
 
-ExperimentFile = Annotated[Path, typer.Argument(metavar="FILE.toml", help="Experiments, with their CSV files beside.")]
+ExperimentFile = Annotated[
+    Path, typer.Argument(metavar="FILE.toml", help="Experiments; their CSV files lie in the same folder.")
+]
 Output = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
 Seed = Annotated[int, typer.Option("--seed", callback=_seed, help="Same seed, same machine: same bytes.")]
 ExperimentName = Annotated[str | None, typer.Option("--experiment", metavar="NAME", help="This experiment only.")]
 TrainHolds = Annotated[
-    int | None, typer.Option("--train-holds", metavar="K", help="Learn from the first K recorded holds only.")
+    int | None, typer.Option("--train-holds", metavar="K", help="Fit the first K recorded holds only.")
 ]
 ElasticLawOption = Annotated[
-    Literal["hooke", "modified"], typer.Option("--elastic-law", help="Strain over L0, eq (1), or over L, eq (3).")
+    Literal["hooke", "modified"],
+    typer.Option(
+        "--elastic-law", help="Strain relative to zero-tension length, eq (1), or stretched length, eq (3)."
+    ),
 ]
 HistoryOption = Annotated[
     Literal["saturating", "additive"],
-    typer.Option("--history", help="Creep towards one total amount, or a new amount in every hold."),
+    typer.Option("--history", help="Creep saturates towards one total amount, or adds a new amount in every hold."),
 ]
 LikelihoodOption = Annotated[
-    Literal["chain", "hold"], typer.Option("--likelihood", help="The holds as one history, or every hold by itself.")
+    Literal["chain", "hold"],
+    typer.Option("--likelihood", help="Treat the holds as one history, or each hold separately."),
 ]
 OwnEffects = Annotated[
     Path | None, typer.Option("--own-effects", metavar="FILE.py", help="A Python file with effects of your own.")

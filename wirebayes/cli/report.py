@@ -7,9 +7,9 @@ import typer
 
 
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that another command wrote.")],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by another command.")],
 ) -> None:
-    """One self-contained page of what a folder of results holds: DIR/report.html."""
+    """Write one self-contained page from a folder of results: DIR/report.html."""
     from wirebayes.report.page import write
 
     print(write(directory))

@@ -6,7 +6,7 @@ from wirebayes.cli.options import Output, Seed
 
 
 def reproduce(output: Output, seed: Seed = 0) -> None:
-    """Everything the paper shows, on its own tables, with posteriors: DIR/report.html and what it is made of."""
+    """Reproduce the paper from its own tables, with posteriors: DIR/report.html and all that it shows."""
     from wirebayes.cli.progress import progress
     from wirebayes.reproduce.run import reproduce as run
 

@@ -14,7 +14,7 @@ Wires = Annotated[Path, typer.Option("--wires", metavar="FOLDER", help="A folder
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
 
 
-Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative, from wire to wire of one line.")]
+Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative difference between wires of one line.")]
 POSTERIOR = "posterior.nc"
 
 
@@ -25,21 +25,19 @@ def pose(
     position: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Pose in metres; default: the file's.")] = None,
     rotation: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Rotation vector in radians.")] = None,
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")] = "0,10,30,60,120,300,600,1800,3600",
-    tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Pose error that is allowed.")] = 0.3,
-    tolerance_tilt: Annotated[
-        float, typer.Option("--tolerance-tilt", metavar="DEG", help="Rotation that is allowed.")
-    ] = 0.055,
+    tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Allowed pose error.")] = 0.3,
+    tolerance_tilt: Annotated[float, typer.Option("--tolerance-tilt", metavar="DEG", help="Allowed rotation.")] = 0.055,
     spread: Spread = 0.05,
     told: Annotated[
         Path | None,
-        typer.Option("--told", metavar="FOLDER", help="Another fit of the wire, told to one more controller."),
+        typer.Option("--told", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
     ] = None,
     draws: Draws = 1000,
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
-    """Kinematics with creeping wires, drift and pose error with bands.
+    """Kinematics on creeping wires; drift and pose error with uncertainty bands.
 
     Give the final fit of discover as --wires and its plain one as --told to see what the effects are worth.
     """
@@ -78,10 +76,14 @@ def calibrate(
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Poses, joints and tensions, in order.")],
     wires: Wires,
     output: Output,
-    tension_sd: Annotated[float, typer.Option("--tension-sd", metavar="N", help="Error of a tension, newtons.")] = 0.02,
-    tilt_sd: Annotated[float, typer.Option("--tilt-sd", metavar="RAD", help="Error of the normal.")] = 1e-3,
+    tension_sd: Annotated[
+        float, typer.Option("--tension-sd", metavar="N", help="Standard error of a tension, in newtons.")
+    ] = 0.02,
+    tilt_sd: Annotated[
+        float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of the platform's normal.")
+    ] = 1e-3,
     reference_sd: Annotated[
-        float, typer.Option("--reference-sd", metavar="MM", help="How wrong the reference lengths may be.")
+        float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the reference lengths.")
     ] = 5.0,
     spread: Spread = 0.05,
     draws: Draws = 1000,
@@ -89,7 +91,7 @@ def calibrate(
     own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
-    """Current zero-tension length of every wire from joint values and tensions, no external sensor needed."""
+    """Estimate every wire's current zero-tension length from joint values and tensions, without external sensors."""
     from wirebayes.errors import InputError
     from wirebayes.output import open_run, read_json, stored_results, write_json
     from wirebayes.robot import schema, session_file

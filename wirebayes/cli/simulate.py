@@ -10,14 +10,21 @@ from wirebayes.cli.options import ElasticLawOption, HistoryOption, Output, OwnEf
 def simulate(
     output: Output,
     seed: Seed = 0,
-    tests: Annotated[int, typer.Option("--tests", min=1, help="Lines tested, each with its own truth.")] = 1,
+    tests: Annotated[
+        int, typer.Option("--tests", min=1, help="Number of lines tested, each with its own true parameters.")
+    ] = 1,
     lengths: Annotated[
-        str, typer.Option("--lengths", metavar="MM,…", help="Zero-tension lengths, a sample of each line for each.")
+        str,
+        typer.Option(
+            "--lengths", metavar="MM,…", help="Zero-tension lengths; one sample of each line for each length."
+        ),
     ] = "1000",
     displacements: Annotated[
-        str, typer.Option("--displacements", metavar="MM,…", help="One a hold.")
+        str, typer.Option("--displacements", metavar="MM,…", help="One displacement per hold.")
     ] = "1,2,3,4,5,6,7,8,9,10,11,12",
-    unload: Annotated[int, typer.Option("--unload", min=0, metavar="K", help="Then K holds back the same way.")] = 0,
+    unload: Annotated[
+        int, typer.Option("--unload", min=0, metavar="K", help="Then K holds back down through the same displacements.")
+    ] = 0,
     times: Annotated[str, typer.Option("--times", metavar="S,…", help="Reading times of a hold.")] = "0,30,60,90,120",
     unrecorded: Annotated[
         list[int] | None, typer.Option("--unrecorded", metavar="HOLD", help="A hold without readings; may be repeated.")
@@ -25,14 +32,22 @@ def simulate(
     temperature: Annotated[
         str, typer.Option("--temperature", metavar="C,…", help="Temperatures at evenly spaced moments of the test.")
     ] = "",
-    resolution: Annotated[float, typer.Option("--resolution", min=0.0, metavar="N", help="0: unrounded.")] = 0.01,
+    resolution: Annotated[
+        float, typer.Option("--resolution", min=0.0, metavar="N", help="Rounding of the tensions; 0: unrounded.")
+    ] = 0.01,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--parameter", metavar="NAME=VALUE", help="As k1=700; drawn from the prior if left out."),
+        typer.Option(
+            "--parameter",
+            metavar="NAME=VALUE",
+            help="For example k1=700; parameters not given are drawn from the prior.",
+        ),
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option("--effect", metavar="NAME.p=VALUE", help="As strain_stiffening.c=12 or grip_slip@7.w=0.2."),
+        typer.Option(
+            "--effect", metavar="NAME.p=VALUE", help="For example strain_stiffening.c=12 or grip_slip@7.w=0.2."
+        ),
     ] = None,
     own_effects: OwnEffects = None,
     elastic_law: ElasticLawOption = "hooke",

@@ -18,7 +18,8 @@ from wirebayes.wire.laws import ElasticLaw, History
 
 HOOKE, TIME = "Is Hooke's law enough?", "Which time law?"
 LAW, HISTORY, LIKELIHOOD = "Which elastic law?", "Which history?", "One history, or every hold by itself?"
-SETTING, ABSENT, EFFECT = "Do setting errors matter?", "Was a row without readings held?", "Which effect helps?"
+SETTING, ABSENT = "Do setting errors matter?", "Was the wire held where readings are missing?"
+EFFECT = "Which effect helps?"
 BASE = "plain"
 _NO_CREEP = {"B": 0.0, "U": 1.0, "k2": 1.0, "N": 1.0}
 
@@ -89,15 +90,15 @@ def candidates(
     if base.history == "saturating":
         out.append(other("additive", HISTORY, "Every hold adds the creep of eq (4) anew.", history="additive"))
     else:
-        out.append(other("saturating", HISTORY, "Eq (4) is the total that the creep tends to.", history="saturating"))
+        out.append(other("saturating", HISTORY, "Creep saturates towards the amount of eq (4).", history="saturating"))
     if base.likelihood == "chain":
-        out.append(other("hold_by_hold", LIKELIHOOD, "Every hold is its own experiment.", likelihood="hold"))
-        out.append(other("independent_errors", SETTING, "Positions are exact; readings err one by one.",
+        out.append(other("hold_by_hold", LIKELIHOOD, "Every hold is a separate experiment.", likelihood="hold"))
+        out.append(other("independent_errors", SETTING, "Positions are exact; each reading has an independent error.",
                          fixed={"setting_sd": 0.0}))  # fmt: skip
     else:
-        out.append(other("chain", LIKELIHOOD, "The holds are one history.", likelihood="chain"))
+        out.append(other("chain", LIKELIHOOD, "The holds form one history.", likelihood="chain"))
     if any(not hold.recorded for hold in experiment.holds):
-        out.append(other("unrecorded_skipped", ABSENT, "No time passed at the rows that are absent.", unrecorded=False))
+        out.append(other("unrecorded_skipped", ABSENT, "No time passed where readings are missing.", unrecorded=False))
     protocol = experiment.protocol()
     for name, kind in known.items():
         for variant in [kind()] if issubclass(kind, EventEffect) else kind.variants([protocol]):

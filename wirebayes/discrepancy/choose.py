@@ -66,7 +66,7 @@ def choose(
     further: Mapping[Candidate, float] = {},
     each: Each = map,
 ) -> Choice:
-    """Evidence of every name, refitted where the scan, or the look from further out, gives it a chance.
+    """Evidence of every name, refitted where the scan, or the test from larger effects, gives it a chance.
 
     Refits are independent of each other, and `each` may be a `map` over processes.
     """

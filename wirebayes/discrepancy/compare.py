@@ -223,18 +223,18 @@ def _meaning(row: dict[str, Any], base: str) -> str:
     if row["failed"] is not None:
         return f"could not be judged ({row['failed']})"
     if row["name"] == base:
-        return "what the others are compared with"
+        return "the reference for the other models"
     told = row["difference"]
-    where = "over all holds left out in turn"
+    where = "leaving out each hold in turn"
     if told is None:
         told, where = row["given_first_difference"], "on held-out holds given their first reading"
     if told is None:
         return "scored on other readings, so not comparable here"
-    size = f"elpd {told['elpd']:+.1f} ± {told['se']:.1f} against {base} {where}"
+    size = f"elpd {told['elpd']:+.1f} ± {told['se']:.1f} against {base}, {where}"
     if not row["converged"]:
         return f"{size}; its sampling did not converge, so this may be wrong"
     if abs(told["elpd"]) < MEANINGFUL_ELPD or abs(told["elpd"]) < MEANINGFUL_SE * told["se"]:
-        return f"{size}: no difference that means anything"
+        return f"{size}: no meaningful difference"
     return f"{size}: predicts {'better' if told['elpd'] > 0 else 'worse'}"
 
 

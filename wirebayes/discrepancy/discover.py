@@ -243,9 +243,7 @@ def _outlook(
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
 
 
-def _held_out(
-    block: Block, final: Block, verdict: str, rng: np.random.Generator, each: Each
-) -> list[dict[str, Any]]:
+def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator, each: Each) -> list[dict[str, Any]]:
     """Plain and final model on the last third of the holds, and by leaving out one hold at a time.
 
     The flexible discrepancy beside them: an effect that predicts worse than a smooth curve does not shrink the gap.

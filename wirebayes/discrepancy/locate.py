@@ -146,15 +146,17 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
 def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
     chance = f"p = {p:.3f}"
     if p > 0.05:
-        return f"{names}: the residuals show no pattern along the {pattern.covariate} ({chance})."
+        return f"{names}: the residuals show no dependence on {pattern.covariate} ({chance})."
     if pattern.hold is not None:
         side = "above" if amplitude > 0 else "below"
         return f"{names}: hold {pattern.hold} lies {abs(amplitude):.3g} N {side} what the others predict ({chance})."
     if pattern.moves is not None:
-        way = "rise" if amplitude > 0 else "fall"
+        way = "grows" if amplitude > 0 else "decreases"
         factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))
+        share = 100 * (factor - 1 if amplitude > 0 else 1 - 1 / factor)
+        size = f"{share:.2g} %" if factor < 2 else f"a factor of {factor:.3g}"
         return (
-            f"{names}: {_PARAMETERS[pattern.moves]} wants to {way} with the {pattern.covariate}, "
-            f"by a factor of {factor:.3g} over two standard deviations of it ({chance})."
+            f"{names}: the residuals suggest that {_PARAMETERS[pattern.moves]} {way} with {pattern.covariate}, "
+            f"by {size} over two standard deviations of {pattern.covariate} ({chance})."
         )
-    return f"{names}: the readings depart from the plain model along the {pattern.covariate} ({chance})."
+    return f"{names}: the residuals of the plain model depend on {pattern.covariate} ({chance})."

@@ -1,4 +1,4 @@
-"""The scan again from further out, where the model has the effect already and the parameters have followed it.
+"""The test again from starting points with larger effects, to which the parameters have already adapted.
 
 The plain fit bends to take in what is missing, and from where it ends a large effect may look like nothing. So each
 effect is led up a ladder of amplitudes: at every rung the parameters follow by Gauss-Newton steps, and its log Bayes

@@ -119,7 +119,7 @@ def not_identifiable(block: Block, kinds: Sequence[type[Effect]], possible: Sequ
     wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
     left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
     out = [
-        f"{t.effect.name}: {100 * (1 - rest / whole):.1f} % of it is taken up by the model's own parameters"
+        f"{t.effect.name}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the model's own parameters"
         for t, whole, rest in zip(trials, wholes, left, strict=True)
         if rest < 0.1 * whole
     ]
@@ -189,7 +189,7 @@ def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Pr
     problem = block.target.problem
     trials = list(pair) if pair else [weakest] if weakest else []
     if not trials:
-        return "No candidate remains; more of the same holds would narrow the parameters."
+        return "No candidate remains; repeating the same holds would narrow the parameters."
     planned = [_another_length(problem)]
     for plans in zip(*(_plans(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
         protocols = [plan.protocol for plan in plans]
@@ -199,18 +199,16 @@ def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Pr
     scored = [(_separation(replace_problem(block.target, other), block, trials), words) for words, other in planned]
     best, words = max(scored)
     ratio = best / here if here > 0 else np.inf
-    told = " from ".join(t.effect.name for t in trials)
+    names = " from ".join(t.effect.name for t in trials)
     if ratio < _WORTH:
-        aim = f"tell {told}: measure one of them" if pair else f"show a smaller {told}: measure it"
-        return f"No test tried (unloading, longer holds, finer steps, another length) would {aim} on its own."
-    gain = (
-        f"{ratio:.1f} times as far apart as now"
-        if np.isfinite(ratio) and ratio < 1e3
-        else "apart, which they are not now"
-    )
+        aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"
+        tried = "unloading, longer holds, finer steps, another length"
+        return f"None of the tests considered ({tried}) would {aim} independently."
     if pair:
-        return f"To tell {told}: {words}. They would lie {gain}."
-    return f"To see a smaller {told}: {words}. It would stand out {ratio:.1f} times as far as now."
+        known = np.isfinite(ratio) and ratio < 1e3
+        gain = f" {ratio:.1f} times as much as now" if known else "; at present they do not"
+        return f"To distinguish {names}: {words}. Their signatures would then differ{gain}."
+    return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
 
 
 def replace_problem(target: Target, problem: Any) -> Target:

@@ -21,7 +21,7 @@ class PermanentCreep(Effect):
     place = "amount"
     scope = "material"
     amplitudes = (Amplitude("psi", "-", 0.0, stats.uniform(0.0, 1.0)),)
-    sentence = "A part of the creep is permanent: later holds creep as if it had not happened."
+    sentence = "A part of the creep is permanent: later holds creep as if it had not occurred."
     shows = "between holds, unloading"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -35,7 +35,7 @@ class Memory(Effect):
     place = "creep"
     scope = "material"
     amplitudes = (Amplitude("omega", "-", 0.0, stats.halfnorm(0.0, 1.0)),)
-    sentence = "Earlier holds go on creeping by their own clocks after the next hold has begun."
+    sentence = "The creep of earlier holds continues on its own time scale after the next hold has begun."
     shows = "grows with hold number, slow inside holds"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -89,8 +89,8 @@ class SteadyCreepCarried(Effect):
     place = "creep"
     scope = "material"
     amplitudes = SteadyCreep.amplitudes
-    sentence = "The wire also flows steadily under tension; unloaded, it takes the flow back."
-    shows = "tail of the hold; given back on unloading"
+    sentence = "The wire also flows steadily under tension; on unloading it recovers that flow."
+    shows = "tail of the hold; recovered on unloading"
 
     @property
     def key(self) -> str:
@@ -136,7 +136,7 @@ class CreepThreshold(Effect):
     place = "drive"
     scope = "material"
     amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 2.0)),)
-    sentence = "Below a threshold of tension the wire does not creep."
+    sentence = "Below a threshold tension the wire does not creep."
     shows = "no relaxation in the first holds"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:

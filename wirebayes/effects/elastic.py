@@ -22,7 +22,7 @@ class StrainStiffening(Effect):
     scope = "material"
     amplitudes = (Amplitude("c", "-", 0.0, stats.norm(0.0, 20.0)),)
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
-    shows = "curved in displacement, alike within a hold"
+    shows = "curved in displacement, constant within a hold"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         return value * (1.0 + own["c"] * value)
@@ -35,7 +35,7 @@ class Toe(Effect):
     place = "strain"
     scope = "material"
     amplitudes = (Amplitude("c", "-", 0.0, stats.halfnorm(0.0, 0.002)),)
-    sentence = "At low tension the line still straightens out and pulls less than its stiffness says."
+    sentence = "At low tension the line is still straightening out and pulls less than its stiffness implies."
     shows = "deficit at low tension only"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -56,7 +56,7 @@ class FixtureCompliance(Effect):
     place = "strain"
     scope = "instrument"
     amplitudes = (Amplitude("c", "mm/N", 0.0, stats.halfnorm(0.0, 0.2)),)
-    sentence = "The test bench itself gives way under the tension."
+    sentence = "The test bench itself deforms under the tension."
     shows = "k1 differs by length; needs two lengths of one line"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -97,7 +97,7 @@ class LengthDependence(Effect):
     scope = "material"
     compares_lengths = True
     amplitudes = (Amplitude("p", "-", 0.0, stats.norm(0.0, 1.0)),)
-    sentence = "A parameter changes with the length of the sample more than the plain model says."
+    sentence = "A parameter changes with the length of the sample more than the plain model assumes."
     shows = "differs between lengths only"
 
     @property

@@ -20,8 +20,8 @@ class ReadingDelay(Effect):
     place = "clock"
     scope = "instrument"
     amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 5.0)),)
-    sentence = "The first reading of each hold was taken later than written down."
-    shows = "first reading low, fastest creepers most"
+    sentence = "The first reading of each hold was taken later than recorded."
+    shows = "first reading low, most where creep is fastest"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         first = np.zeros((len(hold.time_s), 1))
@@ -36,8 +36,8 @@ class SensorDrift(Effect):
     place = "reading"
     scope = "instrument"
     amplitudes = (Amplitude("a", "N/s", 0.0, stats.norm(0.0, 1e-3)),)
-    sentence = "The force sensor drifts with the clock."
-    shows = "clock time, also inside holds"
+    sentence = "The force sensor drifts with time."
+    shows = "grows with elapsed time, also within holds"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         return value + own["a"] * (hold.start_s + hold.time_s)
@@ -50,8 +50,8 @@ class SensorNonlinearity(Effect):
     place = "reading"
     scope = "instrument"
     amplitudes = (Amplitude("a", "1/N", 0.0, stats.norm(0.0, 0.02)),)
-    sentence = "The force sensor's scale bends at higher tension."
-    shows = "like stiffening; told apart over several wires"
+    sentence = "The force sensor is nonlinear at higher tension."
+    shows = "like stiffening; distinguishable with several wires"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         return value * (1.0 + own["a"] * value)
@@ -104,7 +104,7 @@ class GuideFriction(_NeedsReversal):
     place = "reading"
     scope = "instrument"
     amplitudes = (Amplitude("mu", "-", 0.0, stats.norm(0.0, 0.05)),)
-    sentence = "Friction in the guide adds to the reading on the way out and takes away on the way back."
+    sentence = "Friction in the guide raises the reading while loading and lowers it while unloading."
     shows = "unloading branch"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:

@@ -23,7 +23,7 @@ class AtOnce(Effect):
     place = "strain"
     scope = "material"
     amplitudes = ()
-    sentence = "The creep of eq (2) has happened before the first reading."
+    sentence = "All creep of eq (2) happens before the first reading."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         stretched = value.real > 0
@@ -62,7 +62,7 @@ class Logarithmic(Effect):
     place = "fraction"
     scope = "material"
     amplitudes = (Amplitude("t0", "s", np.nan, stats.lognorm(1.5, scale=10.0), is_shape=True),)
-    sentence = "The creep goes on with the logarithm of time."
+    sentence = "Creep grows with the logarithm of time."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         share = np.log1p(hold.time_s / own["t0"]) / np.log1p(DAY_S / own["t0"])
@@ -76,7 +76,7 @@ class PowerLaw(Effect):
     place = "fraction"
     scope = "material"
     amplitudes = (Amplitude("n", "-", np.nan, stats.lognorm(0.7, scale=0.25), is_shape=True),)
-    sentence = "The creep goes on with a power of time."
+    sentence = "Creep grows with a power of time."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         return np.asarray((hold.time_s / DAY_S) ** own["n"] + 0.0 * value)

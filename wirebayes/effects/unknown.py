@@ -1,4 +1,4 @@
-"""What is added when something is missing that has no name: a discrepancy that knows less the farther it is asked.
+"""What is added when something is missing that has no name: a discrepancy less certain the farther it extrapolates.
 
 Two random walks over the order of holds, one for the level and one for the course within the hold, bent at a few
 knots. Beyond the training holds the walks go on, so the bands widen there instead of promising what was not seen.
@@ -37,7 +37,7 @@ class Discrepancy(Effect):
     name = "discrepancy"
     place = "reading"
     scope = "environment"
-    sentence = "Something is missing that has no name here; its size was learned from the readings."
+    sentence = "A missing effect that no name in the catalogue explains; its size is estimated from the readings."
     shows = "smooth over holds and time"
     adds = True
 

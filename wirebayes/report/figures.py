@@ -193,7 +193,7 @@ def creep_ahead(told: Mapping[str, Any], title: str) -> Figure:
     axes.fill_between(told["time_s"], posterior["q05"], posterior["q95"], color=CHAIN, alpha=0.45, lw=0,
                       label="posterior, 90 %")  # fmt: skip
     axes.plot(told["time_s"], posterior["q50"], color=CHAIN, lw=1.2)
-    for end, label in (("q05", "prior counted half"), ("q95", None)):
+    for end, label in (("q05", "prior at half weight"), ("q95", None)):
         axes.plot(told["time_s"], weaker[end], color=HOLD, lw=1, ls="--", label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")

@@ -1,4 +1,4 @@
-"""The page of ``wirebayes calibrate``: lengths with intervals, what Hooke alone would say, what is not seen."""
+"""The page of ``wirebayes calibrate``: lengths with intervals, those by Hooke's law alone, what cannot be observed."""
 
 from pathlib import Path
 from typing import Any
@@ -8,14 +8,14 @@ from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
-    """Tell ``calibrate.json``."""
+    """The content of ``calibrate.json``."""
     found = read_json(folder / "calibrate.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     first: list[Block] = [Columns([_done(found), _known(found), _unknown(creep, hooke)])]
     if not creep["converged"]:
-        first.insert(0, Text("Not converged: use none of these lengths.", strong=True))
+        first.insert(0, Text("Not converged: do not use any of these lengths.", strong=True))
     sections = [
-        Section("In a minute", first),
+        Section("Summary", first),
         Section("Lengths", [_lengths(creep, hooke)]),
         Section("What to do", _next(found)),
     ]
@@ -28,13 +28,15 @@ def _done(found: dict[str, Any]) -> Points:
     return Points("What was done", [
         f"{found['holds']} holds, {found['read']} of them read.",
         f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line were "
-        f"taken to differ by {100 * prior['specimen_spread']:g} %.",
+        f"assumed to differ by {100 * prior['specimen_spread']:g} %.",
     ])  # fmt: skip
 
 
 def _known(found: dict[str, Any]) -> Points:
     if found["pose_now"] is None:
-        return Points("What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]])
+        return Points(
+            "What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]]
+        )
     sd = [1e3 * v for v in found["with_creep_model"]["length_m"]["sd"]]
     place = ", ".join(number(v) for v in found["pose_now"]["position_m"])
     text = f"Every length is known to {span(min(sd), max(sd), 2)} mm (standard error)."
@@ -48,7 +50,7 @@ def _unknown(creep: dict[str, Any], hooke: dict[str, Any]) -> Points:
             said.append(f"With {name} the search did not converge: do not use its lengths.")
         fits = "explains" if result["misfit"] < 1.5 else "cannot explain"
         said.append(
-            f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is right): it "
+            f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
             f"{fits} the readings."
         )
     return Points("How far it can be trusted", said)
@@ -69,7 +71,7 @@ def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
             zip(a["mean"], a["q05"], a["q95"], creep["creep_strain"], b["mean"], b["q05"], b["q95"], strict=True)
         )
     ]
-    header = ["wire", "length now, mm", "90 %", "of it creep, mm per m", "by Hooke alone, mm", "90 %"]
+    header = ["wire", "length now, mm", "90 %", "creep strain, mm per m", "Hooke's law alone, mm", "90 %"]
     return Table(header, lines, "Zero-tension length of every wire when the last hold ended, creep included.")
 
 

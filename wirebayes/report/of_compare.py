@@ -12,7 +12,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section an experiment, from ``comparison.json`` and the pictures beside it."""
     found = read_json(folder / "comparison.json")["experiments"]
     sections = [_section(folder, name, table) for name, table in found.items()]
-    lead = "Each model predicts every hold from the others, and the last holds from the first; the best one wins."
+    lead = "Each model predicts every hold from the others, and the last holds from the first; best first."
     return Page("Models side by side", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -30,7 +30,9 @@ def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
         errors = (number((held.get(way) or {}).get("rmse_N"), 2) for way in ("free", "given_first"))
         scores = (number(difference.get(key), 2) for key in ("elpd", "se"))
         lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _brief(r.get("meaning") or "")])
-    blocks.append(Table(header, lines, "Best first. A weight is the model's share in the best mixture of predictions."))
+    blocks.append(
+        Table(header, lines, "Best first. The weight is the model's share in the mixture that predicts best.")
+    )
     failed = [[r["name"], str(r["failed"])] for r in rows if r.get("failed") is not None]
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))

@@ -32,7 +32,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
             for name, v in found.items()
         ],
     )
-    sections = [Section("In a minute", [overview]), *(_section(folder, name, v) for name, v in found.items())]
+    sections = [Section("Summary", [overview]), *(_section(folder, name, v) for name, v in found.items())]
     lead = "Simulation against measurement: where they disagree, which effect is missing, and whether adding it helps."
     return Page("What the model is missing", lead, sections, f"Seed {configuration.get('seed')}.")
 
@@ -41,19 +41,19 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
     candidates = listed([_words(e) for e in v["set"]])
     words = {
         "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
-        "unknown": "Something is missing that no effect of the catalogue explains.",
-        "ambiguous": f"Something is missing; these readings cannot tell {candidates} apart.",
+        "unknown": "Something is missing that no effect in the catalogue explains.",
+        "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}.",
         "named": f"What is missing: {listed([_words(e) for e in v['effects']])}.",
     }
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
-    where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No place stands out."]
+    where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
     gap = [_gap(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     loose = [f"Not identifiable here: {listed([_words(what) for what, _ in hidden])}."] if hidden else []
     if v.get("next_measurement"):
         loose.append(f"Measure next: {v['next_measurement']}")
-    columns = [Points("Where they disagree", where), Points("What is known", [p for p in gap if p])]
-    blocks.append(Columns([*columns, Points("What is not", loose or ["Nothing to speak of."])]))
+    columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in gap if p])]
+    blocks.append(Columns([*columns, Points("What is not known", loose or ["Nothing to report."])]))
     file = folder / f"{name}.png"
     if file.is_file():
         blocks.append(Pictures([Picture(embedded(file), f"Readings of {name} against the plain and the final model.")]))
@@ -62,14 +62,14 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
     if v.get("probabilities"):
         ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
         lines = [[_words(effect), number(round(p, 4), 2)] for effect, p in ranked]
-        caption = "Of being the first missing effect, given that one is missing."
+        caption = "Probability of being the first missing effect, given that one is missing."
         blocks.append(Table(["candidate", "probability"], lines, caption))
     if v.get("power"):
         lines = [[_words(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
-        caption = "Amplitudes that would have been seen four times in five."
+        caption = "The smallest amplitude of each effect that this test detects with 80 % power."
         blocks.append(Table(["effect", "amplitude", "unit"], lines, caption))
     if hidden:
-        caption = "Not identifiable here: present or absent, these readings would be nearly the same."
+        caption = "Not identifiable here: the readings would be nearly the same with or without it."
         blocks.append(Table(["what", "why"], [[_words(what), why] for what, why in hidden], caption))
     return Section(name, blocks)
 
@@ -95,7 +95,7 @@ def _gap(v: dict[str, Any]) -> str:
     holds = listed([str(h) for h in held["holds"]])
     text = f"On the unused holds {holds} the rms error goes from {plain} to {final} N"
     if v.get("accepted") and held.get("flexible"):
-        text += f"; a smooth curve without a name gets to {number(held['flexible']['rmse_N'], 2)}"
+        text += f"; a smooth curve instead of a named effect reaches {number(held['flexible']['rmse_N'], 2)}"
     return text + "."
 
 

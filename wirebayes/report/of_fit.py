@@ -45,14 +45,14 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         for name in names:
             sections.append(section(load(file.parent, name), prior_draws(file.parent, name), summary))
     titles = listed([s.title for s in sections])
-    lead = f"Posterior of {titles}: what the readings say of each parameter, beside what was believed before."
+    lead = f"Posterior of {titles}: what the readings say about each parameter, compared with the prior."
     return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
 def _told(summary: dict[str, Any]) -> Section:
     """A fit with effects of the user's own, from its summary alone: a page runs nobody's code."""
     lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
-    words = Text("Fitted with effects from a file of the user's own, so this is told from summary.json alone.")
+    words = Text("Fitted with effects from a file of the user's own, so this section shows summary.json alone.")
     table = Table(["parameter", "median", "90 % interval"], lines)
     blocks = [*_cautions(summary), words, table, _derived(summary), Text(_sampled(summary))]
     return Section(summary["experiment"], blocks)
@@ -76,10 +76,10 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
     blocks.append(Pictures(told, small=True))
     taught = [t["sentence"] for t in summary["identifiability"].values()]
-    blocks.append(Columns([Points("What the data taught", taught)]))
+    blocks.append(Columns([Points("What the data determine", taught)]))
     blocks.append(_derived(summary))
     ahead = summary["extrapolation"]
-    alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior counted half, prior alone."
+    alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
     caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
     caption = f"{caption} {ahead['warning']}".strip()
     blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, caption)]))
@@ -98,7 +98,7 @@ def _cautions(summary: dict[str, Any]) -> list[Block]:
     check = _check(summary)
     out: list[Block] = [Text(check["sentence"], strong=check["passed"] is not True or bool(check.get("gross_errors")))]
     if not summary["converged"]:
-        out.insert(0, Text("Not converged: do not believe these intervals.", strong=True))
+        out.insert(0, Text("Not converged: do not trust these intervals.", strong=True))
     return out
 
 
@@ -158,7 +158,7 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tupl
         share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
         lines.append([name, unit_text(unit_of(name, effects)) or "–", number(middle), span(low, high), share])
     caption = (
-        "The interval's width before the test is that of the prior; well known means shrunk by at least "
+        "The interval before the test is the prior's; a parameter is well known if it shrank by at least "
         f"{100 * LEAST_CONTRACTION:.0f} %."
     )
     return Table(["parameter", "unit", "median", "90 % interval", "shrunk by"], lines, caption)

@@ -24,25 +24,25 @@ _CAPTIONS = {
     "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
     "drift": "How far the platform moves while the actuators stand still. Line: median, band: 90 % of the draws.",
     "rotation": "How far it turns. A symmetric pose turns only because specimens of one line differ.",
-    "pose-error": "Distance from the pose under controllers that know more and more of the wires, specimens alike.",
-    "error-budget": "Whose uncertainty makes the drift uncertain.",
-    "workspace": "A level platform at other places, wires new. White with a cross: no tensions within bounds hold it.",
+    "pose-error": "Distance from the pose, controllers with increasingly complete wire models, identical specimens.",
+    "error-budget": "How much each parameter's uncertainty contributes to the variance of the drift.",
+    "workspace": "A level platform at other positions, new wires. White with a cross: no tensions hold it.",
 }
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
-    """Tell ``pose.json`` and show the pictures beside it."""
+    """The content of ``pose.json`` and the pictures beside it."""
     pose = read_json(folder / "pose.json")
     blocks: list[Block] = [Columns([_asked(pose), *_answers(pose)])]
     if not pose.get("feasible", True):
         blocks.insert(0, Text("No tensions within the stated bounds hold the platform at this pose.", strong=True))
     files = {name: folder / f"{name}.png" for name in _CAPTIONS}
     pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p.is_file()]
-    sections = [Section("In a minute", blocks), Section("Pictures", [Pictures(pictures)] if pictures else [])]
+    sections = [Section("Summary", blocks), Section("Pictures", [Pictures(pictures)] if pictures else [])]
     sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
-    sections += [Section("Between calibrations", _between(pose)), Section("Doubts", _doubts(pose))]
+    sections += [Section("Between calibrations", _between(pose)), Section("Sources of uncertainty", _doubts(pose))]
     sections += [Section("How many equilibria", _equilibria(pose))]
-    lead = "A platform on wires that creep: the pose it was sent to, and where it will be."
+    lead = "A platform on wires that creep: the commanded pose, and how the platform moves away from it."
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
 
 
@@ -59,7 +59,7 @@ def _asked(pose: dict[str, Any]) -> Points:
             low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
             rule = pose["tension_distribution"]["choice"].replace("_", " ")
             points.append(f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N.")
-    return Points("What was asked", points)
+    return Points("What was computed", points)
 
 
 def _answers(pose: dict[str, Any]) -> list[Points]:
@@ -70,7 +70,7 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
             low, middle, high = (entry["distance_mm"][q][-1] for q in ("q05", "q50", "q95"))
             spread = f"{100 * entry['specimen_spread']:g} %"
             moved = f"{number(middle)} mm ({span(low, high)})"
-            known.append(f"After {last:g} s the platform has moved {moved}, specimens of one line spread by {spread}.")
+            known.append(f"After {last:g} s the platform has moved {moved}; specimens of one line differ by {spread}.")
     claim = pose.get("claim")
     if claim:
         limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
@@ -81,10 +81,10 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
     if space and claim:
         moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
         chance = number(space["probability"], 2)
-        known.append(f"Over the whole workspace {claim['time_s']:g} s move it {moved}; probability {chance}.")
+        known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
     loose += [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
     loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
-    return [Points("What is known", known or ["Nothing: the pose is not held."]), Points("What is not", loose)]
+    return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
 
 
 def _drift(pose: dict[str, Any]) -> list[Block]:
@@ -120,14 +120,14 @@ def _between(pose: dict[str, Any]) -> list[Block]:
         loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
         spread = f"{100 * entry['specimen_spread']:g} %"
         lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _lasts(entry)])
-    header = ["controller", "specimen spread", "under load before", "longest time between calibrations, s"]
+    header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
     told = "The pose is exact when a calibration ends. " + (_limits(pose["between_calibrations"][0]) if lines else "")
     return [Table(header, lines, told)] if lines else []
 
 
 def _limits(entry: dict[str, Any]) -> str:
     allowed = f"{entry['tolerance_mm']:g} mm and {entry['tolerance_deg']:.3g}°"
-    return f"Within tolerance: less than {allowed} with a probability of 95 %, at every time before."
+    return f"Within tolerance: less than {allowed} with a probability of 95 % at all earlier times."
 
 
 def _lasts(entry: dict[str, Any]) -> str:
@@ -140,7 +140,7 @@ def _doubts(pose: dict[str, Any]) -> list[Block]:
     if not shares:
         return []
     lines = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
-    caption = f"Which parameter the variance of the drift after {pose['variance_shares']['time_s']:g} s comes from."
+    caption = f"Each parameter's share of the variance of the drift after {pose['variance_shares']['time_s']:g} s."
     return [Table(["parameter", "share"], lines, caption)]
 
 
@@ -155,7 +155,7 @@ def _equilibria(pose: dict[str, Any]) -> list[Block]:
     if proof.get("sentence"):
         return [Text(f"{text} {proof['sentence']}")]
     if not proof["proved"]:
-        return [Text(f"{text} Interval arithmetic could not prove that the one shown is alone.")]
+        return [Text(f"{text} Interval arithmetic could not prove that the one shown is the only one.")]
     alone = f"{number(1e3 * proof['alone_within_m'])} mm"
     proved = f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose."
     band = proof.get("band")
@@ -165,7 +165,8 @@ def _equilibria(pose: dict[str, Any]) -> list[Block]:
     axes = zip("xyz", band["low_mm"], band["high_mm"], strict=True)
     box = ", ".join(f"{axis} {span(low, high)} mm" for axis, low, high in axes)
     sure = (
-        f"With stiffness and creep of every wire on its own anywhere in {part} of their 90 % bands and the mean wire's "
-        f"joint values commanded, the platform is after {band['time_s']:g} s surely in this box about the pose: {box}."
+        f"With stiffness and creep of each wire independently anywhere in {part} of their 90 % bands, and the mean "
+        f"wire's joint values commanded, the platform is certain to be in this box about the pose after "
+        f"{band['time_s']:g} s: {box}."
     )
     return [Text(proved), Text(sure)]

@@ -1,4 +1,4 @@
-"""The page of ``wirebayes reproduce``: the paper, with what is known of it and what is not."""
+"""The page of ``wirebayes reproduce``: the paper, with what is known and what is not."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -44,7 +44,7 @@ def _gallery(folder: Path) -> Gallery:
 
 
 def _summary(tables: Tables, gallery: Gallery) -> Section:
-    return Section("In a minute", [in_a_minute(tables)])
+    return Section("Summary", [in_a_minute(tables)])
 
 
 def _measured(tables: Tables, gallery: Gallery) -> Section:
@@ -73,7 +73,7 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
     if loose:
         words = (
             f"On {listed(loose)} the readings leave a ridge along which the refit may run to the edge of the search: "
-            "what the last column names means nothing by itself."
+            "the values of the parameters in the last column mean nothing by themselves."
         )
         blocks.append(Text(words))
     better = [
@@ -89,7 +89,7 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
             )
         )
     caption = "One history, creep saturating towards B τᵁ, law (1)."
-    return Section("Table 4, again", [*blocks, paper_tables.table_4(rows, "chain", "saturating", "hooke", caption)])
+    return Section("Table 4 reproduced", [*blocks, paper_tables.table_4(rows, "chain", "saturating", "hooke", caption)])
 
 
 def _table_4_otherwise(tables: Tables, gallery: Gallery) -> Section:
@@ -105,7 +105,7 @@ def _table_4_otherwise(tables: Tables, gallery: Gallery) -> Section:
 
 def _known(tables: Tables, gallery: Gallery) -> Section:
     words = Text(
-        "Bars are 90 % intervals. The grey bar is what a person knows of a thin line before any test; where a "
+        "Bars are 90 % intervals. The grey bar is the prior, what is known of a thin line before any test; where a "
         "coloured bar is not much shorter, the readings do not determine this number, whatever the published value."
     )
     caption = (
@@ -131,7 +131,7 @@ def _cannot_know(tables: Tables, gallery: Gallery) -> Section:
     ridge = Text(
         "A stiff wire that creeps little and a soft one that creeps much lose tension alike. Within one hold only "
         "the product k1·B counts, so hold by hold the draws lie along a ridge and the prior decides where on it k1 "
-        "is. The steps between holds, which only the chain uses, pin k1 down."
+        "is. The steps between holds, which only the chain uses, determine k1."
     )
     rate = Text(
         "Two minutes show the beginning of the creep. Much creep that comes slowly and little that comes soon look "
@@ -151,7 +151,7 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
     if chain:
         words = (
             "Fitted to the first five holds as one history, the plain model does not predict the others on "
-            f"{listed(chain)}. Something is missing in it. What that may be is the question of “wirebayes discover”."
+            f"{listed(chain)}. The model lacks something; “wirebayes discover” looks for what it is."
         )
         blocks.append(Text(words, strong=True))
     if alone:
@@ -161,7 +161,7 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
         )
         blocks.append(Text(words))
     caption = (
-        "Forecasts of the unused holds from the first five. A band is said to keep its promise when at least "
+        "Forecasts of the unused holds from the first five. A band counts as reliable when at least "
         f"{100 * LEAST_COVERAGE:.0f} % of the readings lie in it; 90 % should."
     )
     return Section("Where the model fails", [*blocks, *gallery("unused-chain"), paper_tables.held_out(rows, caption)])
@@ -169,7 +169,7 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
 
 def _creep(tables: Tables, gallery: Gallery) -> Section:
     words = Text(
-        "The units of B and k2 depend on the exponents, so people compare elongations: creep of a fresh sample at the "
+        "The units of B and k2 depend on the exponents, so elongations are compared: creep of a fresh sample at the "
         "geometric mean of its measured tensions, held constant."
     )
     caption = "Only 2 min lies within what was measured; an hour and a day are extrapolated."
@@ -197,7 +197,7 @@ def _computed(tables: Tables, gallery: Gallery) -> Section:
         "4000 effective draws of every parameter. Evaluations count everything, burn-in and the search for modes "
         "included; autocorrelation time and ESS are those of the worst parameter."
     )
-    prior = Text("What the priors expect of each test before any reading (grey), and what was measured:")
+    prior = Text("Prior predictions of each test (grey), and the measurements:")
     return Section("How it was computed", [words, paper_tables.sampling(rows), prior, *gallery("prior")])
 
 

@@ -1,4 +1,4 @@
-"""The minute's worth of the paper reproduced: what was measured, what is known well, what is not."""
+"""The summary of the paper reproduced: what was measured, what is known well, what is not."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -56,8 +56,8 @@ def _open(tables: dict[str, Rows]) -> Points:
     points = []
     if alone:
         points.append(
-            f"Hold by hold, the only way in which Table 4 fits, the readings do not determine {listed(alone)}: the "
-            f"ends of the 90 % interval of k1 lie a factor of {number(factor, 2)} apart or more."
+            f"Hold by hold, the only way in which Table 4 fits, the readings do not determine {listed(alone)}: "
+            f"k1's 90 % interval spans at least a factor of {number(factor, 2)}."
         )
     if chain:
         points.append(f"Not determined even as one history: {listed(chain)}.")
@@ -65,11 +65,11 @@ def _open(tables: dict[str, Rows]) -> Points:
     if poor:
         wires = len({row["experiment"] for row in tables["held_out"]})
         points.append(
-            "The model is not the whole truth: fitted to the first five holds as one history, it misses the later ones "
+            "The model is incomplete: fitted to the first five holds as one history, it misses the later ones "
             f"on {len(poor)} of {wires} wires."
         )
-    points.append("Nothing was read beyond two minutes in a hold: creep after an hour or a day is extrapolated.")
-    return Points("What is not", points)
+    points.append("No hold was read for longer than two minutes: creep after an hour or a day is extrapolated.")
+    return Points("What is not known", points)
 
 
 def of_table_4(rows: Rows, source: str) -> Rows:

@@ -27,7 +27,7 @@ def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -
     """Published and refitted parameters in one reading of the model."""
     chosen = [r for r in rows if (r["likelihood"], r["history"], r["elastic_law"]) == (likelihood, history, law)]
     header = ["sample", "parameters", "k1, N", "B, mm N⁻ᵁ", "U", "k2, s⁻ᴺ", "N", "preload, mm"]
-    header += ["rms, first five, N", "rms, rest, N", "rms, all, N", "not held back"]
+    header += ["rms, first five, N", "rms, rest, N", "rms, all, N", "parameters not constrained"]
     lines = []
     for r in chosen:
         values = (number(r[key], 4) for key in ("k1_N", "B", "U", "k2", "N", "preload_mm"))
@@ -61,7 +61,7 @@ def held_out(rows: Rows, caption: str) -> Table:
         misses = (f"{r[key]:.3f}" for key in ("rms_N", "median_band_width_N"))
         covered = f"{100 * r['coverage_90']:.0f} %"
         lines.append([r["experiment"], LIKELIHOOD[r["likelihood"]], str(r["readings"]), *misses, covered, kept])
-    return Table([*header, "in the 90 % band", "kept its promise"], lines, caption, VERDICTS)
+    return Table([*header, "in the 90 % band", "reliable"], lines, caption, VERDICTS)
 
 
 def creep(rows: Rows, caption: str) -> Table:
@@ -81,7 +81,7 @@ def creep(rows: Rows, caption: str) -> Table:
 
 def robot(rows: Rows) -> Table:
     """The paper's claim on the drift of a robot."""
-    header = ["wire", "robot", "specimens differ by", "under load before", "drift, mm", "90 %", "tilt, degrees", "90 %"]
+    header = ["wire", "robot", "specimens differ by", "loaded before", "drift, mm", "90 %", "tilt, degrees", "90 %"]
     lines = []
     for r in rows:
         loaded = f"{r['loaded_before_s'] / 3600:g} h" if r["loaded_before_s"] else "never"

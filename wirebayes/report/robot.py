@@ -19,10 +19,10 @@ from wirebayes.robot.question import Question
 
 Floats = NDArray[np.float64]
 CONTROLLERS = {
-    "hooke_only": "knows no creep",
-    "creep_aware": "foresees creep",
-    "creep_aware_told_otherwise": "foresees creep by the other fit",
-    "held_still": "holds still",
+    "hooke_only": "ignores creep",
+    "creep_aware": "compensates for creep",
+    "creep_aware_told_otherwise": "compensates for creep by the other fit",
+    "held_still": "does not move",
 }
 _COLOURS = (HOLD, CHAIN, "#5d8c4a")
 
@@ -119,7 +119,7 @@ def in_time(drifts: Sequence[dict[str, Any]], key: str, label: str, title: str) 
     figure, axes = panel("time, s", label, title)
     for entry, colour in zip(drifts, (CHAIN, HOLD), strict=True):
         spread = entry["specimen_spread"]
-        name = f"specimens differ by {100 * spread:g} %" if spread else "specimens alike"
+        name = f"specimens differ by {100 * spread:g} %" if spread else "identical specimens"
         _banded(axes, entry, key, colour, name)
     _since(axes)
     legend_below(figure, axes)
@@ -156,7 +156,7 @@ def _banded(axes: Any, entry: dict[str, Any], key: str, colour: str, label: str)
 def error_budget(result: dict[str, Any]) -> Figure:
     """Shares of the drift's variance by parameter."""
     label = f"share of the variance of the drift after {result['time_s']:g} s, %"
-    figure, axes = panel(label, "", "Where the doubt comes from", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))
+    figure, axes = panel(label, "", "Sources of uncertainty", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))
     names = list(result["shared_draw"])[::-1]
     bars = axes.barh(names, [100 * result["shared_draw"][name] for name in names], color=CHAIN)
     axes.bar_label(bars, fmt="%.0f", padding=3, fontsize=8.5)

@@ -83,7 +83,9 @@ class Gallery:
         k1, B, k2 = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B", "k2"))
         figure = figures.joint(k1, B, figures.named("k1"), figures.named("B"), e.name, mark)
         low, high = np.quantile(full["hold"].draws["k1"], [0.05, 0.95])
-        caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B follows."
+        caption = (
+            f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
+        )
         jump = stiffest_step(e)
         if abs(jump / published["k1"] - 1) < 0.02:
             told = f"{number(published['k1'], 4)} N is within 2 % of the stiffest single step between two holds"

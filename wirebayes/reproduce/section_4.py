@@ -105,7 +105,7 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
     caption = "New wires, the actuators still. Band: 90 % of the posterior draws; beyond 120 s extrapolated."
     gallery.add("robot", "drift", drifts_in_time(moved, _TIMES_S, limit_mm, f"Robot {MAPPED}: drift"), alt, caption)
     alt = f"Shares of the parameters in the variance of the drift of {MAPPED} after an hour, for each wire."
-    figure = budgets(budget, f"Robot {MAPPED}: where the doubt comes from")
+    figure = budgets(budget, f"Robot {MAPPED}: sources of uncertainty")
     gallery.add("robot", "budget", figure, alt, f"Of the drift after {_TIMES_S[-1]:g} s.")
 
 

@@ -166,7 +166,7 @@ def _solve(
         noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * (1.0 + np.abs(x[2])))
         accept = positive & (new.energy <= at.energy + 1e-4 * downhill + noise)
         accept |= positive & (damping == 0) & (new.size < 0.5 * at.size) & (length < 1e-3 * size)
-        # Uphill or indefinite: shorter, more cautious steps; as foretold: back towards pure Newton.
+        # Uphill or indefinite: shorter, more cautious steps; as predicted: back towards pure Newton.
         predicted = 0.5 * (damping * level * length * length - downhill)
         foretold = at.energy - new.energy > 0.5 * predicted - noise
         calmer = np.where(foretold, np.where(damping < 2e-5, 0.0, damping / 100), damping)

@@ -25,7 +25,7 @@ class Reach:
     ----------
     proved : bool
         For every choice of the parameters an equilibrium lies within `radius_m` of the centre, and it is the only one
-        within `beside_m` of the pose that the linear answer foretells.
+        within `beside_m` of the pose that the linear answer predicts.
     centre_m, rotation : (3,), (3, 3) arrays
     radius_m, beside_m : (6 or 3,) arrays
         Half widths: displacements, then turns times the platform's size. NaN when not proved.
