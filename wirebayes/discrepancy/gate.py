@@ -23,7 +23,7 @@ from wirebayes.wire.effect import Effect
 from wirebayes.workers import Each
 
 Report = Callable[[str, float, float], None]
-PLAIN_TO_SEE = 0.002  # p of the linear scan at which no look from further out could change the verdict
+PLAIN_TO_SEE = 0.002  # p of the linear scan at which no test from larger effects could change the verdict
 # Risk on either side that a p on the level itself gives so few, or so many, exceedances: three standard errors, as the
 # ranks of names add some error to the binomial one.
 CLOSE = 0.00135
