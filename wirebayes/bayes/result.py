@@ -1,7 +1,8 @@
 """Results on disk: netCDF that ArviZ reads, and a summary in JSON. The only module that knows xarray and ArviZ."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -107,8 +108,15 @@ class Stored:
 
 def experiments_in(path: Path) -> tuple[str, ...]:
     """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
-    with stored_results(path), xr.open_dataset(path, group="posterior", engine="h5netcdf") as posterior:
-        return tuple(str(name) for name in json.loads(posterior.attrs["experiments"]))
+    with _opened(path) as tree:
+        return tuple(str(name) for name in json.loads(tree["posterior"].attrs["experiments"]))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """The tree of a ``posterior.nc``; whatever is wrong with it is an `InputError`."""
+    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
+        yield tree
 
 
 def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
@@ -131,7 +139,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
     path = folder / "posterior.nc"
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the posterior of a fit")
-    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
+    with _opened(path) as tree:
         about, constant = tree["posterior"].attrs, tree["constant_data"].to_dataset()
         if "wirebayes_version" not in about:
             raise InputError(f"{path}: not a posterior of wirebayes")
@@ -179,7 +187,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
     """What was believed before the fit: draws of the prior of one experiment's parameters, each (n,)."""
     path = folder / "posterior.nc"
-    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
+    with _opened(path) as tree:
         prior, names = tree["prior"].to_dataset(), json.loads(tree["posterior"].attrs["experiments"])
         if "experiment" in prior.dims:
             prior = prior.isel(experiment=names.index(experiment or names[0]))

@@ -106,6 +106,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         arguments = sys.argv[1:]
         watch(arguments)
+        # Of a damaged file, h5netcdf complains a second time, in a traceback from a destructor that stops nothing.
+        sys.unraisablehook = lambda unraisable: None
     arguments = list(arguments)
     called = next((word for word in arguments if not word.startswith("-")), None)
 

@@ -1,0 +1,273 @@
+"""Damaged, truncated and foreign files: every command that reads them works or ends in one plain line, exit code 2."""
+
+import collections
+import json
+import random
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wirebayes.bayes import result
+from wirebayes.bayes.fit import fit
+from wirebayes.bayes.policy import Policy
+from wirebayes.cli import main
+from wirebayes.simulate import Bench, Truth, draw
+
+ROOT = Path(__file__).parents[1]
+STORED = ROOT / "tests" / "data" / "results"
+SESSION = ROOT / "docs" / "example" / "linear-7-session.csv"
+ROBOTS = ROOT / "data" / "robots"
+HASTY = Policy(walkers=64, rounds=2, round_draws=1024, most_rounds=2, block=2, most_steps=2)
+WILD_TEXT = ["", "nan", "inf", "-1", "0", "1e308", "-1e308", "1e-320", "\x00", "\ud7ff", '"', "\r", "\n", ",", "=", "]"]
+WILD_JSON: list[Any] = [None, True, -1, 0, 1e308, -1e-320, 10**400, "", "x\ny", "<b>", [], [None], {}, {"a": 1}, [[[]]]]
+FOREIGN = [b"", b"\x89HDF\r\n\x1a\n", b"\xff\xfe\x00", b"[" * 100_000, b"{}", b"[]", b"0", b'"x"', b"null"]
+# the destructor of h5netcdf's File, which the command line silences
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+
+
+def scrambled(rng: random.Random, content: bytes) -> bytes:
+    """Bytes changed, cut off, repeated, or the whole of another file."""
+    way = rng.randrange(6)
+    at, end = sorted(rng.randrange(len(content) + 1) for _ in range(2))
+    if way == 0:
+        return content[:at]
+    if way == 1:
+        return content[:at] + content[end:]
+    if way == 2:
+        return content[:end] + content[at:]
+    if way == 3:
+        return rng.choice(
+            [b"", b"\x89HDF\r\n\x1a\n", b"\xff\xfe\x00", b"[" * 100_000, b"{}", b"[]", b"0", b'"x"', b"null"]
+        )
+    out = bytearray(content)
+    for _ in range(rng.choice([1, 3, 30])):
+        out[rng.randrange(len(out))] = rng.randrange(256)
+    return bytes(out)
+
+
+def words_changed(rng: random.Random, content: bytes) -> bytes:
+    """A number or word of a text replaced by a wild one, or a line moved, doubled or dropped."""
+    lines = content.decode("utf-8", "replace").splitlines(keepends=True)
+    for _ in range(rng.choice([1, 1, 1, 3])):
+        i = rng.randrange(len(lines))
+        way = rng.randrange(5)
+        if way == 0:
+            lines.insert(rng.randrange(len(lines)), lines[i])
+        elif way == 1 and len(lines) > 1:
+            del lines[i]
+        else:
+            separator = rng.choice([",", ",", " "])
+            cells = lines[i].split(separator)
+            wild = rng.choice([*WILD_TEXT, "9" * 5000, "0x" + "f" * 5000, "é", f"{rng.uniform(-10, 10):.3g}"])
+            cells[rng.randrange(len(cells))] = wild
+            lines[i] = separator.join(cells)
+    return "".join(lines).encode("utf-8", "surrogatepass")
+
+
+def json_changed(rng: random.Random, content: bytes) -> bytes:
+    """A value anywhere in a JSON document replaced, dropped or renamed."""
+    document = json.loads(content)
+    for _ in range(rng.choice([1, 1, 2, 5])):
+        here, places = document, []
+        while isinstance(here, dict | list) and here:
+            key = rng.choice(list(here) if isinstance(here, dict) else range(len(here)))
+            places.append((here, key))
+            here = here[key]
+        if not places:
+            break
+        parent, key = rng.choice(places)
+        way = rng.randrange(4)
+        if way == 0:
+            del parent[key]
+        elif way == 1 and isinstance(parent, dict):
+            parent[rng.choice(["", "name", "k1"])] = parent.pop(key)
+        else:
+            parent[key] = rng.choice(WILD_JSON)
+    return json.dumps(document).encode()
+
+
+def netcdf_changed(rng: random.Random, content: bytes, place: Path) -> bytes:
+    """A group, variable or attribute of a posterior gone, renamed, or of another kind."""
+    import h5py
+    import numpy as np
+
+    place.write_bytes(content)
+    with h5py.File(place, "r+") as file:
+        group = file[rng.choice(list(file))] if rng.random() < 0.8 else file
+        names = list(group)
+        way = rng.randrange(6)
+        name = rng.choice(names)
+        if way == 0:
+            del group[name]
+        elif way == 1:
+            group.move(name, f"{name}-else")
+        elif way in (2, 3) and isinstance(group[name], h5py.Dataset) and group[name].dtype.kind == "f":
+            values = group[name][...]
+            wild = rng.choice([np.nan, np.inf, -1.0, 0.0, 1e300, 1e-300, -1e29, 1e25])
+            if rng.random() < 0.5 or values.ndim == 0:
+                values[...] = wild
+            else:
+                values.flat[rng.randrange(values.size)] = wild
+            group[name][...] = values
+        elif group.attrs:
+            key = rng.choice(list(group.attrs))
+            if way == 4:
+                del group.attrs[key]
+            else:
+                group.attrs[key] = rng.choice(["", "[]", "[1]", '["x", "y"]', "nan", "{", 3.0, -1.0, "null"])
+    return place.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folders as commands leave them: fit, discover, pose, calibrate."""
+    folder = tmp_path_factory.mktemp("results")
+    shutil.copytree(STORED, folder, dirs_exist_ok=True)
+    wire = folder / "fit" / "simulated"
+    wire.mkdir(parents=True)
+    bench = Bench("simulated", "line", 1000.0, displacements_mm=(1.0, 2.0, 3.0, 4.0))
+    problem = draw([bench], Truth(), seed=3).problem
+    result.save(fit(problem, 1, policy=HASTY), wire, {})
+    configuration = {"command": "fit", "version": "0.1.0", "seed": 0, "own_effects": None}
+    (folder / "fit" / "configuration.json").write_text(json.dumps(configuration))
+    (folder / "protocol.csv").write_text("hold,displacement_mm,time_s\n9,5,0\n9,5,60\n")
+    return folder
+
+
+# what is damaged, and the commands that read it
+READERS = {
+    "fit/simulated/posterior.nc": [
+        ["predict", "{r}/fit", "{r}/protocol.csv", "--output", "{o}/p.csv"],
+        ["export", "hangprinter-4", "--wires", "{r}/fit/simulated", "--draws", "5", "--output", "{o}/export"],
+    ],
+    "fit/simulated/summary.json": [["report", "{r}/fit"]],
+    "fit/configuration.json": [["report", "{r}/fit"]],
+    "discover/discovery.json": [["report", "{r}/discover"]],
+    "discover/configuration.json": [["report", "{r}/discover"]],
+    "pose/pose.json": [["report", "{r}/pose"]],
+    "calibrate/calibrate.json": [["report", "{r}/calibrate"]],
+}
+
+
+def said(arguments: list[str], out: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """The plain line of a command that refused, or nothing; anything else fails."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        code = main(arguments)
+    printed = capsys.readouterr()
+    if code == 0:
+        return ""
+    assert code == 2, (arguments, code, printed)
+    (line,) = printed.err.splitlines()
+    assert "Traceback" not in printed.err and len(line) <= 2100
+    assert not [path for path in out.rglob("*") if path.is_file()], "half written"
+    return line
+
+
+def damage_stored(seed: int, results: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    rng = random.Random(seed)
+    name = list(READERS)[seed % len(READERS)]
+    if "fit/" in name and name.endswith(".json") and rng.random() < 0.8:
+        name = "fit/simulated/posterior.nc"  # drawing the pages of a fit takes seconds
+    original = (results / name).read_bytes()
+    if rng.random() < 0.3:
+        content = scrambled(rng, original)
+    elif name.endswith(".nc"):
+        content = netcdf_changed(rng, original, folder / "changed.nc")
+    else:
+        content = json_changed(rng, original)
+    out = folder / "out"
+    out.mkdir()
+    (results / name).write_bytes(content)
+    try:
+        command = rng.choice(READERS[name])
+        return said([word.format(r=results, o=out) for word in command], out, capsys)
+    finally:
+        (results / name).write_bytes(original)
+        (results / name.split("/")[0] / "report.html").unlink(missing_ok=True)
+
+
+def damage_robot(seed: int, results: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    rng = random.Random(seed)
+    robot, session, out = "linear-7", SESSION, folder / "out"
+    if rng.random() < 0.5:
+        text = SESSION.read_bytes()
+        session = folder / "session.csv"
+        session.write_bytes(
+            rng.choice([scrambled, words_changed, words_changed])(rng, b"".join(text.splitlines(True)[:4]))
+        )
+    else:
+        text = (ROBOTS / f"{robot}.toml").read_bytes()
+        robot = str(folder / "robot.toml")
+        Path(robot).write_bytes(rng.choice([scrambled, words_changed, words_changed])(rng, text))
+    wires = ["--wires", str(results / "fit" / "simulated"), "--draws", "5", "--output", str(out)]
+    command = ["calibrate", robot, str(session)] if session != SESSION or rng.random() < 0.3 else ["export", robot]
+    return said([*command, *wires], out, capsys)
+
+
+def count(lines: list[str]) -> str:
+    """Kinds of error: what was found and where differ, the words do not."""
+    kinds = collections.Counter(line.split("expected")[-1][:60] if line else "worked" for line in lines)
+    return f"{len(lines)} cases, {len(kinds)} kinds: {kinds.most_common(12)}"
+
+
+def every(attack: Callable[..., str], seeds: range, results: Path, tmp_path: Path, capsys: Any) -> None:
+    lines = []
+    for seed in seeds:
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        try:
+            lines.append(attack(seed, results, folder, capsys))
+        except BaseException as error:
+            error.add_note(f"{attack.__name__}, seed {seed}, in {folder}")
+            raise
+        shutil.rmtree(folder)
+    with capsys.disabled():
+        print(f"\n{attack.__name__}: {count(lines)}")
+    assert "" in lines and len(set(lines)) > 3
+
+
+def test_damaged_results(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    every(damage_stored, range(90), results, tmp_path, capsys)
+
+
+def test_a_damaged_file_leaves_one_line_and_no_traceback(results: Path, tmp_path: Path) -> None:
+    """As a process of its own: destructors speak up late."""
+    (tmp_path / "posterior.nc").write_bytes((results / "fit" / "simulated" / "posterior.nc").read_bytes()[:9000])
+    command = [sys.executable, "-m", "wirebayes", "predict", str(tmp_path), str(results / "protocol.csv")]
+    done = subprocess.run([*command, "--output", str(tmp_path / "p.csv")], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"{tmp_path / 'posterior.nc'}: cannot be used")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("raise SystemExit(3)", 2), ("# -*- coding: latin-1 -*-\n# \xe9\n", 2), ("import sys; sys.exit()", 2)],
+)
+def test_a_users_own_effects_cannot_end_the_command(text: str, expected: int, tmp_path: Path, capsys: Any) -> None:
+    own = tmp_path / "own.py"
+    own.write_bytes(text.encode("latin-1"))
+    arguments = ["compare", str(ROOT / "data" / "paper" / "experiments.toml"), "--own-effects", str(own)]
+    assert main([*arguments, "--output", str(tmp_path / "out")]) == expected
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_damaged_robots_and_sessions(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    every(damage_robot, range(30), results, tmp_path, capsys)
+
+
+@pytest.mark.slow
+def test_damaged_results_in_full(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    every(damage_stored, range(1000, 2400), results, tmp_path, capsys)
+
+
+@pytest.mark.slow
+def test_damaged_robots_and_sessions_in_full(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    every(damage_robot, range(1000, 1700), results, tmp_path, capsys)
