@@ -75,6 +75,12 @@ def test_differences_are_said_only_where_they_mean_something() -> None:
     assert sum(r["weight"] or 0.0 for r in table["models"]) == pytest.approx(1.0)
 
 
+def test_one_hold_alone_says_nothing_of_its_error() -> None:
+    table = side_by_side([row(BASE, [10.0]), row("better", [30.0])], BASE)
+    (said,) = (r["meaning"] for r in table["models"] if r["name"] == "better")
+    assert said.startswith("elpd +20.0 against") and "one hold alone" in said
+
+
 def test_rival_laws_are_what_they_say() -> None:
     protocol = experiments()[0].protocol()
 

@@ -14,7 +14,7 @@ from wirebayes.bayes.fit import Fit, fit, seed_of
 from wirebayes.bayes.policy import Policy
 from wirebayes.discrepancy.candidates import Candidate, effects_of, problem_of
 from wirebayes.discrepancy.heldout import HeldOut, Scores, held_out, two_thirds
-from wirebayes.discrepancy.loho import loho
+from wirebayes.discrepancy.loho import loho, standard_error
 from wirebayes.effects import catalogue
 from wirebayes.experiment import Experiment
 from wirebayes.output import write_json
@@ -216,7 +216,7 @@ def _differences(m: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]
 
 def _difference(one: Sequence[float], other: Sequence[float]) -> dict[str, float]:
     gained = np.asarray(one, float) - np.asarray(other, float)
-    return {"elpd": float(gained.sum()), "se": float(np.sqrt(len(gained) * gained.var(ddof=1)))}
+    return {"elpd": float(gained.sum()), "se": standard_error(gained)}
 
 
 def _meaning(row: dict[str, Any], base: str) -> str:
@@ -231,6 +231,8 @@ def _meaning(row: dict[str, Any], base: str) -> str:
     if told is None:
         return "scored on other readings, so not comparable here"
     size = f"elpd {told['elpd']:+.1f} ± {told['se']:.1f} against {base}, {where}"
+    if np.isnan(told["se"]):
+        return f"elpd {told['elpd']:+.1f} against {base}, {where}: one hold alone, which says nothing of its error"
     if not row["converged"]:
         return f"{size}; its sampling did not converge, so this may be wrong"
     if abs(told["elpd"]) < MEANINGFUL_ELPD or abs(told["elpd"]) < MEANINGFUL_SE * told["se"]:

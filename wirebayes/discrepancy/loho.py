@@ -66,7 +66,7 @@ class LeftOut:
     @property
     def se(self) -> float:
         """Standard error of the sum, from the spread between holds."""
-        return _se(self.elpd)
+        return standard_error(self.elpd)
 
 
 def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
     if one.sample != other.sample or not np.array_equal(one.hold, other.hold):
         raise ValueError("the two do not leave out the same holds")
     gained = one.elpd - other.elpd
-    return float(gained.sum()), _se(gained)
+    return float(gained.sum()), standard_error(gained)
 
 
 def loho(
@@ -174,5 +174,6 @@ def thinned(theta: Array, draws: int = _DRAWS) -> Array:
     return kept
 
 
-def _se(values: Array) -> float:
+def standard_error(values: Array) -> float:
+    """Of the sum of (holds,) values, from their spread; NaN of a single one."""
     return float(np.sqrt(len(values) * values.var(ddof=1))) if len(values) > 1 else float("nan")
