@@ -34,7 +34,9 @@ Array = NDArray[Any]
 UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", "sensor_sd": "N",
          "setting_sd": "mm", LENGTH_EXPONENT: "1"}  # fmt: skip
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
-_PREDICTIVE_DRAWS = 500
+_UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
+_PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
+_CHUNK = 2000
 
 
 def save(
@@ -150,9 +152,7 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         if experiment is not None and experiment not in names:
             raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
         at = names.index(experiment or names[0])
-        if "experiment" in constant.dims:
-            posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
-            constant, observed = constant.isel(experiment=at), observed.isel(experiment=at)
+        posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
         draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
         lengths = json.loads(about["lengths_mm"])
         keys, known = json.loads(about["effects"]), catalogue(own_effects)
@@ -166,22 +166,54 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         if "reference_C" not in constant.attrs:
             raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
         reference_C = json.loads(constant.attrs["reference_C"])[at]
-        here = constant["held"].values.astype(bool)
-        protocol = Protocol(
-            float(lengths[at]),
-            constant["displacement_mm"].values[here],
-            constant["time_s"].values[here],
-            constant["mask"].values[here].astype(bool),
-            constant["duration_s"].values[here],
-            constant["number"].values[here].astype(np.int64),
-            None if reference_C is None else constant["warming_K"].values[here],
-            reference_C,
-        )
-        tension = np.nan_to_num(observed["tension_N"].values[here])[..., None]
+        protocol, tension = _measured(constant, observed, names[at], float(lengths[at]), reference_C)
         resolutions = json.loads(about["resolutions_N"])
-        sample = Sample(names[at], about["material"], protocol, tension, float(resolutions[at]), model)
+        sample = Sample(names[at], about["material"], protocol, tension[..., None], float(resolutions[at]), model)
         check(draws, sample, about["likelihood"])
         return Stored(draws, sample, about["likelihood"], exponent)
+
+
+def _measured(
+    constant: Any, observed: Any, name: str, length_mm: float, reference_C: float | None
+) -> tuple[Protocol, Array]:
+    """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
+    own = constant["hold"].values
+    if "experiment" in constant.coords:
+        own = own[constant["experiment"].values == name]
+    here, tension = constant.sel(hold=own), observed["tension_N"].sel(hold=own).values
+    width = int(np.isfinite(tension).sum(axis=1).max())
+    before = np.zeros(0, int)
+    if "unrecorded_hold" in here.dims:
+        if "unrecorded_experiment" in here:
+            here = here.isel(unrecorded_hold=here["unrecorded_experiment"].values == name)
+        before = here["unrecorded_before_hold"].values
+    number = here["number" if "number" in here.coords else "hold"].values
+    # An unrecorded hold stands before the recorded one it names; several keep their order.
+    place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
+
+    def whole(recorded: Array, unrecorded: Array | None = None) -> Array:
+        none = np.full((len(before), *recorded.shape[1:]), np.nan) if unrecorded is None else unrecorded
+        return np.concatenate([none, recorded])[place]
+
+    readings, times = (whole(values)[:, :width] for values in (tension, here["time_s"].values))
+    mask = np.isfinite(readings)
+    if not np.array_equal(mask, np.isfinite(times)):
+        raise ValueError("readings and times that do not belong together")
+    displacement, duration = (
+        whole(here[key].values, here[f"unrecorded_{key}"].values if len(before) else None)
+        for key in ("displacement_mm", "duration_s")
+    )
+    protocol = Protocol(
+        length_mm,
+        displacement,
+        np.nan_to_num(times),
+        mask,
+        duration,
+        whole(number, np.full(len(before), -1)).astype(np.int64),
+        None if reference_C is None else np.nan_to_num(whole(here["warming_K"].values)[:, :width]),
+        reference_C,
+    )
+    return protocol, np.nan_to_num(readings)
 
 
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
@@ -196,89 +228,41 @@ def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]
 
 def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator) -> Any:
     problem, (m, draws, _) = fit.problem, fit.theta.shape
-    together = sample is None
-    samples = problem.samples if together else (sample,)
-    assert samples[0] is not None
-    members = [s for s in samples if s is not None]
-    holds = max(len(s.protocol.displacement_mm) for s in members)
-    width = max(s.protocol.time_s.shape[1] for s in members)
-
-    def laid(values: list[Array]) -> Array:
-        """Per-sample arrays (H, ..., rest) padded and stacked; without the first axis for a single sample."""
-        return np.stack(values) if together else values[0]
-
-    def padded(array: Array, fill: float = 0.0, *, timed: bool = False) -> Array:
-        """(H, ...) grown to all holds, and with `timed` (H, R, ...) to all reading times too."""
-        grow = [(0, holds - array.shape[0])]
-        if timed:
-            grow.append((0, width - array.shape[1]))
-        return np.pad(array.astype(float), grow + [(0, 0)] * (array.ndim - len(grow)), constant_values=fill)
-
-    flat = fit.flat
-    if together:
-        variables = _together_variables(problem, fit.theta)
-    else:
-        variables = {k: v.reshape(m, draws) for k, v in _own(problem, flat, members[0]).items()}
-    per_hold = problem.hold_log_likelihood(flat)
-    order = [i for i, s in enumerate(problem.samples) if s in members]
-    likelihood = np.moveaxis(laid([padded(per_hold[i]) for i in order]), -1, 0).reshape(
-        m, draws, *([len(members)] if together else []), holds
-    )
-    few = np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int)
+    members = list(problem.samples) if sample is None else [sample]
+    variables, few = _variables(problem, fit.theta, sample), np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS))
+    few = np.unique(few.astype(int))
     chosen = fit.theta[:, few].reshape(-1, fit.theta.shape[-1])
-    predicted = np.moveaxis(laid([padded(replicate(problem, chosen, s, rng), timed=True) for s in members]), -1, 0)
-    predicted = predicted.reshape(m, len(few), *predicted.shape[1:])
     prior = problem.prior.rvs(2000, rng)
-    prior_variables = (
-        _together_variables(problem, prior[None])
-        if together
-        else {k: v[None] for k, v in _own(problem, prior, members[0]).items()}
-    )
-    constant: dict[str, Array] = {
-        "displacement_mm": laid([padded(s.protocol.displacement_mm) for s in members]),
-        "duration_s": laid([padded(s.protocol.duration_s) for s in members]),
-        "number": laid([padded(s.protocol.number.astype(float), -1.0) for s in members]),
-        "held": laid([padded(np.ones(len(s.protocol.displacement_mm))) for s in members]),
-        "time_s": laid([padded(s.protocol.time_s, timed=True) for s in members]),
-        "mask": laid([padded(s.protocol.mask, timed=True) for s in members]),
-    }
-    if any(s.protocol.warming_K is not None for s in members):
-        constant["warming_K"] = laid(
-            [
-                padded(
-                    np.zeros_like(s.protocol.time_s) if s.protocol.warming_K is None else s.protocol.warming_K,
-                    timed=True,
-                )
-                for s in members
-            ]  # fmt: skip
-        )
-    observed = laid(
-        [padded(np.where(s.protocol.mask, s.readings[..., 0], np.nan), np.nan, timed=True) for s in members]
-    )
-    first = ["experiment"] if together else []
-    hold_time, only_hold = [*first, "hold", "time"], [*first, "hold"]
-    dims = {"displacement_mm": only_hold, "duration_s": only_hold, "number": only_hold, "held": only_hold,
-            "time_s": hold_time, "mask": hold_time, "warming_K": hold_time, "tension_N": hold_time}  # fmt: skip
-    dims |= {name: ["experiment"] for name, v in variables.items() if v.ndim > 2}
-    coords: dict[str, Any] = {"experiment": [s.name for s in members]} if together else {}
     tree = arviz_base.from_dict(
         {
             "posterior": variables,
             "sample_stats": {"lp": fit.log_density},
-            "posterior_predictive": {"tension_N": predicted},
-            "observed_data": {"tension_N": observed},
-            "constant_data": constant,
-            "prior": prior_variables,
+            "prior": _variables(problem, prior[None], sample),
         },
-        dims=dims,
-        coords=coords,
+        dims={name: ["experiment"] for name, v in variables.items() if v.ndim > 2},
+        coords={} if sample else {"experiment": [s.name for s in members]},
     )
-    tree["log_likelihood"] = xr.DataTree(
-        xr.Dataset(
-            {"tension_N": (("chain", "draw", *only_hold), likelihood)},
-            coords={"chain": range(m), "draw": range(draws)} | coords,
-        )
-    )
+    left_out = _left_out(problem, fit.flat)
+    replicated = {s.name: np.moveaxis(replicate(problem, chosen, s, rng), -1, 0) for s in members}
+    groups = {
+        "posterior_predictive": _readings(members, replicated, (m, len(few))),
+        "log_likelihood": {
+            "tension_N": (
+                ("chain", "draw", "hold"),
+                np.concatenate(
+                    [left_out[i][s.protocol.recorded] for i, s in enumerate(problem.samples) if s in members]
+                ).T.reshape(m, draws, -1),
+            )
+        },
+        "observed_data": _readings(members, {s.name: np.moveaxis(s.readings, -1, 0) for s in members}, ()),
+        "constant_data": _protocols(members),
+    }
+    sampled = {"posterior_predictive": few, "log_likelihood": np.arange(draws)}
+    for group, data in groups.items():
+        coords = _hold_coordinates(members, apart=sample is not None)
+        if group in sampled:
+            coords |= {"chain": np.arange(m), "draw": sampled[group]}
+        tree[group] = xr.DataTree(xr.Dataset(data, coords=coords))
     about = {
         "wirebayes_version": __version__,
         "inference_library": "emcee",
@@ -301,14 +285,105 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
         "converged": int(fit.chains.converged),
         "provenance": json.dumps(dict(provenance)),
     }  # fmt: skip
-    for group in ("posterior", "prior"):
-        tree[group].attrs.clear()
-        for name, variable in tree[group].data_vars.items():
-            variable.attrs["units"] = unit_of(str(name), members[0].model.effects)
+    for group, node in tree.children.items():
+        node.attrs.clear()
+        for name, variable in node.data_vars.items():
+            if group in ("posterior", "prior"):
+                variable.attrs["units"] = unit_of(str(name), members[0].model.effects)
+            elif group in ("log_likelihood", "sample_stats"):
+                variable.attrs["units"] = "1"
+            else:
+                variable.attrs["units"] = _UNIT_IN_NAME.get(str(name).rsplit("_", 1)[-1], "1")
     tree["constant_data"].attrs["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
     tree["posterior"].attrs.update(about)
     tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
     return tree
+
+
+def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Any]:
+    """Labels of the recorded holds: their numbers; of several experiments ``NAME:NUMBER``, one after the other.
+
+    Unrecorded holds have no readings, so they are no part of this dimension: what is a missing value for one function
+    of ArviZ is an observation for another.
+    """
+    number = np.concatenate([s.protocol.number[s.protocol.recorded] for s in members])
+    if apart or len(members) == 1:
+        return {"hold": number}
+    names = np.repeat([s.name for s in members], [s.protocol.recorded.sum() for s in members])
+    labels = [f"{name}:{n}" for name, n in zip(names, number, strict=True)]
+    return {"hold": labels, "experiment": ("hold", names), "number": ("hold", number)}
+
+
+def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
+    """(n, holds, R) from (n, H, R) of each sample: recorded holds, one after the other, NaN where nothing was read."""
+    width = max(s.protocol.time_s.shape[1] for s in members)
+    rows = []
+    for s in members:
+        read = np.where(s.protocol.mask, values[s.name], np.nan)[:, s.protocol.recorded]
+        rows.append(np.pad(read, [(0, 0), (0, 0), (0, width - read.shape[2])], constant_values=np.nan))
+    return np.concatenate(rows, axis=1)
+
+
+def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Any]:
+    """Readings of each hold, and their mean, which has the dimensions of the log-likelihood."""
+    read, first = _stacked(members, values), ("chain", "draw") if shape else ()
+    return {
+        "tension_N": ((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
+        "hold_mean_N": ((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
+    }
+
+
+def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
+    """What was done: the recorded holds, and beside them the unrecorded ones, as an experiment file states them."""
+    protocols = [s.protocol for s in members]
+    recorded = np.concatenate([p.recorded for p in protocols])
+
+    def each(field: str) -> Array:
+        return np.concatenate([getattr(p, field) for p in protocols])
+
+    times = {s.name: s.protocol.time_s[None] for s in members}
+    out: dict[str, Any] = {
+        "displacement_mm": ("hold", each("displacement_mm")[recorded]),
+        "duration_s": ("hold", each("duration_s")[recorded]),
+        "time_s": (("hold", "time"), _stacked(members, times)[0]),
+    }
+    if any(p.warming_K is not None for p in protocols):
+        warming = {s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
+                   for s, p in zip(members, protocols, strict=True)}  # fmt: skip
+        out["warming_K"] = (("hold", "time"), _stacked(members, warming)[0])
+    if not recorded.all():
+        following = np.concatenate([_following(p.number) for p in protocols])
+        names = np.repeat([s.name for s in members], [len(p.number) for p in protocols])
+        out |= {
+            "unrecorded_experiment": ("unrecorded_hold", names[~recorded]),
+            "unrecorded_before_hold": ("unrecorded_hold", following[~recorded]),
+            "unrecorded_displacement_mm": ("unrecorded_hold", each("displacement_mm")[~recorded]),
+            "unrecorded_duration_s": ("unrecorded_hold", each("duration_s")[~recorded]),
+        }
+    return out
+
+
+def _following(number: Array) -> Array:
+    """(H,) number of the next recorded hold; every test ends with one."""
+    out = number.copy()
+    for j in range(len(out) - 2, -1, -1):
+        if out[j] < 0:
+            out[j] = out[j + 1]
+    return out
+
+
+def _left_out(problem: Problem, theta: Array) -> list[Array]:
+    """Per sample (H, n) log p(readings of a hold | those of all others, parameters), some draws at a time."""
+    parts = [problem.leave_one_hold_out(theta[i : i + _CHUNK]) for i in range(0, len(theta), _CHUNK)]
+    return [np.concatenate(holds, axis=1) for holds in zip(*parts, strict=True)]
+
+
+def _variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str, Array]:
+    """Parameters (chains, draws), of one sample, or of all with those of one sample each along a last axis."""
+    if sample is None:
+        return _together_variables(problem, theta)
+    own = _own(problem, theta.reshape(-1, theta.shape[-1]), sample)
+    return {name: values.reshape(theta.shape[:2]) for name, values in own.items()}
 
 
 def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:

@@ -116,7 +116,8 @@ def loho(
     elpd, k, refitted, converged = np.zeros(len(where)), np.zeros(len(where)), np.zeros(len(where), bool), True
     for i, (s, j) in enumerate(where):
         log_p = conditional[s][j]
-        log_weight, k[i] = _statistics.psislw(log_p)
+        # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
+        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else _statistics.psislw(log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
         if exact or not k[i] <= LARGEST_K:
             own = seed_of(seed, "without", str(s), str(j))
