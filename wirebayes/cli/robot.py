@@ -67,6 +67,8 @@ def pose(
     write_json(run.directory / "pose.json", found.content)
     pictures.save_pose(run.directory, machine, asked, found)
     run.finish()
+    if "sentence" in found.content:
+        typer.echo(found.content["sentence"], err=True)
     for warning in found.content.get("warnings", []):
         typer.echo(f"warning: {warning}", err=True)
 

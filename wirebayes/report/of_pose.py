@@ -1,5 +1,6 @@
 """The page of ``wirebayes pose``: where the platform goes, how sure that is, and where the doubt comes from."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     pose = read_json(folder / "pose.json")
     blocks: list[Block] = [Columns([_asked(pose), *_answers(pose)])]
     if not pose.get("feasible", True):
-        blocks.insert(0, Text("No tensions within the stated bounds hold the platform at this pose.", strong=True))
+        said = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
+        blocks.insert(0, Text(said, strong=True))
+    blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
     files = {name: folder / f"{name}.png" for name in _CAPTIONS}
     pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p.is_file()]
     sections = [Section("Summary", blocks), Section("Pictures", [Pictures(pictures)] if pictures else [])]
@@ -44,6 +47,12 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections += [Section("How many equilibria", _equilibria(pose))]
     lead = "A platform on wires that creep: the commanded pose, and how the platform moves away from it."
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
+
+
+def _losses(pose: dict[str, Any]) -> list[str]:
+    """What must be read first: falls, slack wires and poses that are not held, as the command said them."""
+    telling = ("falls", "slack", "cannot begin", "cannot pull", "its tension", "softest motion")
+    return [w[:1].upper() + w[1:] + "." for w in pose.get("warnings", []) if any(word in w for word in telling)]
 
 
 def _asked(pose: dict[str, Any]) -> Points:
@@ -82,7 +91,8 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
         moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
         chance = number(space["probability"], 2)
         known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
-    loose += [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
+    said = [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
+    loose += [sentence for sentence in said if sentence not in _losses(pose)]
     loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
     return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
 
@@ -93,12 +103,14 @@ def _drift(pose: dict[str, Any]) -> list[Block]:
         for i, time in enumerate(entry["times_s"]):
             if entry["distance_mm"]["q50"] and time > 0:
                 cells = []
-                for key in ("distance_mm", "tilt_deg"):
+                for key in ("distance_mm", "tilt_deg", "from_vertical_deg"):
                     low, middle, high = (entry[key][q][i] for q in ("q05", "q50", "q95"))
                     cells += [number(middle), span(low, high)]
                 lines.append([f"{100 * entry['specimen_spread']:g} %", f"{time:g}", *cells])
     header = ["specimen spread", "after, s", "moved, mm", "90 %", "tilt, degrees", "90 %"]
-    return [Table(header, lines)] if lines else []
+    header += ["from vertical, degrees", "90 %"]
+    told = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. "
+    return [Table(header, lines, told + "Draws whose platform falls are left out.")] if lines else []
 
 
 def _errors(pose: dict[str, Any]) -> list[Block]:
@@ -150,7 +162,10 @@ def _equilibria(pose: dict[str, Any]) -> list[Block]:
         return []
     count = found["stable_found"]
     many = "one stable equilibrium" if count == 1 else f"{count} stable equilibria"
-    text = f"From {found['starts']} starts the mean wire's lengths lead to {many}."
+    own = "the commanded pose is one of them" if count > 1 else "the commanded pose"
+    unstable = "the commanded pose is balanced but not stable, so none of them"
+    own = own if found["commanded_stable"] else unstable
+    text = f"From {found['starts']} starts the mean wire's lengths lead to {many}: {own}."
     proof = pose["certificate"]
     if proof.get("sentence"):
         return [Text(f"{text} {proof['sentence']}")]
@@ -163,10 +178,18 @@ def _equilibria(pose: dict[str, Any]) -> list[Block]:
         return [Text(proved)]
     part = "all" if band["share"] == 1 else f"the middle {100 * band['share']:g} %"
     axes = zip("xyz", band["low_mm"], band["high_mm"], strict=True)
-    box = ", ".join(f"{axis} {span(low, high)} mm" for axis, low, high in axes)
+    box = ", ".join(f"{axis} {_outward(low, high)} mm" for axis, low, high in axes)
     sure = (
         f"With stiffness and creep of each wire independently anywhere in {part} of their 90 % bands, and the mean "
         f"wire's joint values commanded, the platform is certain to be in this box about the pose after "
-        f"{band['time_s']:g} s: {box}."
+        f"{band['time_s']:g} s: {box}. This is proved for the whole way there, with wires up to a tenth of the creep "
+        "out of step."
     )
     return [Text(proved), Text(sure)]
+
+
+def _outward(low: float, high: float) -> str:
+    """A proved interval, rounded outward to a hundredth of its width (and no finer than it can be read)."""
+    digits = max(0, 2 - math.floor(math.log10(max(high - low, 1e-9))))
+    scale = 10.0**digits
+    return f"{math.floor(low * scale) / scale:.{digits}f} to {math.ceil(high * scale) / scale:.{digits}f}"

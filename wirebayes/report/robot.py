@@ -34,7 +34,9 @@ def save_pose(folder: Path, robot: Robot, asked: Question, found: Answer) -> Non
     content, pictures = found.content, {}
     pictures["robot"] = scene(robot, asked.position_m, asked.rotation, found.courses[0.0])
     pictures["drift"] = in_time(content["drift"], "distance_mm", "distance from the pose, mm", "Drift")
-    pictures["rotation"] = in_time(content["drift"], "rotation_deg", "rotation, degrees", "Drift of the orientation")
+    if robot.degrees == 6:
+        turned = "rotation, degrees", "Drift of the orientation"
+        pictures["rotation"] = in_time(content["drift"], "rotation_deg", *turned)
     pictures["pose-error"] = error_in_time(content["pose_error"])
     if "shared_draw" in content["variance_shares"]:
         pictures["error-budget"] = error_budget(content["variance_shares"])
@@ -80,6 +82,8 @@ def scene(
     axes.set_zlabel("z, m", labelpad=5)
     axes.tick_params(labelsize=8)
     axes.locator_params(nbins=5)
+    for axis in np.flatnonzero(np.ptp(np.concatenate([robot.exit_m, here, there]), axis=0) < 1e-6 * size):
+        getattr(axes, f"set_{'xyz'[axis]}ticks")([float(position_m[axis])])  # flat: one tick is all there is room for
     axes.set_aspect("equal")
     axes.set_box_aspect(axes._box_aspect, zoom=0.94)
     head = f"{robot.name}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"

@@ -49,6 +49,7 @@ def errors(
                 "specimen_spread": spread,
                 "controller": name,
                 "times_s": error.times_s,
+                "solved": float(error.found.mean()),
                 "distance_mm": band(1e3 * error.distance_m[error.found]),
                 "rotation_deg": band(np.degrees(error.angle_rad[error.found])),
                 **_tolerances(asked),
@@ -79,7 +80,8 @@ def between_calibrations(
                 control.after_calibration(robot, wires, state, x, R, _SINCE_S),
                 strict=True,
             ):
-                row = {"specimen_spread": spread, "loaded_before_s": loaded_s, "controller": name}
+                row: dict[str, Any] = {"specimen_spread": spread, "loaded_before_s": loaded_s, "controller": name}
+                row["solved"] = float(error.found.mean())
                 out.append(row | _tolerances(asked) | _lasts(error, asked))
     return out
 

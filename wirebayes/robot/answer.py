@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot import acting, claim, control, draws, drift, forward, inverse, proofs, shares
+from wirebayes.robot import acting, claim, control, draws, drift, forward, inverse, path, proofs, shares, stability
 from wirebayes.robot import rotation as turning
 from wirebayes.robot.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.description import Robot
@@ -15,7 +15,7 @@ from wirebayes.robot.question import Question, band
 from wirebayes.robot.wires import Wires
 
 Floats = NDArray[np.float64]
-_GRID, _MAP_DRAWS = (7, 7, 3), 60
+_GRID, _FLAT, _MAP_DRAWS = (7, 7, 3), (9, 9, 9), 60  # points of the map; of a workspace in one plane
 
 
 @dataclass(frozen=True)
@@ -89,20 +89,26 @@ def answer(robot: Robot, line: WireDraws, asked: Question, other: WireDraws | No
         "joint_value_m": band(told.joint_m),
     }
     content["forward"] = _round_trip(robot, shared, told, x, R)
-    content["equilibria"] = _all_equilibria(robot, shared, told, x, rng)
+    content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
+    stable = content["equilibria"]["commanded_stable"]
     content["certificate"] = proofs.alone(robot, shared, x, R)
     courses = {}
-    content["drift"] = []
+    content["drift"], losses = [], []
     for spread in asked.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         courses[spread] = drift.from_command(robot, wires, x, R, asked.times_s)
         content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))
+        losses += stability.warnings(courses[spread], spread, stable)
+    content["stability"] = [{"specimen_spread": s} | stability.summary(c) for s, c in courses.items()]
     content["certificate"] |= proofs.enclosed(robot, shared, courses[0.0], x, R)
-    content["claim"] = _claim(courses, x, asked)
+    content["claim"] = _claim(courses, x, R, asked)
     content["pose_error"] = acting.errors(robot, line, asked, rng, other)
     content["between_calibrations"] = acting.between_calibrations(robot, line, asked, rng)
     content["variance_shares"] = _shares(line, courses, x, R)
-    content["warnings"] = draws.warnings(line, tau, float(asked.times_s[-1]), told.zero_m)
+    if content["feasible_draws"] < 1:
+        weak = 100 * (1 - content["feasible_draws"])
+        losses.insert(0, f"{weak:.2g} % of the draws cannot pull as hard as the pose asks, however far stretched")
+    content["warnings"] = losses + draws.warnings(line, tau, float(asked.times_s[-1]), told.zero_m)
     space = _workspace(robot, line)
     content["workspace"] = claim.summary(space) if space else None
     return Answer(content, courses, space)
@@ -111,14 +117,17 @@ def answer(robot: Robot, line: WireDraws, asked: Question, other: WireDraws | No
 def _workspace(robot: Robot, line: WireDraws) -> claim.WorkspaceDrift | None:
     """A minute's drift of a level platform over the workspace, one draw for all wires of the line."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _MAP_DRAWS).round().astype(int)))
-    space = claim.over_workspace(robot, draws.for_robot(robot, few), claim.grid(robot, _GRID))
+    points = _GRID if (robot.upper_m > robot.lower_m).all() else _FLAT
+    space = claim.over_workspace(robot, draws.for_robot(robot, few), claim.grid(robot, points))
     return space if len(space.position_m) else None
 
 
 def _round_trip(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:
     """Forward kinematics of the commands, from a start beside the pose, must return to it."""
     back = forward.solve(robot, wires, told.zero_m, told.offset_m, x + 0.01 * robot.size_m, R)
-    stiff = forward_stiffness(robot, wires, told, x, R)
+    n = len(told.zero_m)
+    pose = np.repeat(x[None], n, 0), np.repeat(R[None], n, 0)
+    stiff = path.lowest_stiffness(robot, wires, pose, (told.zero_m, told.offset_m))[told.feasible]
     return {
         "solved": float(back.found.mean()),
         "statuses": {text: int((back.status == code).sum()) for code, text in forward.STATUS.items()},
@@ -128,32 +137,36 @@ def _round_trip(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R
     }
 
 
-def forward_stiffness(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> Floats:
-    """Smallest eigenvalue of the stiffness matrix, rotations weighed at the platform's edge, ``(n,)`` N/m."""
-    from wirebayes.robot.statics import stiffness
-
-    n = len(told.zero_m)
-    pose = np.repeat(x[:, None], n, 1), np.repeat(R[..., None], n, -1)
-    K = stiffness(robot, wires, *pose, told.zero_m.T, told.offset_m.T)
-    scale = np.ones(robot.degrees)
-    scale[3:] = 1.0 / robot.size_m
-    return np.asarray(np.linalg.eigvalsh(K * np.outer(scale, scale))[:, 0])
-
-
 def _all_equilibria(
-    robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, rng: np.random.Generator
+    robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.random.Generator
 ) -> dict[str, Any]:
-    """How many poses the mean wire's lengths allow, found from many starts."""
+    """The commanded pose, and every stable pose that the same lengths of the mean wire allow, from many starts."""
     mean = control.known(wires)
-    lengths = told.zero_m[told.feasible].mean(0), told.offset_m[told.feasible].mean(0)
-    found = forward.equilibria(robot, mean, *lengths, rng)
+    tau = inverse.tensions(robot, x[None], R[None])
+    told = inverse.commands(robot, mean, x[None], R[None], tau)
+    lengths = told.zero_m[0], told.offset_m[0]
+    if not told.feasible[0]:  # some draws are strong enough, their mean is not
+        return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
+    here = forward.solve(robot, mean, told.zero_m, told.offset_m, x, R)
+    near_m = 1e-6 * robot.span_m
+    stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
+    found = forward.equilibria(robot, mean, *lengths, rng, known=(x, R))
+    own = np.maximum(
+        np.abs(found.position_m - x).max(1), robot.size_m * np.abs(found.rotation - R).max((1, 2))
+    ) < near_m  # fmt: skip
+    poses = [
+        {"position_m": p, "rotation_vector_rad": v, "slack_wires": int((t <= 0).sum()), "commanded": bool(c),
+         "stable": True}
+        for p, v, t, c in zip(found.position_m, turning.vector(found.rotation), found.tension_N, own, strict=True)
+    ]  # fmt: skip
+    if not own.any():
+        poses.append({"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0],
+                      "slack_wires": int((tau[0] <= 0).sum()), "commanded": True, "stable": False})  # fmt: skip
     return {
         "stable_found": len(found.position_m),
-        "starts": 64,
-        "poses": [
-            {"position_m": p, "rotation_vector_rad": v, "slack_wires": int((t <= 0).sum())}
-            for p, v, t in zip(found.position_m, turning.vector(found.rotation), found.tension_N, strict=True)
-        ],
+        "starts": 65,
+        "commanded_stable": stable,
+        "poses": poses,
     }
 
 
@@ -165,13 +178,14 @@ def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
         "solved": float(course.found.mean()),
         "displacement_mm": band(1e3 * shift),
         "distance_mm": band(1e3 * np.linalg.norm(shift, axis=-1)),
-        "tilt_deg": band(np.degrees(turning.tilt(course.rotation))),
+        "tilt_deg": band(np.degrees(turning.tilt(course.rotation, R))),
+        "from_vertical_deg": band(np.degrees(turning.tilt(course.rotation))),
         "rotation_deg": band(np.degrees(angle)),
         "tension_N": band(course.tension_N),
     }
 
 
-def _claim(courses: dict[float, drift.Course], x: Floats, asked: Question) -> dict[str, Any]:
+def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, asked: Question) -> dict[str, Any]:
     """Probability, at this pose, of the paper's figures."""
     out: dict[str, Any] = {"time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD))}
     probability = []
@@ -180,7 +194,7 @@ def _claim(courses: dict[float, drift.Course], x: Floats, asked: Question) -> di
         value = None
         if k.size:
             distance = np.linalg.norm(course.position_m[:, k[0]] - x, axis=-1)
-            value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]]) < TILT_RAD)).mean())
+            value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]], R) < TILT_RAD)).mean())
         probability.append({"specimen_spread": spread, "probability": value})
     return out | {"holds": probability}
 
@@ -188,12 +202,14 @@ def _claim(courses: dict[float, drift.Course], x: Floats, asked: Question) -> di
 def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: Floats) -> dict[str, Any]:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
+    held = np.isfinite(size[0.0])
     names = [*draws.CORE, *(column for effect in line.material() for column in effect.columns())]
     names += [name for name in (draws.LENGTH_EXPONENT,) if name in line.parameters]
-    kept = {name: line.parameters[name] for name in names}
+    kept = {name: line.parameters[name][held] for name in names}
     result: dict[str, Any] = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
-    if line.count < 30:
-        return result | {"sentence": "Fewer than 30 draws: no shares are computed."}
-    result["shared_draw"] = shares.shares(kept, size[0.0])
-    result["sd_mm"] = [{"specimen_spread": s, "sd_mm": 1e3 * float(v.std())} for s, v in size.items()]
+    if held.sum() < 30:
+        return result | {"sentence": "Fewer than 30 draws that hold the platform: no shares are computed."}
+    result["shared_draw"] = shares.shares(kept, size[0.0][held])
+    sd = {s: float(v[np.isfinite(v)].std()) if np.isfinite(v).any() else None for s, v in size.items()}
+    result["sd_mm"] = [{"specimen_spread": s, "sd_mm": None if v is None else 1e3 * v} for s, v in sd.items()]
     return result

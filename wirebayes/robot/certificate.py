@@ -46,6 +46,7 @@ def certify(
     offset_m: Floats,
     position_m: Floats,
     rotation: Floats,
+    how_alone: bool = True,
 ) -> Certificate:
     """Try to prove that one equilibrium, and only one, lies near a pose.
 
@@ -59,6 +60,8 @@ def certify(
         As in `forward.solve`.
     position_m, rotation : (3,), (3, 3) arrays
         Approximate solution for the middle of the bounds.
+    how_alone : bool
+        Whether to look for the largest box without a second equilibrium, which costs most of the time.
 
     Returns
     -------
@@ -76,21 +79,22 @@ def certify(
         C = np.asarray(np.linalg.inv(system.middle_slope()), np.float64)
     except np.linalg.LinAlgError:  # the platform is free to move: no isolated equilibrium
         return nothing
-    radius = np.full(d, 1e-10)
+    span = robot.span_m
+    radius = np.full(d, 1e-10 * span)
     for _ in range(40):
         image = _krawczyk(system, C, radius)
         if np.all(image < radius):
             break
-        radius = 1.2 * image + 1e-13
-        if not np.all(radius < 0.5 * robot.size_m + 0.5 * np.ptp(robot.exit_m)):
+        radius = 1.2 * image + 1e-13 * span
+        if not np.all(radius < 0.5 * robot.size_m + 0.5 * span):
             return nothing
     else:
         return nothing
     # Inside, further images only shrink the enclosure.
     for _ in range(3):
         radius = np.minimum(radius, _krawczyk(system, C, radius))
-    unique, width = float(radius.min()), 1e-7
-    while width < np.ptp(robot.exit_m):
+    unique, width = float(radius.min()), 1e-7 * span
+    while how_alone and width < span:
         box = np.maximum(radius, width)
         if not np.all(_krawczyk(system, C, box) < box):
             break

@@ -41,15 +41,30 @@ class WorkspaceDrift:
     feasible: float
     found: float
 
+    @property
+    def median_distance_m(self) -> Floats:
+        """(p,) median over the draws that hold the platform; NaN where none does."""
+        return _median(self.distance_m)
+
+    @property
+    def median_tilt_rad(self) -> Floats:
+        """(p,) median over the draws that hold the platform; NaN where none does."""
+        return _median(self.tilt_rad)
+
     def holds(self, distance_m: float = DISTANCE_M, tilt_rad: float = TILT_RAD) -> Floats:
         """(p,) probability, at every point, that both limits are kept."""
         return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
 
 
+def _median(values: Floats) -> Floats:
+    held = [row[np.isfinite(row)] for row in values]
+    return np.array([np.median(row) if row.size else np.nan for row in held])
+
+
 def grid(robot: Robot, points: tuple[int, int, int]) -> Floats:
-    """Regular grid over the robot's workspace box, (p, 3) m."""
+    """Regular grid over the robot's workspace box, (p, 3) m; one layer where the box is flat."""
     axes = [
-        np.linspace(low, high, count) if count > 1 else np.array([0.5 * (low + high)])
+        np.linspace(low, high, count) if count > 1 and high > low else np.array([0.5 * (low + high)])
         for low, high, count in zip(robot.lower_m, robot.upper_m, points, strict=True)
     ]
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
@@ -90,9 +105,10 @@ def over_workspace(
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
     told = inverse.commands(robot, many, where, R, pull, state.strain(many))
-    course = drift.hold(robot, many, told.joint_m, np.array([time_s]), where, R, state)
+    held = drift.stably(robot, many, told, where, R)
+    course = drift.hold(robot, many, np.where(held[:, None], told.joint_m, np.nan), np.array([time_s]), where, R, state)
     shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
-    tilt = turning.tilt(course.rotation[:, 0])
+    tilt = turning.tilt(course.rotation[:, 0])  # commanded level: against the vertical and the command alike
     return WorkspaceDrift(
         x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
     )
@@ -111,7 +127,8 @@ def summary(out: WorkspaceDrift) -> dict[str, float]:
     inside = (out.distance_m < DISTANCE_M) & (out.tilt_rad < TILT_RAD)
     numbers: dict[str, float] = {}
     for name, unit, value in (("drift", "mm", 1e3 * out.distance_m), ("tilt", "deg", np.degrees(out.tilt_rad))):
-        low, middle, high = np.nanquantile(value, [0.05, 0.5, 0.95])
+        held = value[np.isfinite(value)]
+        low, middle, high = np.quantile(held, [0.05, 0.5, 0.95]) if held.size else [np.nan] * 3
         numbers |= {f"q05_{name}_{unit}": low, f"q50_{name}_{unit}": middle, f"q95_{name}_{unit}": high}
     return {key: float(value) for key, value in numbers.items()} | {
         "probability": float(inside.mean()),

@@ -5,6 +5,7 @@ zero-tension length is its length before creep times one plus that elongation ov
 """
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import Literal
 
@@ -81,31 +82,86 @@ class HoldCreep:
         self.reached, self.counted = np.zeros((1, 1)), np.zeros((1, 1))  # share of the creep, and its own clock
         self.before: tuple[Floats, Floats] | None = None  # tension and progress of the step before
 
+    def toward(self, time_s: float, slope: Floats, last: Floats | None = None) -> "HoldCreep":
+        """The hold at a later time while the amount changes in a straight line, by creep's own clock (`progress`).
+
+        Parameters
+        ----------
+        time_s : float
+        slope : (w, n) array
+            Change of the amount by that clock; not used where `last` is given.
+        last : (w, n) array, optional
+            The amount at that time.
+        """
+        done = self.progress(time_s)
+        out = copy(self)
+        out.reached, out.counted = self.law.fraction(self.k2, self.hold), self.law.clock(self.hold)
+        out.time_s = time_s
+        if self.follow == "start":
+            out.grown = self.amount * out.reached
+            return out
+        last = self.amount + slope * done if last is None else last
+        if self._open_ended:
+            out.grown = self.grown + 0.5 * (self.amount + last) * done
+        else:
+            share = -np.expm1(-done)
+            lag = np.where(done > 1e-5, 1.0 - share / np.maximum(done, 1e-300), 0.5 * done)
+            out.grown = self.grown + (self.amount - self.grown) * share + (last - self.amount) * lag
+        out.amount = last
+        return out
+
+    @property
+    def _open_ended(self) -> bool:
+        """Whether a law of time without a plateau reigns: what each step adds is that step's share of the amount."""
+        return "fraction" in self.law.effects.at
+
+    def progress(self, time_s: float) -> Floats:
+        """What creep's own clock counts from now to a later time: growth of ``k2 t^N``, or of the share reached."""
+        self._look(time_s)
+        if self._open_ended:
+            return np.asarray(self.law.fraction(self.k2, self.hold) - self.reached)
+        clock = self.law.clock(self.hold)
+        return np.asarray(self.k2 * (np.power(clock, self.law.N) - np.power(self.counted, self.law.N)))
+
+    def amount_at(self, tension_N: Floats) -> Floats:
+        """Creep that the hold still has to come, if the tension stayed, (w, n) mm of the tested length."""
+        self._look(self.time_s)
+        return self.law.amount(tension_N, self.hold) if self.follow == "current" else self.amount
+
+    def _look(self, time_s: float) -> None:
+        self.hold.time_s, self.hold.duration_s = np.full((1, 1), time_s), time_s
+
     def advance(self, time_s: float, tension_N: Floats) -> CreepState:
         """Creep to a later time of the hold; `tension_N` reigns where the last step ended, and is followed onward."""
-        hold, law, carried = self.hold, self.law, self.carried
-        hold.time_s, hold.duration_s, self.time_s = np.full((1, 1), time_s), time_s, time_s
+        hold, law = self.hold, self.law
+        self.time_s = time_s
+        self._look(time_s)
         reached, clock = law.fraction(self.k2, hold), law.clock(hold)
         progress = reached - self.reached
         if self.follow == "start":
             self.grown = self.amount * reached
         else:
             self.amount = law.amount(self._onward(progress, tension_N), hold)
-            if "fraction" in law.effects.at:
-                # A law of time without a plateau: what each step adds is that step's share of the amount.
+            if self._open_ended:
                 self.grown = self.grown + self.amount * progress
             else:
                 # The share of what is left: composes to eq (5) exactly when the tension stays.
                 share = -np.expm1(-self.k2 * (np.power(clock, law.N) - np.power(self.counted, law.N)))
                 self.grown = self.grown + (self.amount - self.grown) * share
         self.reached, self.counted = reached, clock
+        return self.state()
+
+    def state(self) -> CreepState:
+        """What the wires carry now."""
+        hold, law, carried = self.hold, self.law, self.carried
+        self._look(self.time_s)
         beside = law.beside(carried.beside_mm, hold)
         creep = law.creep(carried.creep_mm + self.grown, hold)
         return CreepState(
             creep,
             beside,
             carried.holds + 1,
-            carried.clock_s + time_s,
+            carried.clock_s + self.time_s,
             (*carried.past, (carried.clock_s, self.amount, self.k2)),
             law.elongation(creep, beside, hold),
         )

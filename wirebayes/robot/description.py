@@ -107,7 +107,12 @@ class Robot:
         return np.array([a == "linear" for a in self.actuator])
 
     @property
+    def span_m(self) -> float:
+        """Largest extent of the exit points along an axis: the robot's own measure of length."""
+        return float(np.ptp(self.exit_m, axis=0).max())
+
+    @property
     def size_m(self) -> float:
         """Typical lever arm of the platform, by which rotations are compared with displacements."""
         arms = np.linalg.norm(self.platform_m - self.platform_m.mean(0), axis=1)
-        return float(max(np.sqrt(np.mean(arms**2)), 1e-3 * np.ptp(self.exit_m, axis=0).max()))
+        return float(max(np.sqrt(np.mean(arms**2)), 1e-3 * self.span_m))

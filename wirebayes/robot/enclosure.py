@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot import forward
-from wirebayes.robot.certificate import certify
+from wirebayes.robot.certificate import Certificate, certify
 from wirebayes.robot.description import Robot
+from wirebayes.robot.reach import Reach
 from wirebayes.robot.wires import Wires
 from wirebayes.wire.laws import ElasticLaw
 
@@ -46,7 +47,8 @@ def enclose(
 ) -> Enclosure:
     """Enclose the pose while the lengths run together from one set to the other (a shared draw: one unknown, not w).
 
-    Each piece of the way is proved by `certificate.certify`; a piece that cannot be is halved.
+    Each piece of the way is proved by `certificate.certify`; a piece that cannot be is halved. Where two pieces meet,
+    the equilibrium of the one must be that of the other: a pose past a fall is no continuation.
 
     Parameters
     ----------
@@ -63,7 +65,8 @@ def enclose(
     stiff = np.full(robot.legs, k1_N)
     pieces, low, high = [(0.0, 1.0)], np.full(3, np.inf), np.full(3, -np.inf)
     nothing = np.full(3, np.nan)
-    x, R = start_m, start_rotation
+    begun = forward.solve(robot, wires, zero_low_m[None], offset_m, start_m, start_rotation)
+    here = _upright(begun)
     tried = proved = 0
     while pieces:
         a, b = pieces.pop()
@@ -71,16 +74,28 @@ def enclose(
         if tried > most:
             return Enclosure(False, nothing, nothing, proved)
         first, last = (zero_low_m + s * (zero_high_m - zero_low_m) for s in (a, b))
-        middle = forward.solve(robot, wires, 0.5 * (first + last)[None], offset_m, x, R)
-        orthogonal, _, rest = np.linalg.svd(middle.rotation[0])
-        here = middle.position_m[0], orthogonal @ rest
+        middle = _upright(forward.solve(robot, wires, 0.5 * (first + last)[None], offset_m, *here))
         bounds = np.minimum(first, last), np.maximum(first, last)
-        proof = certify(robot, law, (stiff, stiff), bounds, offset_m, *here)
-        if not proof.proved:
+        proof = certify(robot, law, (stiff, stiff), bounds, offset_m, *middle)
+        if not (proof.proved and _inside(robot, proof, here)):
             # the earlier half next, so that each solution starts from its neighbour
             pieces += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
             continue
+        here = _upright(forward.solve(robot, wires, last[None], offset_m, *middle))
+        if not _inside(robot, proof, here):
+            return Enclosure(False, nothing, nothing, proved)
         proved += 1
-        x, R = here
+        x = middle[0]
         low, high = np.minimum(low, x - proof.radius_m[:3]), np.maximum(high, x + proof.radius_m[:3])
     return Enclosure(True, low, high, proved)
+
+
+def _upright(found: forward.Equilibria) -> tuple[Floats, Floats]:
+    left, _, right = np.linalg.svd(found.rotation[0])
+    return found.position_m[0], left @ right
+
+
+def _inside(robot: Robot, proof: Certificate, pose: tuple[Floats, Floats]) -> bool:
+    """Whether a pose is in the box that holds one equilibrium only."""
+    box = Reach(True, proof.centre_m, proof.rotation, proof.radius_m, proof.radius_m, np.zeros((robot.degrees, 1)))
+    return box.holds(*pose, np.zeros(1), robot.size_m, 0.0)

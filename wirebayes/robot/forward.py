@@ -4,7 +4,7 @@ An equilibrium is a minimum of the potential energy of weight and wires, slack w
 that energy, damped where the Hessian is not positive definite or the energy would rise, finds it from any start.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,13 @@ from wirebayes.robot.description import GRAVITY, Robot
 from wirebayes.robot.wires import Wires, energy, tension
 
 Floats = NDArray[np.float64]
-FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD = 0, 1, 2, 3
+FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
 STATUS = {
     FOUND: "stable equilibrium",
     NOT_CONVERGED: "not converged",
     NO_EQUILIBRIUM: "no equilibrium: the wires cannot carry the platform",
     NOT_HELD: "in balance, but free to move or about to fall: no isolated stable pose",
+    FELL: "fell: the equilibrium that was followed lost its stability",
 }
 _CHUNK, _QUICK = 2048, 7
 
@@ -37,7 +38,8 @@ class Equilibria:
     tension_N : (n, w) array
         Zero for slack wires.
     status : (n,) int array
-        `FOUND`, `NOT_CONVERGED`, `NO_EQUILIBRIUM` or `NOT_HELD`; poses mean something where found only.
+        `FOUND`, `NOT_CONVERGED`, `NO_EQUILIBRIUM` or `NOT_HELD`; poses mean something where found only. `FELL` is set
+        by those who follow an equilibrium (`path`), never here.
     iterations : (n,) int array
     residual_N : (n,) array
         Largest force left over (moments divided by the platform's size).
@@ -83,14 +85,19 @@ def solve(
     Equilibria
     """
     n = len(zero_m)
-    sane = np.flatnonzero(np.isfinite(zero_m).all(1) & np.isfinite(np.broadcast_to(offset_m, zero_m.shape)).all(1))
+    finite = [np.isfinite(zero_m), np.isfinite(np.broadcast_to(offset_m, zero_m.shape))]
+    finite.append(np.isfinite(np.broadcast_to(start_m, (n, 3))))
+    sane = np.flatnonzero(np.logical_and.reduce([f.all(1) for f in finite]))
     if len(sane) < n:
         offsets = np.broadcast_to(offset_m, zero_m.shape)[sane]
         x, R = np.broadcast_to(start_m, (n, 3))[sane], np.broadcast_to(start_rotation, (n, 3, 3))[sane]
-        return _spread(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
+        return spread(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
     if not n:
-        return _spread(None, sane, 0, robot.legs)
-    position = np.array(np.broadcast_to(start_m, (n, 3)).T)
+        return spread(None, sane, 0, robot.legs)
+    # Counted from the middle of the exit points, so that nothing depends on where the robot's origin is.
+    middle = robot.exit_m.mean(0)
+    robot = replace(robot, exit_m=robot.exit_m - middle)
+    position = np.array(np.broadcast_to(start_m, (n, 3)).T) - middle[:, None]
     rotation = np.array(np.moveaxis(np.broadcast_to(start_rotation, (n, 3, 3)), 0, -1))
     zero = np.ascontiguousarray(zero_m.T)
     offset = np.ascontiguousarray(np.broadcast_to(offset_m, zero_m.shape).T)
@@ -103,10 +110,10 @@ def solve(
         rest = _in_chunks(robot, *part, max_iterations - quick)
         at[:, slow], turn[..., slow], tau[:, slow], status[slow], left[slow] = *rest[:4], rest[5]
         count[slow] += rest[4]
-    return Equilibria(at.T, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
+    return Equilibria(at.T + middle, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
 
 
-def _spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
+def spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
     """Solutions put back among rows that could not be tried."""
     if found is not None:
         legs = found.tension_N.shape[1]
@@ -138,13 +145,16 @@ def _solve(
     n, d, size = zero.shape[1], robot.degrees, robot.size_m
     scale = np.ones((d, 1))
     scale[3:] = 1.0 / size  # rotations are stepped in metres at the platform's edge
-    reach = 10.0 * (np.ptp(robot.exit_m, axis=0).max() + zero.max(0))
+    span = robot.span_m + zero.max(0)
+    reach = 10.0 * span
     out_x, out_R, out_tau = np.array(x), np.array(R), np.zeros_like(zero)
     status, count, left = np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf)
     live = np.arange(n)
     k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, n))
     # Below this no computed force can be trusted: S/ℓ - 1 is known to one rounding error.
-    floor = 32 * np.finfo(float).eps * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
+    # Moments are divided by the platform's size; points far from the reference point make more of the same error.
+    arm = max(1.0, np.abs(robot.platform_m).max() / size) if d == 6 else 1.0
+    floor = 32 * np.finfo(float).eps * arm * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
     # The stiffness if every wire were taut: a measure of damping that exists also when all are slack.
     level = np.sum(k1 * robot.lines[:, None] ** 2 / zero, axis=0)
     damping = np.zeros(n)
@@ -163,7 +173,7 @@ def _solve(
         new_R = turning.compose(step[3:] * scale[3:], R) if d == 6 else R
         new = _evaluate(robot, wires, zero, offset, new_x, new_R, scale)
         downhill = (at.gradient * step).sum(0)
-        noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * (1.0 + np.abs(x[2])))
+        noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * span)
         accept = positive & (new.energy <= at.energy + 1e-4 * downhill + noise)
         accept |= positive & (damping == 0) & (new.size < 0.5 * at.size) & (length < 1e-3 * size)
         # Uphill or indefinite: shorter, more cautious steps; as predicted: back towards pure Newton.
@@ -188,7 +198,8 @@ def _solve(
             status[gone] = kinds[finished]
             left[gone] = at.size[finished]
             keep = np.flatnonzero(~finished)
-            live, damping, floor, level, reach = live[keep], damping[keep], floor[keep], level[keep], reach[keep]
+            live, damping, floor, level = live[keep], damping[keep], floor[keep], level[keep]
+            reach, span = reach[keep], span[keep]
             x, R, zero, offset = x[:, keep], R[..., keep], zero[:, keep], offset[:, keep]
             wires, at = wires.part(keep), at.part(keep)
         if not live.size:
@@ -240,6 +251,25 @@ def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Float
     return _Point(total, gradient, H, tau, np.abs(gradient).max(0))
 
 
+def balance_at(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> tuple[Floats, list[list[Floats]]]:
+    """Gradient ``(6 or 3, n)`` and Hessian of the energy at poses ``(n, ...)``, rotations in metres at the edge."""
+    scale = np.ones((robot.degrees, 1))
+    scale[3:] = 1.0 / robot.size_m
+    offset = np.broadcast_to(offset_m, zero_m.shape).T
+    at = _evaluate(robot, wires, zero_m.T, offset, position_m.T, np.moveaxis(rotation, 0, -1), scale)
+    return at.gradient, at.H
+
+
+def tensions_at(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> Floats:
+    """Tensions ``(n, w)`` that lengths give at poses ``(n, ...)``, in balance or not."""
+    shape = statics.geometry(robot, position_m.T, np.moveaxis(rotation, 0, -1))
+    return tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)[0].T
+
+
 def equilibria(
     robot: Robot,
     wires: Wires,
@@ -247,7 +277,7 @@ def equilibria(
     offset_m: Floats,
     rng: np.random.Generator,
     starts: int = 64,
-    near_m: float = 1e-6,
+    known: tuple[Floats, Floats] | None = None,
 ) -> Equilibria:
     """Every stable equilibrium that many random starts find for one set of lengths.
 
@@ -260,8 +290,8 @@ def equilibria(
     rng : numpy Generator
     starts : int
         Starting poses: anywhere below and among the exit points, any orientation.
-    near_m : float
-        Poses nearer than this (rotations at the platform's edge) are one.
+    known : (3,), (3, 3) arrays, optional
+        A pose to start from too: the commanded one, say, which few random starts may reach.
 
     Returns
     -------
@@ -272,9 +302,13 @@ def equilibria(
     low = low - np.array([0.0, 0.0, 0.5 * zero_m.max()])
     begin = rng.uniform(low, high, (starts, 3))
     turn = np.eye(3) if robot.degrees == 3 else turning.matrix(rng.normal(0.0, 1.2, (starts, 3)))
-    tiled = np.broadcast_to(zero_m, (starts, len(zero_m)))
+    turn = np.broadcast_to(turn, (starts, 3, 3))
+    if known is not None:
+        begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
+    tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
     found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
     good = np.flatnonzero(found.found)
+    near_m = 1e-6 * robot.span_m  # poses nearer than this, rotations at the platform's edge, are one
     height = statics.potential(
         robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]
     )

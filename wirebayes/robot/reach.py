@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wirebayes.robot.balance import Balance
 from wirebayes.robot.description import Robot
+from wirebayes.robot.rotation import vector
 from wirebayes.wire.laws import ElasticLaw
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,8 @@ class Reach:
     centre_m, rotation : (3,), (3, 3) arrays
     radius_m, beside_m : (6 or 3,) arrays
         Half widths: displacements, then turns times the platform's size. NaN when not proved.
+    line_m : (6 or 3, q) array
+        The linear answer to each ``p``.
     """
 
     proved: bool
@@ -36,6 +39,15 @@ class Reach:
     rotation: Floats
     radius_m: Floats
     beside_m: Floats
+    line_m: Floats
+
+    def holds(self, position_m: Floats, rotation: Floats, p: Floats, size_m: float, slack_m: Floats | float) -> bool:
+        """Whether a pose, known to `slack_m`, is the equilibrium that was proved for the parameters ``p``."""
+        turn = vector(rotation @ self.rotation.T)
+        angle = float(np.linalg.norm(turn))
+        cayley = turn * (2 * np.tan(0.5 * angle) / angle) if angle > 0 else turn
+        here = np.concatenate([position_m - self.centre_m, size_m * cayley])[: len(self.beside_m)]
+        return self.proved and bool(np.all(np.abs(here - self.line_m @ p) + slack_m <= self.beside_m))
 
 
 def apart(half_k1_N: Floats, half_zero_m: Floats) -> tuple[Floats, Floats]:
@@ -73,7 +85,7 @@ def reach(
         python-flint is not installed.
     """
     d = robot.degrees
-    nothing = Reach(False, position_m, rotation, np.full(d, np.nan), np.full(d, np.nan))
+    nothing = Reach(False, position_m, rotation, np.full(d, np.nan), np.full(d, np.nan), np.full((d, 1), np.nan))
     k1_bounds, zero_bounds = _bounds(k1_N, generators[0]), _bounds(zero_m, generators[1])
     if min(k1_bounds[0].min(), zero_bounds[0].min()) <= 0:
         return nothing
@@ -85,13 +97,13 @@ def reach(
         return nothing
     Y = _linear_answer(middle, C, generators)
     along = np.abs(Y).sum(1) * _UP
-    beside = np.full(d, 1e-10) + 1e-3 * along
+    beside = np.full(d, 1e-10 * robot.span_m) + 1e-3 * along
     for _ in range(30):
         image = _image(middle, wide, C, Y, generators, along, beside)
         if np.all(image < beside):
-            return Reach(True, position_m, rotation, (along + beside) * _UP, beside)
-        beside = 1.2 * image + 1e-13
-        if not np.all(beside < np.ptp(robot.exit_m)):
+            return Reach(True, position_m, rotation, (along + beside) * _UP, beside, Y)
+        beside = 1.2 * image + 1e-13 * robot.span_m
+        if not np.all(beside < robot.span_m):
             break
     return nothing
 

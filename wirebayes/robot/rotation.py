@@ -32,9 +32,17 @@ def cross_matrix(v: Floats) -> Floats:
     return np.stack(rows, -2)
 
 
-def tilt(rotation: Floats) -> Floats:
-    """Angle between the platform's normal (its third axis) and the vertical, rad; `(...)` of `(..., 3, 3)`."""
-    return np.asarray(np.arctan2(np.hypot(rotation[..., 0, 2], rotation[..., 1, 2]), rotation[..., 2, 2]))
+def tilt(rotation: Floats, commanded: Floats | None = None) -> Floats:
+    """Angle between the platform's normal (its third axis) and another, rad; `(...)` of `(..., 3, 3)`.
+
+    Parameters
+    ----------
+    rotation : (..., 3, 3) array
+    commanded : (3, 3) array, optional
+        The orientation whose normal counts; default: upright, and the normal is compared with the vertical.
+    """
+    turned = rotation if commanded is None else np.swapaxes(commanded, -1, -2) @ rotation
+    return np.asarray(np.arctan2(np.hypot(turned[..., 0, 2], turned[..., 1, 2]), turned[..., 2, 2]))
 
 
 def compose(increment_rad: Floats, rotation: Floats) -> Floats:

@@ -158,9 +158,9 @@ def _given(t: _Table) -> dict[str, GivenWire]:
 
 
 def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
-    value = t.take("leg", "at least three [[leg]] tables")
-    if not isinstance(value, list) or len(value) < 3:
-        raise t.fail("leg", f"found {_kind(value)}", "at least three [[leg]] tables")
+    value = t.take("leg", "at least two [[leg]] tables")
+    if not isinstance(value, list) or len(value) < 2:
+        raise t.fail("leg", f"found {_kind(value)}", "at least two [[leg]] tables")
     out = []
     for i, content in enumerate(value):
         leg = _Table(content, t.where, f"leg[{i}]")

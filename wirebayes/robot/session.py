@@ -12,7 +12,7 @@ from wirebayes.robot import forward, inverse
 from wirebayes.robot.creep import HoldCreep, fresh
 from wirebayes.robot.description import Robot
 from wirebayes.robot.draws import CORE, LENGTH_EXPONENT, WireDraws, for_robot
-from wirebayes.robot.drift import steps_between, without_creep
+from wirebayes.robot.drift import without_creep
 from wirebayes.robot.wires import Wires
 
 Floats = NDArray[np.float64]
@@ -146,7 +146,7 @@ def predict(
     session : Session
     unknowns : (n, d) array
     longest_step : float
-        As in `drift.hold`.
+        Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
     near : (n, p, 3), (n, p, 3, 3) arrays, optional
         Where the holds are known to begin, about; default: the poses asked for.
     """
@@ -162,7 +162,7 @@ def predict(
         here = forward.solve(robot, wires, bare * (1 + state.strain(wires).T), offset, *begin)
         begun.append(here)
         creep = HoldCreep(wires, state, here.tension_N.T)
-        for time in steps_between(0.0, float(duration), float(duration), longest_step):
+        for time in _steps(float(duration), longest_step):
             state = creep.advance(time, here.tension_N.T)
             here = forward.solve(
                 robot, wires, bare * (1 + state.strain(wires).T), offset, here.position_m, here.rotation
@@ -183,3 +183,9 @@ def predict(
         np.stack([b.position_m for b in begun], 1), np.stack([b.rotation for b in begun], 1),
         np.stack(lengths, 1), solved,
     )  # fmt: skip
+
+
+def _steps(duration_s: float, longest: float) -> Floats:
+    """Times of a hold, geometrically spaced no wider than `longest`, after a first thousandth."""
+    steps = int(np.ceil(np.log(1e3) / longest))
+    return duration_s * 1e-3 ** (1 - np.arange(steps + 1) / steps)

@@ -32,28 +32,38 @@ def nearest(reference_N: Floats, structure: Floats, load: Floats, lowest_N: floa
     -------
     (w,) array, or None when no tensions within the bounds carry the load.
     """
+    scale = float(np.abs(load).max()) or max(lowest_N, float(np.abs(reference_N).max()), 1.0)
+    tau = _nearest(reference_N / scale, structure, load / scale, lowest_N / scale, highest_N / scale)
+    return None if tau is None else scale * tau
+
+
+def _nearest(reference: Floats, structure: Floats, load: Floats, lowest: float, highest: float) -> Floats | None:
+    """`nearest` with forces in units of the load."""
     left, sizes, right = np.linalg.svd(structure)
     rank = int((sizes > 1e-10 * sizes[0]).sum())
     particular = right[:rank].T @ ((left.T @ load)[:rank] / sizes[:rank])
     if np.abs(structure @ particular - load).max() > 1e-9 * np.abs(load).max():
         return None
     null = right[rank:].T
-    tau = particular + null @ (null.T @ (reference_N - particular))
-    if tau.min() >= lowest_N and tau.max() <= highest_N:
+    tau = particular + null @ (null.T @ (reference - particular))
+    outside = float(max(lowest - tau.min(), tau.max() - highest))
+    margin = 1e-9 * max(1.0, float(np.abs(tau).max()))
+    if outside <= (margin if null.shape[1] == 0 else 0.0):
         return np.asarray(tau)
     if null.shape[1] == 0:
         return None
     G = np.vstack([null, -null])
-    h = np.concatenate([lowest_N - tau, tau - highest_N])
+    # In units of the worst violation, so that the size of the answer does not look like an answer.
+    h = np.concatenate([lowest - tau, tau - highest]) / outside
     E = np.vstack([G.T, h])
     f = np.zeros(len(E))
     f[-1] = 1.0
     residual = E @ nnls(E, f, maxiter=50 * E.shape[1])[0] - f
     if np.abs(residual[-1]) < 1e-10:
         return None
-    result = tau + null @ (-residual[:-1] / residual[-1])
-    margin = 1e-8 * max(highest_N, 1.0)
-    inside = result.min() >= lowest_N - margin and result.max() <= highest_N + margin
+    result = tau + null @ (-outside * residual[:-1] / residual[-1])
+    margin = 1e-8 * max(1.0, float(np.abs(result).max()))
+    inside = result.min() >= lowest - margin and result.max() <= highest + margin
     return np.asarray(result) if inside else None
 
 
