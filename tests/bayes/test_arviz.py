@@ -5,6 +5,7 @@ import warnings
 from pathlib import Path
 
 import arviz as az
+import h5py
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from wirebayes.bayes.policy import Policy
 from wirebayes.bayes.problem import build
 from wirebayes.discrepancy.loho import loho
 from wirebayes.effects import named
+from wirebayes.errors import InputError
 from wirebayes.experiment import Experiment, read_experiments
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=12)
@@ -255,3 +257,12 @@ def test_the_plotted_observation_is_the_measured_one(stored: dict[str, tuple[Pat
     measured = data.observed_data.tension_N.values
     assert np.array_equal(plotted[np.isfinite(plotted)], np.sort(measured[np.isfinite(measured)]))
     plt.close("all")
+
+
+def test_a_reading_without_its_time_is_refused(stored: dict[str, tuple[Path, Fit]], tmp_path: Path) -> None:
+    copy = tmp_path / "posterior.nc"
+    copy.write_bytes((stored["chain"][0] / "posterior.nc").read_bytes())
+    with h5py.File(copy, "a") as file:
+        file["constant_data/time_s"][0, 1] = np.nan
+    with pytest.raises(InputError, match="readings and times that do not belong together"):
+        result.load(tmp_path)
