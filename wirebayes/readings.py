@@ -264,7 +264,7 @@ def _holds(table: _Table, length_mm: float, tension: Sequence[float]) -> tuple[H
             )
         )
         start += time[end - 1]
-    if times_run_on(holds) < RUN_ON_CERTAIN:
+    if times_run_on([hold.time_s for hold in holds]) < RUN_ON_CERTAIN:
         expected = f"the time since hold {number[first[1]]} began, not since the test began (0 s at each hold's start)"
         raise table.complain(first[1], "time_s", table.cell(first[1], "time_s"), expected)
     return tuple(holds)
@@ -274,12 +274,13 @@ STRETCH = 8.0  # the most elastic thread breaks at seven times its length
 RUN_ON_CERTAIN = 1e-4  # three holds of four readings; two holds of five may still be an odd protocol (0.004)
 
 
-def times_run_on(holds: Sequence[Hold]) -> float:
+def times_run_on(times_s: Sequence[NDArray[np.float64]]) -> float:
     """How likely the reading times would run on from hold to hold over the whole test, had they nothing to do with it.
 
     Parameters
     ----------
-    holds : sequence of Hold
+    times_s : sequence of (r,) arrays
+        Of each hold; those without readings do not count.
 
     Returns
     -------
@@ -287,9 +288,9 @@ def times_run_on(holds: Sequence[Hold]) -> float:
         Share of the orders of all reading times in which every hold begins after the last reading of the one before;
         1 where the times do not run on, or most holds have a single reading (durations may well grow).
     """
-    recorded = [hold for hold in holds if hold.recorded]
-    counts = [hold.time_s.size for hold in recorded]
-    runs_on = all(b.time_s[0] >= a.time_s[-1] for a, b in zip(recorded, recorded[1:], strict=False))
+    recorded = [times for times in times_s if times.size]
+    counts = [times.size for times in recorded]
+    runs_on = all(after[0] >= before[-1] for before, after in zip(recorded, recorded[1:], strict=False))
     if len(recorded) < 2 or not runs_on or float(np.median(counts)) < 2:
         return 1.0
     return float(np.exp(sum(lgamma(n + 1) for n in counts) - lgamma(sum(counts) + 1)))

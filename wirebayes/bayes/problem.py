@@ -26,6 +26,7 @@ Likelihood = Literal["chain", "hold"]
 MATERIAL = ("k1", "B", "U", "k2", "N")
 SAMPLE = ("preload", "sensor_sd", "setting_sd")
 LENGTH_EXPONENT = "creep_length_exponent"
+FINEST = 1e-5  # of the largest tension: no load cell resolves less, and data without any noise need a floor
 _POSITIVE = {"k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd"}
 
 
@@ -191,11 +192,12 @@ def build(
             suffix = mark if effect.scope == "material" else ""
             distributions |= {f"{c}{suffix}": a.prior for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
         for experiment in members:
+            largest = max((float(np.abs(h.tension_N).max()) for h in experiment.recorded_holds), default=0.0)
             acting = tuple(e for e in effects if not isinstance(e, EventEffect) or e.test in ("", experiment.name))
             model = Model(law, history, acting, tension, reference if len(members) > 1 else 0.0)
             samples.append(
                 Sample(experiment.name, material, experiment.protocol(), experiment.tension()[..., None],
-                       experiment.resolution_N, model)
+                       max(experiment.resolution_N, FINEST * largest), model)
             )  # fmt: skip
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""

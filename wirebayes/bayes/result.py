@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from wirebayes import __version__
+from wirebayes.bayes import posterior_checks
 from wirebayes.bayes.fit import Fit
 from wirebayes.bayes.identifiability import extrapolation, identifiability, told
 from wirebayes.bayes.prior import Prior
@@ -454,6 +455,13 @@ def statistics(values: Array) -> dict[str, float]:
         }  # fmt: skip
 
 
+def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
+    """What is odd about the readings, with the experiment's name where there are several."""
+    if sample is not None:
+        return posterior_checks.warnings(fit, sample)
+    return [f"{s.name}: {said}" for s in fit.problem.samples for said in posterior_checks.warnings(fit, s)]
+
+
 def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
     first = sample or fit.problem.samples[0]
     parameters: dict[str, Any] = {}
@@ -475,6 +483,7 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
         "effects": [e.key for e in first.model.effects],
         "converged": chains.converged,
         "convergence": chains.why,
+        "warnings": _warnings(fit, sample),
         "parameters": parameters,
         "derived": {"tension_N": tension, **quantities},
         "identifiability": told(identifiability(fit)),

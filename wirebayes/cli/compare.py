@@ -41,6 +41,7 @@ def compare(
     """
     from wirebayes import __version__
     from wirebayes.cli.progress import progress
+    from wirebayes.data_checks import of_experiments
     from wirebayes.discrepancy.candidates import BASE, Candidate, candidates, problem_of
     from wirebayes.discrepancy.compare import Task, run, side_by_side
     from wirebayes.effects import catalogue, source_of
@@ -73,6 +74,8 @@ def compare(
         "priors": {one.name: one.priors for one in experiments},
         "data_sha256": {one.name: one.data_hash for one in experiments},
     }  # fmt: skip
+    for said in of_experiments(experiments):
+        typer.echo(f"warning: {said}", err=True)
     opened = open_run(output, configuration)
     if opened.state == "done":
         return

@@ -72,6 +72,8 @@ def discover(
         file = output / folder / "summary.json"
         with stored_results(file):
             summary = read_json(file)
+            for said in summary["warnings"] if folder.endswith("/plain") else ():
+                print(f"{folder}: warning: {said}", file=sys.stderr)
             if not summary["converged"]:
                 print(f"{folder}: {summary['convergence']}", file=sys.stderr)
 

@@ -100,6 +100,8 @@ def fit(
         path = output / job.folder / "summary.json"
         with stored_results(path):
             summary = read_json(path)
+            for said in summary["warnings"]:
+                print(f"{job.folder}: warning: {said}", file=sys.stderr)
             if not summary["converged"]:
                 print(f"{job.folder}: {summary['convergence']}", file=sys.stderr)
             found = summary.get("model_check", {})

@@ -99,7 +99,7 @@ def _cautions(summary: dict[str, Any]) -> list[Block]:
     out: list[Block] = [Text(check["sentence"], strong=check["passed"] is not True or bool(check.get("gross_errors")))]
     if not summary["converged"]:
         out.insert(0, Text("Not converged: do not trust these intervals.", strong=True))
-    return out
+    return [Text(f"Check the readings: {said}.", strong=True) for said in summary["warnings"]] + out
 
 
 def _sampled(summary: dict[str, Any]) -> str:
