@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from wirebayes.bayes.coordinates import Coordinates, Target
-from wirebayes.bayes.problem import build
+from wirebayes.bayes.pooling import pooled
+from wirebayes.bayes.problem import Problem, build
 from wirebayes.effects import named
 from wirebayes.simulate import Bench, Truth, draw
 from wirebayes.wire.staircase import simulate
@@ -19,6 +20,7 @@ PROBLEMS = {
     "effects": draw([Bench()], Truth(effects=(named("second_relaxation"), named("grip_slip@5"))), seed=2).problem,
     "edges": draw([Bench()], Truth(effects=(named("permanent_creep"), named("creep_threshold"))), seed=4).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
+    "pooled": pooled(draw(LINE, seed=5).problem, ("k1", "B", "N")),
     "slack": build([Bench().experiment()]),  # every reading zero
     "hold": build([Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 10.0)).experiment()], likelihood="hold"),
 }
@@ -119,3 +121,28 @@ def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates():
 
     assert np.log(lost(level)).std() < 0.15 * np.log(lost(theta)).std()
     assert stats.spearmanr(np.log(lost(theta)), coordinates.to_sampled(theta)[:, column]).statistic > 0.98
+
+
+def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread():
+    class Silent(Problem):
+        def log_likelihood(self, theta, readings=None):
+            return np.zeros(len(theta))
+
+    problem = PROBLEMS["pooled"]
+    silent, names = Silent(problem.samples, problem.prior, problem.likelihood), problem.names
+    theta = problem.prior.rvs(500, np.random.default_rng(3))
+    z = Coordinates(silent).to_sampled(theta)
+    at = {name: i for i, name in enumerate(names)}
+    seen = Coordinates(problem).to_sampled(theta)
+    for line, spread, own in problem.prior.pools:
+        for name in own:
+            deviation = np.log(theta[:, at[name]] / theta[:, at[line]]) / theta[:, at[spread]]
+            assert z[:, at[name]] == pytest.approx(deviation, rel=0.05, abs=0.05)
+    # readings say much of k1: with a wide spread a specimen's value counts, and its line's does not matter
+    theta = theta[:2]
+    theta[:, at["spread_k1"]], theta[1] = 10.0, theta[0]
+    theta[1, at["k1"]] *= 1.1
+    moved = np.diff(Coordinates(problem).to_sampled(theta), axis=0)[0]
+    own = [at[name] for name in problem.prior.pools[0][2]]
+    assert np.abs(moved[own]).max() < 0.01 < np.abs(np.diff(z[:2], axis=0)[0][own]).max()
+    assert np.isfinite(seen).all()

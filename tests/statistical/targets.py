@@ -75,4 +75,41 @@ def heavy_tails():
     return Analytic(density, np.zeros(D), np.full(D, 8.0 / 6.0), spread=3.0)
 
 
+def funnel(neck=0):
+    """Neal's, in six dimensions: coordinate `neck` is v ~ N(0, 3²), the others N(0, e^v) given it."""
+    d = 6
+
+    def density(z):
+        v, others = z[:, neck], np.delete(z, neck, axis=1)
+        with np.errstate(over="ignore"):
+            return -0.5 * v**2 / 9.0 - 0.5 * (d - 1) * v - 0.5 * (others**2).sum(axis=1) * np.exp(-v)
+
+    second = np.full(d, np.exp(4.5))
+    second[neck] = 9.0
+    return Analytic(density, np.zeros(d), second)
+
+
+def sixteen_modes(centres):
+    """Of one weight, with unit covariance, at centres (16, d)."""
+
+    def density(z):
+        return logsumexp([-0.5 * ((z - centre) ** 2).sum(axis=1) for centre in centres], axis=0)
+
+    return Analytic(density, centres.mean(axis=0), 1.0 + (centres**2).mean(axis=0), spread=12.0)
+
+
+def grid(apart=10.0, d=6):
+    """Four by four."""
+    at = np.zeros((16, d))
+    at[:, :2] = apart * (np.stack(np.meshgrid(range(4), range(4)), axis=-1).reshape(16, 2) - 1.5)
+    return at
+
+
+def corners(apart=10.0, d=8):
+    """Of a cube in four dimensions."""
+    at = np.zeros((16, d))
+    at[:, :4] = apart * (np.stack(np.meshgrid(*4 * [range(2)]), axis=-1).reshape(16, 4) - 0.5)
+    return at
+
+
 TARGETS = {"gaussian": gaussian, "banana": banana, "two_modes": two_modes, "heavy_tails": heavy_tails}

@@ -1,9 +1,11 @@
 """The sampler on analytic targets: first and second moments over independent runs, and broken ones that must fail."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from tests.statistical.targets import TARGETS, Analytic, gaussian
+from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussian, grid, sixteen_modes
 from wirebayes.bayes import burn_in, convergence, ensemble, moves, walkers
 from wirebayes.bayes.ensemble import sample
 from wirebayes.bayes.optimum import Optimum
@@ -100,6 +102,96 @@ def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
     monkeypatch.setattr(ensemble, "_block_steps", lambda state, policy: 1 if state.kept_z else 2)
     t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "most_steps": 24, "ess": 1e9}))
     assert t > LIMIT
+
+
+def funnels(neck, runs):
+    """Of the runs that call themselves converged, (n, 3): E[v²] / 9 and the shares of 5 % in the neck and the mouth."""
+    found = []
+    for seed in range(runs):
+        chains = sample(funnel(neck), seed, Policy(most_steps=800))
+        if chains.converged:
+            v = chains.z[..., neck] / 3.0
+            found.append([(v**2).mean(), (v < -1.645).mean(), (v > 1.645).mean()])
+    return np.array(found).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("runs", [4, pytest.param(40, marks=pytest.mark.slow)])
+def test_a_funnel_comes_out_right_or_is_refused(runs):
+    found = funnels(0, runs)
+    print(f"{len(found)} of {runs} converged: {found.mean(axis=0)} ± {found.std(axis=0)}")
+    assert len(found) >= runs / 2
+    # a neck half explored has a share of .02 to .03; Monte-Carlo errors of a run are .05 and .004
+    assert found[:, 0].min() > 0.85 and found[:, 0].max() < 1.15
+    assert found[:, 1:].min() > 0.035 and found[:, 1:].max() < 0.065
+    assert found.mean(axis=0) == pytest.approx([1.0, 0.05, 0.05], rel=0.08)
+
+
+@pytest.mark.slow
+def test_a_funnel_whose_neck_is_taken_for_its_last_coordinate_is_refused():
+    found = funnels(5, 20)
+    assert not len(found) or (found[:, 1].min() > 0.035 and found[:, 0].min() > 0.85)
+
+
+def test_without_its_witness_the_sampler_believes_a_funnel_without_a_neck(monkeypatch):
+    monkeypatch.setattr(ensemble, "OUTWEIGHS", np.inf)
+    assert funnels(0, 2)[:, 1].min() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("centres", "runs"),
+    [(corners(), 2), (grid(), 2), *(pytest.param(c, 20, marks=pytest.mark.slow) for c in
+                                    (corners(), corners(20.0), grid(), grid(20.0)))],
+)  # fmt: skip
+def test_sixteen_modes_have_their_shares_or_are_refused(centres, runs):
+    converged = 0
+    for seed in range(runs):
+        chains = sample(sixteen_modes(centres), seed, Policy(most_steps=800))
+        z = chains.z.reshape(-1, centres.shape[1])
+        nearest = (((z[:, None] - centres) ** 2).sum(axis=2)).argmin(axis=1)
+        share = np.bincount(nearest, minlength=16) / len(z)
+        converged += chains.converged
+        if chains.converged:  # 0.0625 each, with 4000 effective draws known to 0.004
+            assert share.min() > 0.044 and share.max() < 0.081
+    print(f"{converged} of {runs} converged")
+    assert converged >= runs / 2
+
+
+def fake(draws):
+    """A state that kept (ensembles, steps, walkers, d) draws of a Gaussian, and the target that it came from."""
+    ensembles, steps, walkers_, d = draws.shape
+    z = np.moveaxis(draws, 0, 1).reshape(steps, ensembles * walkers_, d)
+    state = walkers.State(z[-1], np.zeros(len(z[-1])), None, None, None, np.random.default_rng(0), 1, 0, learned=False)
+    state.frozen, state.kept_z, state.kept_log_density = True, [z], [np.zeros(z.shape[:2])]
+    return state, SimpleNamespace(coordinates=gaussian(d).coordinates, problem=gaussian(d).problem)
+
+
+def looked(draws, **asked):
+    state, target = fake(draws)
+    ensemble._look(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **asked))
+    return state
+
+
+def test_a_chain_that_gives_enough_draws_is_believed_and_one_with_too_few_is_not():
+    x = np.random.default_rng(3).normal(size=(4, 100, 64, 2))
+    assert looked(x, ess=20_000.0).finished and looked(x, ess=20_000.0).converged
+    assert not looked(x, ess=40_000.0).finished
+
+
+def test_an_ensemble_that_stands_apart_is_not_believed_however_many_draws_there_are():
+    x = np.random.default_rng(4).normal(size=(4, 100, 64, 2))
+    x[0, ..., 1] += 0.4  # R-hat of 1.02 by the walkers' spread, when ESS alone would do
+    state = looked(np.repeat(x, 8, axis=1), ess=50.0)
+    assert (state.ess > 50.0).all() and state.r_hat.max() > 1.01
+    assert not state.finished
+
+
+def test_a_chain_shorter_than_five_autocorrelation_times_is_not_believed():
+    x = first_order(0.95, (4, 120, 256, 2), np.random.default_rng(5))  # 39 steps remember: three times as long
+    state = looked(x, ess=1000.0)
+    assert (state.ess > 1000.0).all() and (state.r_hat < 1.01).all()
+    assert not state.finished
+    longer = looked(first_order(0.95, (4, 400, 256, 2), np.random.default_rng(6)), ess=1000.0)
+    assert longer.finished and longer.converged
 
 
 def first_order(rho, shape, rng):

@@ -33,15 +33,16 @@ def begin(
     spawned = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
-    seen = None if rough is None else (rough, rough)
+    seen, witness = None if rough is None else (rough, rough), None
     if found is None:
         searched = search(target, rng, extra=near)
         found, seen = searched.modes, seen or (searched.warm, searched.cold)
+        witness = searched.cold, searched.height
     known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
     random = np.random.RandomState(np.random.MT19937(spawned[1]))
     positions, values = _finite_draws(target, known, _walking(target, policy), random)
     before = target.evaluations - before
-    state = State(positions, values, random.get_state(), known, known, rng, len(found.z), before)
+    state = State(positions, values, random.get_state(), known, known, rng, len(found.z), before, witness=witness)
     if seen is not None and _fit(target, state, policy, *seen, proposal.ROUGH_SHARES):
         state.acceptance, state.seen = 1.0, None  # to be believed until draws tell better
     return state
@@ -77,11 +78,26 @@ def learn_again(target: Target, state: State, policy: Policy) -> None:
     """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before."""
     z = np.concatenate(state.kept_z).reshape(-1, state.positions.shape[1])
     value = np.concatenate(state.kept_log_density).ravel()
-    state.frozen, state.again, state.round = False, True, policy.rounds - 1
+    state.frozen, state.again, state.round = False, state.again + 1, policy.rounds - 1
     state.kept_z, state.kept_log_density = [], []
     state.kept_evaluations = state.accepted = state.proposed = 0
     hot = z[_resampled((_HOT - 1.0) * value, len(z), state.generator)]
     _fit(target, state, policy, hot, z)
+
+
+def overlooked(state: State, z: Array, value: Array) -> float:
+    """How far places that matter lie above what the frozen proposal makes of them, in nats.
+
+    The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
+    draws (n, d) with log densities (n,), and at its 99 % quantile over the rough draws that the search left; the larger
+    counts. A neck into which few walkers found, and stayed, shows in the first, a mode that they lost in the second.
+    """
+    over = value - state.proposal.log_density(z)
+    middle, high = np.quantile(over, [0.5, 0.999])
+    if state.witness is None:
+        return float(high - middle)
+    z, value = state.witness
+    return float(max(high, np.quantile(value - state.proposal.log_density(z), 0.99)) - middle)
 
 
 def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
@@ -123,7 +139,7 @@ def _fit(
     try:
         state.proposal = proposal.fit(
             hot, cold, state.start, target.coordinates.order, state.generator, shares,
-            most=policy.components, points=points,
+            most=max(policy.components, min(state.modes, _MOST_COMPONENTS)), points=points,
             before=state.proposal if isinstance(state.proposal, Proposal) else None,
         )  # fmt: skip
     except np.linalg.LinAlgError:
@@ -178,3 +194,4 @@ _GOOD_ACCEPTANCE = 0.25
 _PASSING = 5000  # points for a proposal that only the next round draws from
 _IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are as many draws as asked for; the fewest before
 _LONGEST_SETTLING = 8
+_MOST_COMPONENTS = 24  # however many modes there are

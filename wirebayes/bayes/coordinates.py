@@ -9,7 +9,8 @@ standard deviations of their prior. Then, one after the other,
   taken for the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
   creep is linear in B, so G needs no B and one pass along the holds.
 
-The map is triangular and its last two steps have unit Jacobian.
+The map is triangular and these two steps have unit Jacobian. Specimens' values that are partially pooled come last
+(`wirebayes.bayes.specimens`).
 
 What bend and what funnel remain, a proposal learns (`wirebayes.bayes.straighten`), for which the columns have an order:
 errors before what they blur, the shape of the creep before its amount and the stiffness.
@@ -23,19 +24,23 @@ from numpy.typing import NDArray
 
 from wirebayes.bayes.edges import edge
 from wirebayes.bayes.problem import MATERIAL, Problem, Sample
+from wirebayes.bayes.specimens import specimens
 
 Array = NDArray[Any]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
+_STEEPEST = 1.6  # a larger U of a pool is of no ridge that data see; to follow it would only bend the prior's tail
 _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
 
 
 @dataclass(frozen=True)
 class _Ridge:
-    """Columns of one material's parameters (or their fixed values) and the constants of the map."""
+    """Columns of one material's parameters (or fixed values), which of them are shifted, and the map's constants."""
 
     where: dict[str, int]
     fixed: dict[str, float]
+    shifted: frozenset[str]
+    steepest: float
     log_tension: Array
     times_s: Array
     which_time: NDArray[np.int64]
@@ -45,6 +50,7 @@ class _Ridge:
 
     def log_creep(self, U: Array, k2: Array, N: Array) -> Array:
         """log G: root mean square of the elongation gained in a hold, for B = 1."""
+        U = np.minimum(U, self.steepest)
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
@@ -70,18 +76,28 @@ class Coordinates:
         for i, distribution in free:
             if i not in self.edges:
                 self.scale[i] = _spread(distribution)
-        self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
+        self.specimens = specimens(problem)
+        first = () if self.specimens is None else self.specimens.spreads
+        steepest = np.inf if self.specimens is None else _STEEPEST
+        unpooled = set(names) if self.specimens is None else set()
+        self.order = np.array(sorted(range(len(names)), key=lambda i: (i not in first, _rank(names[i]))))
         self.ridges = []
-        for mark in dict.fromkeys(_mark(problem, s.material) for s in problem.samples):
-            sample = next(s for s in problem.samples if _mark(problem, s.material) == mark)
-            columns = {name: f"{name}{mark}" for name in MATERIAL}
+        shifted: set[str] = set()  # a column that several samples share follows the first of them
+        for sample in problem.samples:
+            mark = _mark(problem, sample.material)
+            columns = {
+                name: own if (own := f"{name}[{sample.name}]") in unpooled else f"{name}{mark}" for name in MATERIAL
+            }
+            fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
             where = {
                 name: names.index(c) for name, c in columns.items() if c in names and self.log_columns[names.index(c)]
             }
-            fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
             if len(where) + len(fixed) < len(MATERIAL):
                 continue  # a user's prior that allows negative values: leave this material's columns as they are
-            self.ridges.append(_ridge(where, fixed, sample, problem.likelihood))
+            moved = frozenset({"k2", "B"} & {name for name in where if columns[name] not in shifted})
+            shifted |= {columns[name] for name in moved}
+            if moved:
+                self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood))
 
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
@@ -91,10 +107,12 @@ class Coordinates:
             z[:, i] = at.score(theta[:, i])
         for ridge in self.ridges:
             creep, hazard = self._shifts(theta, ridge)
-            if "k2" in ridge.where:
+            if "k2" in ridge.shifted:
                 z[:, ridge.where["k2"]] += hazard
-            if "B" in ridge.where:
+            if "B" in ridge.shifted:
                 z[:, ridge.where["B"]] += creep
+        if self.specimens is not None:
+            z[:, self.specimens.own] = self.specimens.to_sampled(theta)
         return z
 
     def to_natural(self, z: Array) -> Array:
@@ -105,10 +123,12 @@ class Coordinates:
         with np.errstate(over="ignore"):
             theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
             for ridge in self.ridges:
-                if "k2" in ridge.where:
+                if "k2" in ridge.shifted:
                     theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
-                if "B" in ridge.where:
+                if "B" in ridge.shifted:
                     theta[:, ridge.where["B"]] = np.exp(z[:, ridge.where["B"]] - self._shifts(theta, ridge)[0])
+            if self.specimens is not None:
+                theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
         return theta
 
     def log_jacobian(self, theta: Array) -> Array:
@@ -116,6 +136,8 @@ class Coordinates:
         total = np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum()
         for i, at in self.edges.items():
             total = total + at.log_slope(theta[:, i])
+        if self.specimens is not None:
+            total = total + self.specimens.log_jacobian(theta)
         return np.asarray(total)
 
     def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:
@@ -136,7 +158,14 @@ def _rank(name: str) -> int:
     return _FIRST.index(kind) - len(_FIRST) if kind in _FIRST else int(kind in _LAST)
 
 
-def _ridge(where: dict[str, int], fixed: dict[str, float], sample: Sample, likelihood: str) -> _Ridge:
+def _ridge(
+    where: dict[str, int],
+    fixed: dict[str, float],
+    shifted: frozenset[str],
+    steepest: float,
+    sample: Sample,
+    likelihood: str,
+) -> _Ridge:
     recorded = np.flatnonzero(sample.protocol.recorded)
     first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
     # a slack wire drives no creep; a small share of the largest tension stands in for it
@@ -146,7 +175,7 @@ def _ridge(where: dict[str, int], fixed: dict[str, float], sample: Sample, likel
     times, which = np.unique(np.where(duration > 0, duration, hold_s), return_inverse=True)
     kept = 1.0 if sample.model.history == "saturating" and likelihood == "chain" else 0.0
     length = sample.model.length_ref_mm or sample.protocol.length_mm
-    return _Ridge(where, fixed, np.log(tension), times, which, kept, hold_s, float(np.log(length)))
+    return _Ridge(where, fixed, shifted, steepest, np.log(tension), times, which, kept, hold_s, float(np.log(length)))
 
 
 def _spread(distribution: Any) -> float:

@@ -5,7 +5,8 @@ every parameter
 
 - the effective sample size, from the spread of the walkers' means, is at least `Policy.ess`,
 - the kept steps span five autocorrelation times, and
-- the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`,
+- the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`, and
+- no place that matters outweighs a pool of draws of the frozen proposal (`wirebayes.bayes.burn_in.overlooked`),
 
 or until `Policy.most_steps`: then the result says *not converged*, and why. Where a first look promises that another
 proposal would be done sooner, what was kept counts as burn-in, and teaches that one.
@@ -24,7 +25,7 @@ from wirebayes.bayes.convergence import ENOUGH, autocorrelation_steps, nested_r_
 from wirebayes.bayes.coordinates import Target
 from wirebayes.bayes.optimum import Optimum
 from wirebayes.bayes.policy import DEFAULT, Policy
-from wirebayes.bayes.walkers import State, advance
+from wirebayes.bayes.walkers import POOL, State, advance
 
 Array = NDArray[Any]
 
@@ -109,7 +110,7 @@ def sample(
         else:
             _kept_block(target, state, policy)
             _look(target, state, policy)
-            if not state.finished and not state.again and _promises_more(state, policy):
+            if not state.finished and (_doubtful(state) or not state.again and _promises_more(state, policy)):
                 burn_in.learn_again(target, state, policy)
             progress(min(1.0, 0.2 + 0.8 * float(state.ess.min()) / policy.ess))
         state.save(checkpoint)
@@ -157,10 +158,22 @@ def _look(target: Target, state: State, policy: Policy) -> None:
     state.ess = values.shape[0] * steps * values.shape[2] / state.autocorrelation
     state.r_hat = nested_r_hat(values)
     long_enough = steps >= ENOUGH * state.autocorrelation.max()
+    state.overlooked = 0.0
     if long_enough and (state.ess >= policy.ess).all() and (state.r_hat <= policy.r_hat).all():
-        state.finished, state.converged = True, True
-        least, most = float(state.ess.min()), float(state.r_hat.max())
-        state.why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
+        if state.learned:
+            some = slice(None, None, 1 + z[..., 0].size // _WEIGHED)
+            places, heights = (np.concatenate(kept) for kept in (state.kept_z, state.kept_log_density))
+            state.overlooked = burn_in.overlooked(state, places.reshape(-1, d)[some], heights.ravel()[some])
+        if state.overlooked <= OUTWEIGHS:
+            state.finished, state.converged = True, True
+            least, most = float(state.ess.min()), float(state.r_hat.max())
+            state.why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
+        elif state.again >= _MOST_AGAIN:
+            state.finished = True
+            state.why = (
+                f"not converged after {steps} steps: the proposal makes too little of some places, by a factor of "
+                f"e^{state.overlooked:.1f} (allowed e^{OUTWEIGHS:.1f}); a narrow neck or a far mode may be missing"
+            )
     elif steps >= policy.most_steps:
         names = target.problem.names
         worst = names[int(np.argmin(state.ess))]
@@ -169,6 +182,11 @@ def _look(target: Target, state: State, policy: Policy) -> None:
             f"not converged after {steps} steps: {worst} has ESS {state.ess.min():.0f} (wanted {policy.ess:.0f}), "
             f"largest nested R-hat {state.r_hat.max():.4f} (allowed {policy.r_hat})"
         )
+
+
+def _doubtful(state: State) -> bool:
+    """Whether draws would be enough, were it not for places that the proposal overlooks."""
+    return state.overlooked > OUTWEIGHS
 
 
 def _promises_more(state: State, policy: Policy) -> bool:
@@ -182,4 +200,7 @@ def _promises_more(state: State, policy: Policy) -> bool:
 
 
 _LEAST_BLOCK = 8
+OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
+_WEIGHED = 16384  # kept draws whose weights are looked at
+_MOST_AGAIN = 5  # times that the proposal may be learned once more for what it overlooks
 _USUAL, _POOR = 0.4, 0.2  # effective draws per kept evaluation

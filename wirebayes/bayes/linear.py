@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.bayes import noise
-from wirebayes.bayes.prior import Prior
 from wirebayes.bayes.problem import Problem
 from wirebayes.wire.staircase import simulate
 
@@ -105,7 +104,7 @@ def integrated(problem: Problem) -> Problem:
         for s in problem.samples
     )
     return Integrated(
-        samples, Prior(left, problem.prior.fixed, problem.prior.logarithmic), "chain", problem,
+        samples, replace(problem.prior, distributions=left), "chain", problem,
         tuple(np.array(gone)[shows]), tuple(s[..., shows] for s in shapes),
         np.array([p.mean() for p in priors])[shows], np.array([p.std() for p in priors])[shows],
     )  # fmt: skip

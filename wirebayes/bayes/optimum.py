@@ -22,6 +22,8 @@ _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
 _WARM_STEPS = 4  # the last ones of the cooling
 _LEAST_SAG = 1.0  # nats
+_LOOKS = 12  # at most, for modes that explain places left over
+_MANY = 2  # new modes in one look: there may be more
 _ONE_MODE = 4.0  # squared standard deviations
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
@@ -182,11 +184,14 @@ class Search:
         The distinct modes, best first.
     warm, cold : (n, d) arrays
         Rough draws of the density to some power below one, and of the density itself.
+    height : (n,) array
+        Log densities of the cold ones.
     """
 
     modes: Optimum
     warm: Array
     cold: Array
+    height: Array
 
 
 def search(
@@ -197,7 +202,8 @@ def search(
     Prior draws are annealed to the posterior. Half of the starts, the highest place among them, are spread
     over all places it passed: where it ends, a mode of less weight may have died out, but on the way it lived. The
     others are chosen among passed places that belong to the hill of no mode found from these; such a climb is given up
-    where it comes so near to a known mode that it would count as that one.
+    where it comes so near to a known mode that it would count as that one. Where they find several modes, more are
+    looked for in the same way.
 
     Parameters
     ----------
@@ -206,28 +212,32 @@ def search(
     draws : int
         Of the prior.
     starts : int
-        The most climbs.
+        Half of them climb first, and half at every further look.
     extra : (m, d) array, optional
         Further starts, in sampled coordinates.
     """
     z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
     value = target(z)
     passed, height = _cooled(target, z, value, rng)
-    warm, cold = passed[-_WARM_STEPS * draws :], passed[-draws:]
+    warm, cold, cold_height = passed[-_WARM_STEPS * draws :], passed[-draws:], height[-draws:]
     width = passed.std(axis=0)
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
     start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
     found = _distinct([climb(lambda points, rows: target(points), start)])
     looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
-    sag = _sag(target, passed, height, found)
-    strange = np.flatnonzero(sag > _LEAST_SAG)
-    if len(strange):
+    for _ in range(_LOOKS):
+        sag = _sag(target, passed, height, found)
+        strange = np.flatnonzero(sag > _LEAST_SAG)
+        if not len(strange):
+            break
         share = sag[strange] / sag[strange].sum()
         chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
-        known = partial(_near, modes=found.z, curvature=found.curvature)
+        known, before = partial(_near, modes=found.z, curvature=found.curvature), len(found.z)
         found = _distinct([found, climb(lambda points, rows: target(points), passed[chosen], until=known)])
-    return Search(found, warm, cold)
+        if len(found.z) < before + _MANY:
+            break
+    return Search(found, warm, cold, cold_height)
 
 
 def _sag(target: Target, z: Array, height: Array, found: Optimum) -> Array:

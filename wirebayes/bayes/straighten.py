@@ -102,11 +102,13 @@ def fit(x: Array, order: NDArray[np.int64]) -> Straight:
     v = (x - centre) / scale
     constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
     clear = _CLEAR * np.sqrt(n / len(np.unique(x[:, 0])))  # rows that repeat know no more
-    bends = d**3 / 6.0 < n / _POINTS_A_TERM
+    every = d**3 / 6.0 < n / _POINTS_A_TERM
     spread, left = np.zeros((n, d)), np.zeros((n, d))
     for j in range(d):
         lines = np.column_stack([np.ones(n), v[:, :j]])
-        one, other = np.triu_indices(j if bends else 0)
+        one, other = np.triu_indices(j if every or d > _FEW else 0)
+        if not every and d > _FEW:
+            one, other = _seen_at_once(v, lines, one, other, v[:, j], clear)
         terms = np.column_stack([lines, v[:, one] * v[:, other]])
         _, _, t = _regress(terms, lines, v[:, j])
         # Far out a bend that is only noise throws everything aside: none without evidence.
@@ -124,6 +126,25 @@ def fit(x: Array, order: NDArray[np.int64]) -> Straight:
         order, centre, scale, v.min(axis=0), v.max(axis=0), constant, linear, quadratic, log_scale,
         spread.min(axis=0), spread.max(axis=0), _shapes(left),
     )  # fmt: skip
+
+
+def _seen_at_once(
+    v: Array, lines: Array, one: NDArray[np.int64], other: NDArray[np.int64], y: Array, clear: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The pairs whose product, alone, clearly explains what straight lines leave of y; the clearest few.
+
+    In many dimensions there are too many pairs to fit all together.
+    """
+    if not len(one):
+        return one, other
+    products = v[:, one] * v[:, other]
+    both, basis = np.column_stack([products, y]), np.linalg.qr(lines)[0]
+    left = both - basis @ (basis.T @ both)
+    size = np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
+    t = np.abs(left[:, :-1].T @ left[:, -1]) / (size[:-1] * size[-1]) * np.sqrt(len(y))
+    best = np.argsort(-t, kind="stable")[:_MOST_PAIRS]
+    best = np.sort(best[t[best] > clear])
+    return one[best], other[best]
 
 
 def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
@@ -176,6 +197,7 @@ def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]
 _POINTS_A_TERM = 20
 _RIDGE = 1e-3
 _CLEAR = 4.0  # standard errors
+_FEW, _MOST_PAIRS = 12, 30  # dimensions in which rough points settle no bends; bends of a coordinate in more
 _ALTERNATIONS = 6
 _SCORES = np.linspace(-2.8, 2.8, 15)
 _SKEWNESSES = np.linspace(-2.0, 2.0, 81)

@@ -40,6 +40,8 @@ class State:
         The proposal was learned a second time, from draws that were to be kept.
     kept_z, kept_log_density : list of arrays
         Blocks (steps, n, d) and (steps, n).
+    overlooked : float
+        What `wirebayes.bayes.burn_in.overlooked` said at the last look, where all else was enough.
     """
 
     positions: Array
@@ -53,7 +55,8 @@ class State:
     round: int = 0
     frozen: bool = False
     learned: bool = True
-    again: bool = False
+    again: int = 0
+    witness: Any = None
     acceptance: float = 0.0
     walks: int = 0
     walk: Any = None
@@ -66,6 +69,7 @@ class State:
     autocorrelation: Any = None
     ess: Any = None
     r_hat: Any = None
+    overlooked: float = 0.0
     finished: bool = False
     converged: bool = False
     why: str = ""
@@ -115,8 +119,8 @@ def _move(state: State, ensembles: int, steps: int) -> Move:
     if not state.learned:
         return EvolutionMove(ensembles)
     straight = state.proposal.straight if isinstance(state.proposal, Proposal) else None
-    return PoolMove(state.proposal, EvolutionMove(ensembles, straight), steps, _POOL if state.frozen else _EXPLORING)
+    return PoolMove(state.proposal, EvolutionMove(ensembles, straight), steps, POOL if state.frozen else _EXPLORING)
 
 
-_POOL = 64  # steps of which one does not trust the proposal; more gain little
+POOL = 64  # steps of which one does not trust the proposal; more gain little
 _EXPLORING = 3  # the same in burn-in, which looks for what the proposal leaves out
