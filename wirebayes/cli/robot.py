@@ -94,6 +94,8 @@ def calibrate(
     seed: Seed = 0,
 ) -> None:
     """Estimate every wire's current zero-tension length from joint values and tensions, without external sensors."""
+    import numpy as np
+
     from wirebayes.errors import InputError
     from wirebayes.output import open_run, read_json, stored_results, write_json
     from wirebayes.robot import schema, session_file
@@ -111,7 +113,9 @@ def calibrate(
     file = run.directory / "calibrate.json"
     if run.state != "done":
         prior = Prior(line, 1e-3 * reference_sd, spread)
-        write_json(file, answer(machine, prior, session, values, seed))
+        with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so below
+            found = answer(machine, prior, session, values, seed)
+        write_json(file, found)
         run.finish()
     models = {"with_creep_model": "the creep model", "by_hooke_alone": "Hooke's law alone"}
     with stored_results(file):

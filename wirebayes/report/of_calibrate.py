@@ -48,6 +48,8 @@ def _unknown(creep: dict[str, Any], hooke: dict[str, Any]) -> Points:
     for name, result in (("the creep model", creep), ("Hooke's law alone", hooke)):
         if not result["converged"]:
             said.append(f"With {name} the search did not converge: do not use its lengths.")
+        if result["misfit"] is None:
+            continue
         fits = "explains" if result["misfit"] < 1.5 else "cannot explain"
         said.append(
             f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
@@ -61,11 +63,11 @@ def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
     lines = [
         [
             str(i + 1),
-            f"{1e3 * mean:.2f}",
-            f"{1e3 * low:.2f} … {1e3 * high:.2f}",
-            f"{1e3 * strain:.2f}",
-            f"{1e3 * plain:.2f}",
-            f"{1e3 * plain_low:.2f} … {1e3 * plain_high:.2f}",
+            _milli(mean),
+            f"{_milli(low)} … {_milli(high)}",
+            _milli(strain),
+            _milli(plain),
+            f"{_milli(plain_low)} … {_milli(plain_high)}",
         ]
         for i, (mean, low, high, strain, plain, plain_low, plain_high) in enumerate(
             zip(a["mean"], a["q05"], a["q95"], creep["creep_strain"], b["mean"], b["q05"], b["q95"], strict=True)
@@ -73,6 +75,11 @@ def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
     ]
     header = ["wire", "length now, mm", "90 %", "creep strain, mm per m", "Hooke's law alone, mm", "90 %"]
     return Table(header, lines, "Zero-tension length of every wire when the last hold ended, creep included.")
+
+
+def _milli(value: float | None) -> str:
+    """Thousandths; a search that did not converge may leave none."""
+    return "–" if value is None else f"{1e3 * value:.2f}"
 
 
 def _next(found: dict[str, Any]) -> list[Block]:

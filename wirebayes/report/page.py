@@ -32,7 +32,8 @@ def write(folder: Path) -> Path:
         The folder is not one that a command of ours has written.
     """
     path = folder / "report.html"
-    content = render(tell(folder))
+    with stored_results(folder):
+        content = render(tell(folder))
     check_file(path)
     write_text(path, content)
     return path

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from wirebayes.linear_algebra import inv, solve
 from wirebayes.robot import inverse
 from wirebayes.robot.calibration_start import start
 from wirebayes.robot.description import Robot
@@ -80,28 +81,30 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
     cost = _cost(here, readings, white)
     converged, damping = np.zeros(m, bool), np.full(m, 1e-3)
     J = np.zeros((m, readings.shape[1], d))
+    moved = np.ones(m, bool)
     for _ in range(iterations):
-        open_ = np.flatnonzero(~converged)
-        J[open_] = derivatives(robot, prior, session, mean, root, white[open_], _part(here, open_))[0]
+        open_ = np.flatnonzero(~converged & moved)  # where a step failed, the derivatives stay: they are the work
+        if len(open_):
+            J[open_] = derivatives(robot, prior, session, mean, root, white[open_], _part(here, open_))[0]
         normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
         slope = np.einsum("mrd,mr->md", J, readings - here.readings) - white
         # What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached.
-        decrement = np.einsum("md,md->m", slope, np.linalg.solve(normal, slope[..., None])[..., 0])
+        decrement = np.einsum("md,md->m", slope, solve(normal, slope[..., None])[..., 0])
         # A mode on the edge of slackness has no zero slope; there, no step however short improves.
         converged |= (decrement < 1e-3) | (damping > 1e8)
         if converged.all():
             break
         ridge = damping[:, None, None] * np.einsum("mdd->md", normal)[:, None] * np.eye(d)
-        step = np.linalg.solve(normal + ridge, slope[..., None])[..., 0]
+        step = solve(normal + ridge, slope[..., None])[..., 0]
         step[converged] = 0.0
         there = predict(robot, prior, session, mean + (white + step) @ root.T, near=(here.begun_m, here.begun_rotation))
         new = _cost(there, readings, white + step)
         better = new < cost - 1e-9 * np.where(np.isfinite(cost), cost, 0.0)
-        white = np.where(better[:, None], white + step, white)
+        white, moved = np.where(better[:, None], white + step, white), better
         damping = np.where(better, damping / 10, damping * 10)
         here, cost = _pick(better, there, here), np.where(better, new, cost)
     J, G = derivatives(robot, prior, session, mean, root, white, here)
-    spread = np.linalg.inv(np.swapaxes(J, 1, 2) @ J + np.eye(d))
+    spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(d))
     variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
     misfit = ((readings - here.readings) ** 2).mean(1)
     return Calibration(

@@ -7,6 +7,7 @@ almost linear in pose and lengths, and every pose must balance the measured tens
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.linear_algebra import solve
 from wirebayes.robot import inverse, rotation, statics
 from wirebayes.robot.description import Robot
 from wirebayes.robot.session import Prior, Session, predict
@@ -56,18 +57,19 @@ def start(robot: Robot, prior: Prior, session: Session, readings: Floats, iterat
         A = by_pose.swapaxes(1, 2) @ by_pose + 1e-9 * np.eye(d)
         B = by_pose.swapaxes(1, 2) @ by_length
         f = by_pose.swapaxes(1, 2) @ residual[..., None]
-        solved = np.linalg.solve(A, np.concatenate([B, f], 2))
+        solved = solve(A, np.concatenate([B, f], 2))
         left = by_length.swapaxes(1, 2) @ by_length - B.swapaxes(1, 2) @ solved[..., :legs]
         right = by_length.swapaxes(1, 2) @ residual[..., None] - B.swapaxes(1, 2) @ solved[..., legs:]
         total = left.reshape(m, q, legs, legs).sum(1) + np.eye(legs) / prior.reference_sd_m**2
         pull = right.reshape(m, q, legs).sum(1) + o / prior.reference_sd_m**2
-        change = -np.linalg.solve(total, pull[..., None])[..., 0]
+        change = -solve(total, pull[..., None])[..., 0]
         o = o + change
         move = -(solved[..., legs:] + solved[..., :legs] @ np.repeat(change, q, 0)[..., None])[..., 0].T * scale
         size = np.abs(move / scale).max(0)
         move *= np.minimum(1.0, 0.1 * robot.size_m / np.maximum(size, 1e-300))
         x = x + move[:3]
         R = rotation.compose(move[3:], R) if d == 6 else R
-        if np.abs(change).max() < 1e-7:
+        if not np.abs(change).max() >= 1e-7:
             break
-    return o
+    # Absurd readings lead nowhere: such a robot starts from its references.
+    return np.where(np.isfinite(o).all(1, keepdims=True), o, 0.0)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.linear_algebra import solve
 from wirebayes.robot import statics
 from wirebayes.robot.description import Robot
 from wirebayes.robot.wires import Wires, tension
@@ -42,7 +43,7 @@ def response(
     _, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
     K = np.stack([np.stack(row, -1) for row in H], -2)
     J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0)
-    motion = np.asarray(-np.linalg.solve(K, J), np.float64)
+    motion = np.asarray(-solve(K, J), np.float64)
     change = slope.T[:, :, None] * (np.swapaxes(J, 1, 2) @ motion) + np.eye(robot.legs)
     # The tension depends on S/ℓ alone under either law, so its slope by ℓ follows from that by S.
     return motion, np.asarray(change), (-slope * S / zero).T
@@ -92,6 +93,9 @@ def observe(change_N: Floats, tension_sd_N: float, prior_sd_m: float) -> Observa
     """
     w = change_N.shape[-1]
     information = (np.swapaxes(change_N, 1, 2) @ change_N).sum(0) / tension_sd_N**2
+    if not np.isfinite(information).all():
+        said = "What the readings show cannot be computed at these poses: nothing holds the platform there."
+        return Observability(0, np.full(w, prior_sd_m), np.full(w, np.nan), np.inf, said)
     values, vectors = np.linalg.eigh(information)
     alone = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     rank = int((alone < 0.1 * prior_sd_m).sum())
@@ -119,7 +123,9 @@ def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: 
     """
     pieces = np.swapaxes(change_N, 1, 2) @ change_N / tension_sd_N**2
     total = np.eye(change_N.shape[-1]) / prior_sd_m**2
-    chosen = []
+    chosen: list[int] = []
+    if not len(pieces):
+        return chosen
     for _ in range(count):
         gain = np.linalg.slogdet(total + pieces)[1]
         chosen.append(int(np.argmax(gain)))

@@ -76,6 +76,9 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
     return session, np.concatenate(readings)
 
 
+_LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
+
+
 def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]:
     if len(row) != len(names):
         raise InputError(f"{path}: line {line}: found {len(row)} cells; expected {len(names)}")
@@ -89,11 +92,11 @@ def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]
             value = float(cell)
         except ValueError:
             value = np.nan
-        allowed, kind = True, "a finite number"
+        allowed, kind = abs(value) < _LARGEST, "a finite number"
         if name == "duration_s":
-            allowed, kind = value > 0, "a number above 0"
+            allowed, kind = 0 < value < _LARGEST, "a number above 0"
         elif name.startswith("tension_"):
-            allowed, kind = value >= 0, "a finite number of at least 0"
+            allowed, kind = 0 <= value < _LARGEST, "a finite number of at least 0"
         elif name in NORMAL:
             allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
         if not np.isfinite(value) or not allowed:
