@@ -165,6 +165,7 @@ BAD_TOML = [
     ("1000.0", "1" * 9999, "line 4, column 13: found a TOML error"),
     ("1000.0", "[" * 9999, "line 4: found values nested too deeply, expected valid TOML"),
     ("length_mm = 1000.0", "length_m = 1.0", "line 4,", "(another unit: 1 m = 1000 mm; convert it to length_mm)"),
+    ("1000.0", "1e-300", "line 4, experiment wire-a, key length_mm: found 1e-300, expected a length above"),
     ("1000.0", "1e300", "line 4, experiment wire-a, key length_mm: found 1e+300, expected a length above"),
     ("resolution_N = 0.01", "resolution_N = 1e300", "line 5, experiment wire-a, key resolution_N: found 1e+300"),
     ("duration_s = 45.0", "duration_s = 1e300", "line 7, experiment wire-a, key unrecorded_holds[0].duration_s: found"),

@@ -122,6 +122,7 @@ class Experiment:
         return hashlib.sha256(json.dumps([content, holds]).encode()).hexdigest()
 
 
+SHORTEST = 1e-3  # mm, below any specimen; strains of far shorter ones overflow
 LEAST_HOLDS, LEAST_READINGS = 2, 5  # stiffness needs a step; level, slope and creep over time need readings
 ENOUGH = f"at least {LEAST_HOLDS} recorded holds and {LEAST_READINGS} readings in all"
 
@@ -256,7 +257,8 @@ def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[
     ):
         raise keys.complain("material", shown(material), expected)
     largest = LARGEST["displacement_mm"]
-    length = keys.number("length_mm", f"a length above 0 mm, at most {largest:.0e} mm", above=0.0, most=largest)
+    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {largest:.0e} mm"
+    length = keys.number("length_mm", expected, least=SHORTEST, most=largest)
     resolution = 0.0
     if "resolution_N" in keys.table:
         most = LARGEST["tension_N"]
