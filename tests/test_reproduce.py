@@ -18,7 +18,8 @@ from wirebayes.reproduce.pictures import stiffest_step
 
 WIRES = {experiment.name: experiment for experiment in paper.experiments()}
 TABLE_4 = paper.published()["table_4"]
-NAMES = ("least_squares", "posterior", "creep", "held_out", "sampling", "measured", "robot", "robot_mass")
+NAMES = ("least_squares", "posterior", "creep", "held_out", "sampling", "measured", "robot", "robot_mass",
+         "robot_claim")  # fmt: skip
 
 
 def test_contraction_is_the_ratio_of_widths_on_a_logarithmic_scale():

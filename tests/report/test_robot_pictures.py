@@ -1,6 +1,8 @@
 import numpy as np
 
 from wirebayes.report.robot import _edges
+from wirebayes.report.robot_space import workspace_map
+from wirebayes.robot.claim import WorkspaceDrift
 
 
 def test_the_platform_is_drawn_by_the_edges_of_its_hull():
@@ -14,3 +16,14 @@ def test_a_flat_platform_is_a_polygon_and_a_point_is_none():
     assert {tuple(sorted(pair)) for pair in _edges(triangle)} == {(0, 1), (0, 2), (1, 2)}
     assert list(_edges(np.zeros((4, 3)))) == []
     assert list(_edges(np.array([[0, 0, 0], [1.0, 0, 0], [2, 0, 0]]))) == []
+
+
+def test_a_flat_workspace_is_mapped_in_its_own_plane():
+    x, z = (v.ravel() for v in np.meshgrid([0.0, 0.1, 0.2], [0.5, 0.6], indexing="ij"))
+    for flat, across in ((1, "x"), (0, "y")):
+        where = np.insert(np.column_stack([x, z]), flat, 7.0, axis=1)
+        drift = np.arange(6.0)[:, None] * np.array([[1e-3, np.nan, 1e-3]])
+        figure = workspace_map(WorkspaceDrift(where, drift, 0 * drift, np.ones((6, 2)), 1.0, 1.0))
+        (panel,) = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]  # nothing tilts: no second row
+        assert (panel.get_xlabel(), panel.get_ylabel()) == (f"{across}, m", "z, m")
+        np.testing.assert_allclose(panel.collections[0].get_array().ravel(), [0, 2, 4, 1, 3, 5])

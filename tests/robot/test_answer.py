@@ -96,3 +96,16 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
     said = draws.warnings(line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
     assert len(said) == 1
     assert "could not name" in said[0]
+
+
+def test_tilt_is_told_against_the_commanded_normal_and_against_the_vertical():
+    from wirebayes.robot.rotation import matrix
+
+    robot = schema.read("cogiro-desk")
+    leaning = matrix(np.array([0.05, 0.0, 0.3]))
+    drift = answer(robot, _line(40, 800.0), Question(robot.home_m, leaning, TIMES)).content["drift"][0]
+    away = np.degrees(np.arccos(leaning[2, 2]))
+    assert drift["tilt_deg"]["q95"][0] < 1e-6
+    assert 0 < drift["tilt_deg"]["q50"][1] < 0.5
+    np.testing.assert_allclose(drift["from_vertical_deg"]["q50"], away, atol=0.5)
+    assert drift["from_vertical_deg"]["q50"][0] == pytest.approx(away, abs=1e-6)

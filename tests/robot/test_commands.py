@@ -78,13 +78,13 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     assert (out[0] / "robot.png").stat().st_size > 1000
 
 
-def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path):
+def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
     out = tmp_path / "far"
     arguments = ["pose", "linear-6", "--wires", str(fitted), "--output", str(out), "--position", "5,0,0.6"]
     assert main(arguments) == 0
     said = json.loads((out / "pose.json").read_text())
     assert not said["feasible"]
-    assert "sentence" in said
+    assert said["sentence"] in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -120,6 +120,58 @@ def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
     (tmp_path / "posterior.nc").write_text("not netcdf")
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
     assert "posterior.nc" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["pose", "linear-6"], ["export", "hangprinter-4"]])
+def test_a_fit_hold_by_hold_is_refused_for_it_leaves_k1_open(fitted, tmp_path, monkeypatch, capsys, command):
+    from dataclasses import replace
+
+    from wirebayes.bayes import result
+
+    stored = replace(result.load(fitted), likelihood="hold")
+    monkeypatch.setattr("wirebayes.bayes.result.load", lambda folder, experiment=None, own_effects=None: stored)
+    assert main([*command, "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
+    line = capsys.readouterr().err.strip()
+    assert "does not determine the stiffness k1" in line
+    assert "\n" not in line
+    assert not (tmp_path / "o").exists()
+
+
+PLOTTER = """version = 1
+name = "plotter"
+description = "two wires in a vertical plane"
+source = "made up"
+freedom = "position"
+[platform]
+mass_kg = 0.4
+[tension]
+choice = "minimum_norm"
+lowest_N = 0.1
+highest_N = 60.0
+[pose]
+position_m = [0.0, 0.0, 0.6]
+[workspace]
+lower_m = [-0.4, 0.0, 0.3]
+upper_m = [0.4, 0.0, 0.9]
+"""
+CORNERS = ((-0.6, 1.4), (0.6, 1.4), (-0.6, 0.0), (0.6, 0.0))
+
+
+@pytest.mark.parametrize("legs", [2, 4])
+def test_a_robot_in_a_vertical_plane_is_a_robot(fitted, tmp_path, legs):
+    text = PLOTTER.replace("lowest_N = 0.1", "lowest_N = 1.0") if legs == 4 else PLOTTER
+    for x, z in CORNERS[:legs]:
+        text += f"[[leg]]\nexit_point_m = [{x}, 0.0, {z}]\nplatform_point_m = [0.0, 0.0, 0.0]\n"
+    file, out = tmp_path / "plotter.toml", tmp_path / "out"
+    file.write_text(text)
+    assert main(["pose", str(file), "--wires", str(fitted), "--output", str(out), "--times", "0,60"]) == 0
+    said = json.loads((out / "pose.json").read_text())
+    assert said["forward"]["solved"] == 1.0
+    assert [p["commanded"] for p in said["equilibria"]["poses"]] == [True]
+    assert said["workspace"]["feasible"] == 1.0
+    assert (out / "workspace.png").is_file()
+    assert not (out / "rotation.png").exists()  # parallel lines: nothing turns
+    assert main(["report", str(out)]) == 0
 
 
 @pytest.fixture

@@ -16,7 +16,13 @@ def read_wires(folder: Path, count: int, experiment: str | None = None, own_effe
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / "posterior.nc").is_file():
         raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
-    return wire_draws(load(folder, experiment, own_effects), count)
+    stored = load(folder, experiment, own_effects)
+    if stored.likelihood == "hold":
+        raise InputError(
+            f"{folder}: found a fit with --likelihood hold, which does not determine the stiffness k1; expected one "
+            "with --likelihood chain, for a robot needs k1"
+        )
+    return wire_draws(stored, count)
 
 
 def wire_draws(stored: "Stored", count: int) -> "WireDraws":

@@ -18,7 +18,7 @@ from wirebayes.bayes.result import Stored, load
 from wirebayes.experiment import Experiment
 from wirebayes.output import open_run, write_csv, write_json
 from wirebayes.report.page import write as write_page
-from wirebayes.reproduce import identification, pictures, section_4, verdicts
+from wirebayes.reproduce import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.reproduce.held_out import HeldOut, held_out
 from wirebayes.workers import workers
 
@@ -139,6 +139,8 @@ def _tables_and_pictures(
     report("tables and pictures", 2, 3)
     robot = section_4.rows(chains, seed)
     write_table(directory, "robot", robot)
+    lines, lengths = {n: section_4.as_line(c) for n, c in chains.items()}, {e.name: e.length_mm for e in experiments}
+    write_table(directory, "robot_claim", claim_steps.rows(section_4.MAPPED, table_4, lengths, lines))
     write_table(directory, "robot_mass", section_4.needed(chains))
     limit_mm = published["pose_claim"]["centre_moves_less_than_mm"]
     section_4.draw(drawn, robot, limit_mm)

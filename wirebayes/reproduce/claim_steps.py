@@ -1,0 +1,67 @@
+"""The paper's claim taken apart: from its own parameters, read as printed, to what the chain says of a workspace."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from wirebayes.robot import claim, draws, drift, schema
+from wirebayes.robot.description import Robot
+from wirebayes.robot.draws import WireDraws
+from wirebayes.robot.rotation import matrix
+from wirebayes.robot.wires import Wires
+
+STEPS = ("table_4_elongation", "table_4_strain", "chain_strain", "chain_workspace")
+_GRID = (3, 3, 2)
+
+
+def rows(
+    robot_name: str,
+    table_4: Mapping[str, Mapping[str, float]],
+    lengths_mm: Mapping[str, float],
+    chains: Mapping[str, WireDraws],
+) -> list[dict[str, Any]]:
+    """Drift within a minute for each wire and step, one thing changed a step.
+
+    Table 4's parameters with eq. (5) as printed, which gives every wire of the robot the elongation of the tested
+    sample whatever its length; the same with creep as a strain of the whole wire; the chain's posterior instead of
+    Table 4; the workspace instead of the home pose.
+
+    Parameters
+    ----------
+    robot_name : str
+        Of a shipped robot.
+    table_4 : mapping of wire to parameters
+    lengths_mm : mapping of wire to tested length
+    chains : mapping of wire to WireDraws
+
+    Returns
+    -------
+    list of rows
+        Median drift, mm, its 5 and 95 % quantiles over draws (and poses), and whether the median is within the claim.
+    """
+    robot = schema.read(robot_name)
+    out = []
+    for wire, line in chains.items():
+        given = WireDraws({k: np.array([table_4[wire][k]]) for k in draws.CORE}, lengths_mm[wire])
+        strain = draws.for_robot(robot, given)
+        literal = replace(strain, length_mm=1e3 * draws.nominal_length(robot)[:, None])
+        known = draws.for_robot(robot, line)
+        space = claim.over_workspace(robot, known, claim.grid(robot, _GRID))
+        drifts = (*(_at_home(robot, wires) for wires in (literal, strain, known)), 1e3 * space.distance_m.ravel())
+        for step, drift_mm in zip(STEPS, drifts, strict=True):
+            low, middle, high = np.nanquantile(drift_mm, [0.05, 0.5, 0.95])
+            within = bool(middle < 1e3 * claim.DISTANCE_M)
+            out.append({
+                "experiment": wire, "robot": robot_name, "step": step, "q05_drift_mm": float(low),
+                "q50_drift_mm": float(middle), "q95_drift_mm": float(high), "within_claim": within,
+            })  # fmt: skip
+    return out
+
+
+def _at_home(robot: Robot, wires: Wires) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Drift of new wires at the home pose, mm, a value a draw."""
+    x, R = robot.home_m, matrix(robot.home_rotation_rad)
+    course = drift.from_command(robot, wires, x, R, np.array([claim.TIME_S]))
+    return np.asarray(1e3 * np.linalg.norm(course.position_m[:, 0] - x, axis=-1))
