@@ -27,21 +27,23 @@ from typing import Any
 import numpy as np
 
 from analyses.hidden_effects.truth import draw_wire
-from wirebayes.bayes.fit import seed_of
-from wirebayes.bayes.jobs import Job, one
-from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.result import CREEP_TIMES_S, Stored, load
 from wirebayes.cli.wires import wire_draws
-from wirebayes.discrepancy.discover import final_models, investigate
-from wirebayes.discrepancy.question import read_question
-from wirebayes.discrepancy.settings import Settings
-from wirebayes.discrepancy.table import table as predicted_table
+from wirebayes.discovery.search import final_models, investigate
+from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE
-from wirebayes.experiment import Experiment, read_experiments
-from wirebayes.output import write_csv
-from wirebayes.robot import claim, export, inverse, schema
-from wirebayes.robot.draws import WireDraws, for_robot
-from wirebayes.simulate import Bench, Simulated, Truth, draw, write
+from wirebayes.inference.fit import seed_of
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.run_folder import write_csv
+from wirebayes.prediction.request import read_question
+from wirebayes.prediction.table import table as predicted_table
+from wirebayes.results.jobs import Job, one
+from wirebayes.results.store import CREEP_TIMES_S, Stored, load
+from wirebayes.robot.export import files
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.motion import claim, inverse
+from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw, write
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import simulate
@@ -163,7 +165,7 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
     robot = schema.read("hangprinter-4")
     low, high = line.tension_range_N or (1.0, 1.0)
     loads = [float(np.sqrt(low * high)), high]
-    tables = [export.creep_table(robot, line, loads, TIMES_S), export.creep_table(robot, real, loads, TIMES_S)]
+    tables = [files.creep_table(robot, line, loads, TIMES_S), files.creep_table(robot, real, loads, TIMES_S)]
     for row, exact in zip(*tables, strict=True):
         add("export", f"{row[1]:g} s", exact[5], row[4], row[6])
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.bayes.fit import fit, seed_of
-from wirebayes.bayes.noise import chain, reading_variance
-from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.problem import MATERIAL, Problem
-from wirebayes.output import write_json
-from wirebayes.simulate import Bench, Simulated, Truth, draw
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.policy import Policy
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.noise import chain, reading_variance
+from wirebayes.model.problem import MATERIAL, Problem
+from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw
 from wirebayes.wire.staircase import linearise
 
 Array = Any

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes import paper
-from wirebayes.discrepancy import gap
-from wirebayes.discrepancy.block import fitted
-from wirebayes.discrepancy.discover import final_models, investigate
-from wirebayes.discrepancy.settings import Settings
+from wirebayes.discovery import gap
+from wirebayes.discovery.search import final_models, investigate
+from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.io import paper
 
 TRAIN = {"roc-line-1m": 8, "roc-line-1.71m": 8, "nylon-1.5m": 8, "kite-1.5m": 5}
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.bayes.fit import fit, seed_of
-from wirebayes.bayes.problem import build
-from wirebayes.discrepancy.compare import told
-from wirebayes.discrepancy.heldout import held_out, train_counts
-from wirebayes.paper import experiments
-from wirebayes.report import compare as pictures
+from wirebayes.comparison.compare import told
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
+from wirebayes.prediction.held_out import held_out, train_counts
+from wirebayes.report.pictures import compare as pictures
 
 SEED = 0
 

@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from wirebayes.bayes.fit import fit, seed_of
-from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.prior import Prior
-from wirebayes.bayes.problem import Problem, build
-from wirebayes.bayes.replicate import readings
-from wirebayes.discrepancy.heldout import LEVELS, held_out
-from wirebayes.paper import experiments
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.policy import Policy
+from wirebayes.io.paper import experiments
+from wirebayes.model.prior import Prior
+from wirebayes.model.problem import Problem, build
+from wirebayes.model.replicate import readings
+from wirebayes.prediction.held_out import LEVELS, held_out
 from wirebayes.workers import workers
 
 WIRES = {

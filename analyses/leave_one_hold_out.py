@@ -9,12 +9,12 @@ import argparse
 
 import numpy as np
 
-from wirebayes.bayes.fit import fit, seed_of
-from wirebayes.discrepancy.candidates import BASE, Candidate, candidates, effects_of, problem_of
-from wirebayes.discrepancy.loho import LARGEST_K, loho
+from wirebayes.comparison.candidates import BASE, Candidate, candidates, effects_of, problem_of
 from wirebayes.effects import catalogue
-from wirebayes.experiment import select
-from wirebayes.paper import experiments
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.io.experiment import select
+from wirebayes.io.paper import experiments
+from wirebayes.prediction.leave_one_hold_out import LARGEST_K, loho
 
 SEED = 0
 MODELS = ("exponential", "additive", "modified_hooke", "independent_errors", "hooke_without_creep", "strain_stiffening")

@@ -23,12 +23,12 @@ from scipy import stats
 
 from analyses.hidden_effects.rig import Rig
 from analyses.hidden_effects.truth import draw_rig
-from wirebayes.bayes.fit import seed_of
-from wirebayes.bayes.jobs import Job
-from wirebayes.discrepancy.model_check import check_model
+from wirebayes.discovery.model_check import check_model
 from wirebayes.effects import CATALOGUE
-from wirebayes.experiment import Experiment, read_experiments
-from wirebayes.simulate import Bench, Truth, write
+from wirebayes.inference.fit import seed_of
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.results.jobs import Job
+from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect, EventEffect
 
 KINDS = ("chain", "additive", "together", "effect")

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes import paper
-from wirebayes.bayes.result import load
-from wirebayes.report import figures, paper_figures
+from wirebayes.io import paper
+from wirebayes.report import figures
+from wirebayes.report.pictures import paper_figures
 from wirebayes.reproduce.held_out import held_out
+from wirebayes.results.store import load
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
 

@@ -15,8 +15,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.robot import cases
-from wirebayes.robot import forward, rotation, schema, statics
-from wirebayes.robot.mujoco_model import settle
+from wirebayes.robot.export.mujoco_model import settle
+from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.motion import forward
 
 
 def distance(robot, x, R, y, Q):

@@ -14,9 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.robot import draws, forward, inverse, observability, rotation, schema
-from wirebayes.robot.calibration import calibrate, corrected
-from wirebayes.robot.session import Prior, Session, predict
+from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration.estimate import calibrate, corrected
+from wirebayes.robot.self_calibration.session import Prior, Session, predict
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
 POSES, CANDIDATES, TESTS = 10, 200, 6

@@ -1,6 +1,6 @@
 """Proofs on every shipped robot: share of poses certified, time each, and enclosures beside sampled bands.
 
-    python analyses/robot_certificate.py [--poses 24] [--wires FOLDER]
+python analyses/robot_certificate.py [--poses 24] [--wires FOLDER]
 """
 
 import argparse
@@ -14,9 +14,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.robot import cases
-from wirebayes.robot import draws, drift, inverse, proofs, schema
-from wirebayes.robot.certificate import certify
-from wirebayes.robot.enclosure import enclose
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.motion import drift, inverse
+from wirebayes.robot.proof import proofs
+from wirebayes.robot.proof.certificate import certify
+from wirebayes.robot.proof.enclosure import enclose
 
 
 def shares(poses, rng):

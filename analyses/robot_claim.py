@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.cli.wires import read_wires
-from wirebayes.robot import claim, draws, schema
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.motion import claim
 
 LINES = ("roc-line-1m", "roc-line-1.71m", "nylon-1.5m", "kite-1.5m")
 ROBOTS = ("linear-6", "linear-7", "cogiro-desk", "segesta-8")

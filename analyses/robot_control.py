@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.cli.wires import read_wires
-from wirebayes.robot import control, draws, inverse, schema
-from wirebayes.robot.creep import HoldCreep, fresh
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.motion import control, inverse
+from wirebayes.robot.motion.creep import HoldCreep, fresh
 
 LINES = ("roc-line-1m", "roc-line-1.71m", "nylon-1.5m", "kite-1.5m")
 ROBOTS = ("linear-7", "cogiro-desk", "segesta-8", "hangprinter-4")

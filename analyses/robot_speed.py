@@ -11,8 +11,9 @@ import time
 import numpy as np
 from scipy.optimize import root
 
-from wirebayes.robot import draws, drift, forward, inverse, rotation, schema
-from wirebayes.robot.description import GRAVITY
+from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.mechanics.description import GRAVITY
+from wirebayes.robot.motion import drift, forward, inverse
 
 SOLVES, SCIPY_SOLVES, REPEATS = 20_000, 200, 4
 

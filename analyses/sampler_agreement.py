@@ -7,9 +7,9 @@ Scale parameters are compared as logarithms.
 
 import numpy as np
 
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.problem import build
-from wirebayes.paper import experiments
+from wirebayes.inference.fit import fit
+from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
 
 SEEDS = range(100, 112)
 

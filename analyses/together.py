@@ -10,13 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from wirebayes.bayes.fit import Fit, fit, seed_of
-from wirebayes.bayes.identifiability import identifiability
-from wirebayes.bayes.pooling import SPREAD, pooled
-from wirebayes.bayes.problem import LENGTH_EXPONENT, MATERIAL, Problem, build
-from wirebayes.discrepancy.loho import LeftOut, loho
 from wirebayes.effects import named
-from wirebayes.paper import experiments
+from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.io.paper import experiments
+from wirebayes.model.pooling import SPREAD, pooled
+from wirebayes.model.problem import LENGTH_EXPONENT, MATERIAL, Problem, build
+from wirebayes.prediction.leave_one_hold_out import LeftOut, loho
+from wirebayes.results.identifiability import identifiability
 
 SEED = 0
 

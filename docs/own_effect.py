@@ -3,9 +3,9 @@
 import numpy as np
 from scipy import stats
 
-from wirebayes import paper
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.problem import build
+from wirebayes.inference.fit import fit
+from wirebayes.io import paper
+from wirebayes.model.problem import build
 from wirebayes.wire.effect import Amplitude, Effect
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from wirebayes import paper
-from wirebayes.bayes.policy import Policy
+from wirebayes.inference.policy import Policy
+from wirebayes.io import paper
 from wirebayes.reproduce import run
 
 POLICY = Policy(walkers=32, ess=300.0, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from wirebayes.experiment import Experiment
-from wirebayes.readings import frozen
-from wirebayes.simulate import Bench, Truth, draw
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import frozen
+from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 
 def simulated_tests(benches: Sequence[Bench], truth: Truth, seed: int) -> list[Experiment]:

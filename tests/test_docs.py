@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from wirebayes.cli import COMMANDS, main
-from wirebayes.experiment import read_experiments
+from wirebayes.io.experiment import read_experiments
 from wirebayes.wire.staircase import Model, simulate
 
 DOCS = Path(__file__).parent.parent / "docs"

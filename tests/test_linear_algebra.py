@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wirebayes.bayes import noise
-from wirebayes.discrepancy.predictive import _regressed
 from wirebayes.linear_algebra import eigh, inv, solve
+from wirebayes.model import noise
+from wirebayes.prediction.predictive import _regressed
 from wirebayes.wire.staircase import Linearised
 
 RNG = np.random.default_rng(0)

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from wirebayes import __version__, paper
+from wirebayes import __version__
 from wirebayes.cli import COMMANDS
+from wirebayes.io import paper
 
 ROOT = Path(__file__).parent.parent
 USE = (
-    "import wirebayes.paper as p; from pathlib import Path;"
+    "import wirebayes.io.paper as p; from pathlib import Path;"
     "print([int(e.protocol().mask.sum()) for e in p.experiments()], p.published()['table_4']['nylon-1.5m']['k1'],"
     "(p.FOLDER.parent / 'robots').is_dir(), p.FOLDER)"
 )

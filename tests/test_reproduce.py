@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from tests import light
-from wirebayes import paper, workers
-from wirebayes.bayes import jobs
-from wirebayes.bayes.least_squares import Variant, at, residuals
+from wirebayes import workers
 from wirebayes.cli import main
+from wirebayes.inference.least_squares import Variant, at, residuals
+from wirebayes.io import paper
 from wirebayes.reproduce import verdicts
 from wirebayes.reproduce.held_out import HeldOut, published_course
 from wirebayes.reproduce.pictures import stiffest_step
+from wirebayes.results import jobs
+from wirebayes.results.contraction import contraction
 
 WIRES = {experiment.name: experiment for experiment in paper.experiments()}
 TABLE_4 = paper.published()["table_4"]
@@ -25,9 +27,9 @@ NAMES = ("least_squares", "posterior", "creep", "held_out", "sampling", "measure
 def test_contraction_is_the_ratio_of_widths_on_a_logarithmic_scale():
     rng = np.random.default_rng(0)
     prior, posterior = np.exp(1.5 * rng.normal(size=200_000)), np.exp(3.0 + 0.3 * rng.normal(size=200_000))
-    assert verdicts.contraction(posterior, prior) == pytest.approx(1 - 0.3 / 1.5, abs=0.005)
-    assert verdicts.contraction(prior, prior) == 0.0
-    assert verdicts.contraction(prior**2, prior) == pytest.approx(-1.0)
+    assert contraction(posterior, prior) == pytest.approx(1 - 0.3 / 1.5, abs=0.005)
+    assert contraction(prior, prior) == 0.0
+    assert contraction(prior**2, prior) == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from wirebayes.readings import OPTIONAL, REQUIRED
+from wirebayes.io.readings import OPTIONAL, REQUIRED
 from wirebayes.units import nearest
 
 COLUMNS = (*REQUIRED, *OPTIONAL)

@@ -1,8 +1,8 @@
 """Ctrl-C and SIGTERM: one line, no process and no unfinished file left behind, and the process is gone.
 
 A signal may arrive anywhere: in an import, in a C extension that swallows exceptions, in a library that prints what it
-was doing. So nothing is raised. Results are written whole (`wirebayes.output`) and fits leave checkpoints, therefore
-there is nothing to unwind: the handler tidies up and ends the process.
+was doing. So nothing is raised. Results are written whole (`wirebayes.io.run_folder`) and fits leave checkpoints,
+therefore there is nothing to unwind: the handler tidies up and ends the process.
 """
 
 import os

@@ -13,11 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from analyses.benchmarks import asked, gradient, measure, model, plain
-from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.optimum import modes
-from wirebayes.bayes.problem import build
-from wirebayes.output import write_json
-from wirebayes.paper import experiments
+from wirebayes.inference.modes import modes
+from wirebayes.inference.transform import Target
+from wirebayes.io.paper import experiments
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.problem import build
 
 PEERS = {
     "NumPyro NUTS, natural": lambda p, s, t: gradient.numpyro_nuts(p, s, t, True),

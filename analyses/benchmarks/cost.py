@@ -15,14 +15,14 @@ import numpy as np
 
 from analyses.benchmarks import asked
 from analyses.benchmarks.plain import ours
-from wirebayes.bayes import coordinates
-from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.problem import build
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.experiment import Experiment, Hold
-from wirebayes.output import write_json
-from wirebayes.paper import experiments
+from wirebayes.inference import transform
+from wirebayes.inference.fit import fit
+from wirebayes.inference.transform import Target
+from wirebayes.io.experiment import Experiment, Hold
+from wirebayes.io.paper import experiments
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.problem import build
 
 BATCH, REPEATS, SEEDS = 256, 7, 20
 
@@ -73,7 +73,7 @@ def growth(title, sizes, problems):
 def share_in_likelihood(problem, seed):
     """Share of a fit's processor time within the likelihood, within the target around it, and elsewhere."""
     spent = {"likelihood": 0.0, "target": 0.0}
-    kind, likelihood, target = type(problem), type(problem).log_likelihood, coordinates.Target.__call__
+    kind, likelihood, target = type(problem), type(problem).log_likelihood, transform.Target.__call__
 
     def watch(function, key):
         def watched(*given):

@@ -8,8 +8,8 @@ import numpy as np
 
 from analyses.benchmarks import model
 from analyses.benchmarks.measure import Costs, judged, looked_at
-from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.optimum import modes
+from wirebayes.inference.modes import modes
+from wirebayes.inference.transform import Target
 
 jax.config.update("jax_enable_x64", True)
 CHAINS = 4

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wirebayes.bayes.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
+from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 
 WANTED = 20_000
 R_HAT = 1.01

@@ -7,10 +7,10 @@ import emcee
 import numpy as np
 
 from analyses.benchmarks.measure import Costs, judged, looked_at
-from wirebayes.bayes import ensemble
-from wirebayes.bayes.coordinates import Target
-from wirebayes.bayes.optimum import modes
-from wirebayes.bayes.policy import Policy
+from wirebayes.inference.modes import modes
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import ensemble
+from wirebayes.inference.transform import Target
 
 
 def ours(problem, seed, seconds, wanted=20_000):

@@ -17,11 +17,11 @@ from unittest.mock import patch
 
 import wirebayes
 from analyses.benchmarks import asked
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.problem import build
-from wirebayes.discrepancy.discover import discover
-from wirebayes.output import write_json
-from wirebayes.paper import experiments
+from wirebayes.discovery.search import discover
+from wirebayes.inference.fit import fit
+from wirebayes.io.paper import experiments
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.problem import build
 from wirebayes.reproduce import run
 
 HOME = str(Path(wirebayes.__file__).parent)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from analyses.calibration.study import BROKEN, STUDIES, Study
-from wirebayes.bayes.calibration import band, verdict
-from wirebayes.output import write_json
+from wirebayes.inference.simulation_based_calibration import band, verdict
+from wirebayes.io.run_folder import write_json
 
 
 def main() -> int:

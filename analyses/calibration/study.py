@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.bayes.calibration import one
-from wirebayes.bayes.fit import seed_of
-from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.problem import Problem, build, with_readings
-from wirebayes.bayes.replicate import readings
-from wirebayes.simulate import PAPER_TIMES_S, Bench
+from wirebayes.inference.fit import seed_of
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.simulation_based_calibration import one
+from wirebayes.model.problem import Problem, build, with_readings
+from wirebayes.model.replicate import readings
+from wirebayes.simulation.synthetic import PAPER_TIMES_S, Bench
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=400.0)
 BENCHES = {

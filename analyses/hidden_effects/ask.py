@@ -40,8 +40,8 @@ def ask(spec: Spec, cases: Path, how: str) -> dict[str, Any]:
 def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...]) -> dict[str, Any]:
     seed = int(spec.key, 16) % 2**31
     if how == "api":
-        from wirebayes.discrepancy.discover import discover
-        from wirebayes.experiment import read_experiments
+        from wirebayes.discovery.search import discover
+        from wirebayes.io.experiment import read_experiments
 
         # posteriors are not judged here and cost minutes: left out where the function offers to
         options = {"posterior": False} if "posterior" in inspect.signature(discover).parameters else {}

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wirebayes import paper
-from wirebayes.bayes.jobs import Job, run
-from wirebayes.bayes.policy import Policy
 from wirebayes.cli import main
+from wirebayes.inference.policy import Policy
+from wirebayes.io import paper
 from wirebayes.report.blocks import Page, Picture, Pictures, Section, Table, Text, drawn, number, span, svg, unit_text
 from wirebayes.report.page import render, write
+from wirebayes.results.jobs import Job, run
 
 _VOID = {"meta", "img", "link", "br", "hr", "input"}
 _FAST = Policy(walkers=32, ess=200.0, rounds=2, round_draws=1024, block=20, most_steps=40, r_hat=1.5)
@@ -292,7 +292,7 @@ def test_an_unfinished_reproduction_shows_what_there_is(tmp_path):
 
 def test_bars_of_intervals_stand_where_the_numbers_are():
     """Read back from the drawn figure: a wrong column would shift a bar."""
-    from wirebayes.report.paper_figures import intervals
+    from wirebayes.report.pictures.paper_figures import intervals
 
     row = {"parameter": "k1", "published": 2.0, "q05": 4.0, "q50": 5.0, "q95": 6.0, "prior_q05": 1.0, "prior_q95": 20.0}
     axes = intervals([row | {"likelihood": kind} for kind in ("chain", "hold")], "wire").axes[0]

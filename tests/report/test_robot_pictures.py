@@ -1,8 +1,8 @@
 import numpy as np
 
-from wirebayes.report.robot import _edges
-from wirebayes.report.robot_space import workspace_map
-from wirebayes.robot.claim import WorkspaceDrift
+from wirebayes.report.pictures.robot import _edges
+from wirebayes.report.pictures.robot_space import workspace_map
+from wirebayes.robot.motion.claim import WorkspaceDrift
 
 
 def test_the_platform_is_drawn_by_the_edges_of_its_hull():

@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.robot import forward, inverse, rotation
-from wirebayes.robot.wires import Wires
+from wirebayes.robot.mechanics import rotation
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward, inverse
 
 
 @dataclass

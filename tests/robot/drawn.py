@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.robot import draws, inverse, rotation
-from wirebayes.robot.description import GRAVITY, Robot, TensionRule
+from wirebayes.robot.mechanics import draws, rotation
+from wirebayes.robot.mechanics.description import GRAVITY, Robot, TensionRule
+from wirebayes.robot.motion import inverse
 
 KINDS = ("planar-2", "planar-4", "point-3", "point-4", "point-5", "body-6", "body-7", "body-8", "body-9")
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from wirebayes.output import plain
-from wirebayes.report import robot as pictures
-from wirebayes.robot import draws, schema
-from wirebayes.robot.answer import answer
-from wirebayes.robot.question import Question, band
+from wirebayes.io.run_folder import plain
+from wirebayes.report.pictures import robot as pictures
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.request import Question, band
 
 TIMES = np.array([0.0, 60.0])
 
@@ -99,7 +99,7 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
 
 
 def test_tilt_is_told_against_the_commanded_normal_and_against_the_vertical():
-    from wirebayes.robot.rotation import matrix
+    from wirebayes.robot.mechanics.rotation import matrix
 
     robot = schema.read("cogiro-desk")
     leaning = matrix(np.array([0.05, 0.0, 0.3]))

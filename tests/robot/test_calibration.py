@@ -3,10 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.robot import draws, forward, inverse, observability, rotation, schema
-from wirebayes.robot.calibration import calibrate, corrected
-from wirebayes.robot.calibration_start import start
-from wirebayes.robot.session import Prior, Session, predict
+from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration.estimate import calibrate, corrected
+from wirebayes.robot.self_calibration.session import Prior, Session, predict
+from wirebayes.robot.self_calibration.start import start
 
 
 def _line(n=300, seed=1):

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from wirebayes.robot import forward, rotation, schema
-from wirebayes.robot.certificate import certify
-from wirebayes.robot.enclosure import enclose
-from wirebayes.robot.wires import Wires
+from wirebayes.robot.mechanics import rotation, schema
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward
+from wirebayes.robot.proof.certificate import certify
+from wirebayes.robot.proof.enclosure import enclose
 
 from . import cases
 

@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wirebayes.bayes.problem import Sample
-from wirebayes.bayes.result import Stored
 from wirebayes.cli import main
+from wirebayes.model.problem import Sample
+from wirebayes.results.store import Stored
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 
@@ -31,7 +31,7 @@ def fitted(tmp_path, monkeypatch):
         Sample("made-up", "made up", PROTOCOL, np.array([[0.85, 0.8], [7.65, 7.3]])[..., None], 0.01, Model()),
         "chain",
     )
-    monkeypatch.setattr("wirebayes.bayes.result.load", lambda folder, experiment=None, own_effects=None: stored)
+    monkeypatch.setattr("wirebayes.results.store.load", lambda folder, experiment=None, own_effects=None: stored)
     folder = tmp_path / "fit"
     folder.mkdir()
     (folder / "posterior.nc").write_bytes(b"made up")
@@ -126,10 +126,10 @@ def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
 def test_a_fit_hold_by_hold_is_refused_for_it_leaves_k1_open(fitted, tmp_path, monkeypatch, capsys, command):
     from dataclasses import replace
 
-    from wirebayes.bayes import result
+    from wirebayes.results import store
 
-    stored = replace(result.load(fitted), likelihood="hold")
-    monkeypatch.setattr("wirebayes.bayes.result.load", lambda folder, experiment=None, own_effects=None: stored)
+    stored = replace(store.load(fitted), likelihood="hold")
+    monkeypatch.setattr("wirebayes.results.store.load", lambda folder, experiment=None, own_effects=None: stored)
     assert main([*command, "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
     line = capsys.readouterr().err.strip()
     assert "does not determine the stiffness k1" in line
@@ -177,8 +177,10 @@ def test_a_robot_in_a_vertical_plane_is_a_robot(fitted, tmp_path, legs):
 @pytest.fixture
 def session_csv(tmp_path):
     """A session on linear-7 whose true reference errors are known, written as the command reads it."""
-    from wirebayes.robot import draws, inverse, rotation, schema, session_file
-    from wirebayes.robot.session import Prior, Session, predict
+    from wirebayes.robot.mechanics import draws, rotation, schema
+    from wirebayes.robot.motion import inverse
+    from wirebayes.robot.self_calibration import session_file
+    from wirebayes.robot.self_calibration.session import Prior, Session, predict
 
     robot = schema.read("linear-7")
     line = draws.WireDraws({k: np.full(3, v) for k, v in
@@ -244,7 +246,8 @@ def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(
 
 
 def test_the_documented_session_is_one():
-    from wirebayes.robot import schema, session_file
+    from wirebayes.robot.mechanics import schema
+    from wirebayes.robot.self_calibration import session_file
 
     session, readings = session_file.read(DOCS / "linear-7-session.csv", schema.read("linear-7"), 0.02, 1e-3)
     assert session.read.tolist() == [False] + [True] * 8

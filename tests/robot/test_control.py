@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.robot import claim, control, draws, inverse, schema
-from wirebayes.robot.creep import HoldCreep, fresh
-from wirebayes.robot.shares import shares
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.motion import claim, control, inverse
+from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.pose.variance_shares import shares
 
 CORE = {"k1": 800.0, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
 

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.robot import draws, drift, forward, inverse, proofs, stability
-from wirebayes.robot.answer import answer
-from wirebayes.robot.question import Question
+from wirebayes.robot.mechanics import draws
+from wirebayes.robot.motion import drift, forward, inverse
+from wirebayes.robot.pose import stability
+from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.request import Question
+from wirebayes.robot.proof import proofs
 
 from . import drawn, independent
 

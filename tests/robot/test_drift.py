@@ -6,9 +6,10 @@ import pytest
 from tests.wire.test_fresh import Shrinking, Waking
 from wirebayes.effects import named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
-from wirebayes.robot import draws, drift, forward, inverse, rotation, schema
-from wirebayes.robot.creep import HoldCreep, fresh
-from wirebayes.robot.wires import Wires, tension
+from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.mechanics.wires import Wires, tension
+from wirebayes.robot.motion import drift, forward, inverse
+from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model, simulate
 
@@ -143,9 +144,7 @@ def test_smaller_errors_allowed_a_step_change_little():
     for allowed in (2e-4, 1e-8):
         tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
         joint = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau).joint_m
-        course = drift.hold(
-            robot, wires, joint, np.array([600.0]), robot.home_m, np.eye(3), tolerance=allowed
-        )
+        course = drift.hold(robot, wires, joint, np.array([600.0]), robot.home_m, np.eye(3), tolerance=allowed)
         ends.append(course)
     relaxed = ends[1].tension_N[0, 0]
     assert (relaxed < 0.97 * tau[0]).all()  # the pretension relaxes, so following it matters at all
@@ -171,7 +170,7 @@ def test_shared_draws_sink_and_specimens_tilt():
 
 
 def test_rotation_angle_keeps_small_and_large_angles():
-    from wirebayes.robot.rotation import matrix
+    from wirebayes.robot.mechanics.rotation import matrix
 
     angle = np.array([1e-9, 1e-3, 1.0, 3.0])
     R = matrix(angle[:, None] * np.array([0.6, 0.0, 0.8]))[:, None]

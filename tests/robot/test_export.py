@@ -7,8 +7,10 @@ import pytest
 
 from wirebayes.effects import named
 from wirebayes.errors import InputError
-from wirebayes.robot import draws, export, inverse, rotation, schema
-from wirebayes.robot.wires import tension
+from wirebayes.robot.export import files
+from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.mechanics.wires import tension
+from wirebayes.robot.motion import inverse
 
 CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
 BENT = [
@@ -43,12 +45,12 @@ def test_the_spring_constant_is_the_slope_of_the_whole_law_at_the_working_tensio
     step = 1e-7
     up, down = (tension(wires, high + move, np.ones_like(high))[0] for move in (step, -step))
     slope = (up - down) / (2 * step)
-    spring = export.working_spring(robot, line)
+    spring = files.working_spring(robot, line)
     np.testing.assert_allclose(spring.stiffness_N, slope[0], rtol=1e-6)
     assert np.abs(slope[0] / line.parameters["k1"] - 1).min() > 1e-3  # k1 would be wrong
     for text, setting in (
-        (export.reprapfirmware(robot, line), f"M666 S{slope.mean():.0f} "),
-        (export.klipper(robot, line), f"winch_spring_constant: {slope.mean():.0f} "),
+        (files.reprapfirmware(robot, line), f"M666 S{slope.mean():.0f} "),
+        (files.klipper(robot, line), f"winch_spring_constant: {slope.mean():.0f} "),
     ):
         assert setting in text
         assert f"it is the tangent at {load:.4g} N, the mean tension of the lines at the home pose" in text
@@ -61,7 +63,7 @@ def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amp
     wires = draws.for_robot(robot, line.centre())
     x, R, tau = _home(robot)
     told = inverse.commands(robot, wires, x, R, tau)
-    text = export.mujoco(robot, line)
+    text = files.mujoco(robot, line)
     assert "tangent stiffness of the home pose, where the wires carry " + f"{tau[0, 0]:.4g}, " in text
     springs = ElementTree.fromstring(text).findall("./tendon/spatial")
     stiffness = np.array([float(s.get("stiffness")) for s in springs])
@@ -82,11 +84,11 @@ def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amp
 def test_a_line_of_one_stiffness_is_exported_as_it_is():
     amplitudes = {"second_relaxation.A": 0.05, "second_relaxation.T2": 30.0}
     robot, line = schema.read("hangprinter-4"), _line("hooke", "second_relaxation", amplitudes)
-    assert f"M666 S{line.parameters['k1'].mean():.0f} " in export.reprapfirmware(robot, line)
-    assert "tangent" not in export.reprapfirmware(robot, line) + export.mujoco(robot, line)
+    assert f"M666 S{line.parameters['k1'].mean():.0f} " in files.reprapfirmware(robot, line)
+    assert "tangent" not in files.reprapfirmware(robot, line) + files.mujoco(robot, line)
 
 
 def test_a_line_that_cannot_carry_the_platform_has_no_spring_constant():
     robot = schema.read("hangprinter-4")
     with pytest.raises(InputError, match="cannot carry"):
-        export.reprapfirmware(robot, _line("hooke", "strain_stiffening", {"strain_stiffening.c": -2000.0}))
+        files.reprapfirmware(robot, _line("hooke", "strain_stiffening", {"strain_stiffening.c": -2000.0}))

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from tests.light import POLICY
-from wirebayes import paper
-from wirebayes.bayes import result
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.problem import build
 from wirebayes.cli import main
 from wirebayes.effects import catalogue
-from wirebayes.robot import rotation, schema
+from wirebayes.inference.fit import fit
+from wirebayes.io import paper
+from wirebayes.model.problem import build
+from wirebayes.results import store
+from wirebayes.robot.mechanics import rotation, schema
 
 OWN = Path(__file__).parents[2] / "docs" / "own_effect.py"
 
@@ -39,7 +39,7 @@ def fitted(tmp_path_factory):
     for name in ("plain", *EFFECTS):
         folders[name] = tmp_path_factory.mktemp(name)
         effects = [] if name == "plain" else [catalogue(EFFECTS[name][1])[name]()]
-        result.save(fit(build([nylon], effects), 1, policy=POLICY), folders[name], {})
+        store.save(fit(build([nylon], effects), 1, policy=POLICY), folders[name], {})
     return folders
 
 
@@ -55,7 +55,7 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
     robot = schema.read("cogiro-desk")
     points = robot.platform_m @ rotation.matrix(robot.home_rotation_rad).T
     stretched = np.linalg.norm(robot.home_m + points - robot.exit_m, axis=1) + robot.beyond_m
-    sample = result.load(fitted[effect], own_effects=own).draws
+    sample = store.load(fitted[effect], own_effects=own).draws
     pick = np.linspace(0, len(sample["k1"]) - 1, 50).round().astype(int)
     k1, amplitude = sample["k1"][pick, None], sample[f"{effect}.{column}"][pick, None]
     zero = stretched / (1 + strain(np.array(said["inverse"]["tension_N"]) / k1, amplitude))

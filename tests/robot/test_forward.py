@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.robot import forward, inverse, rotation, schema, statics
-from wirebayes.robot.wires import Wires
+from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward, inverse
 
 from . import cases
 
@@ -32,7 +33,7 @@ def test_inverse_then_forward_returns_to_the_pose(name, law):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_mujoco_settles_where_we_solve(name):
     pytest.importorskip("mujoco")
-    from wirebayes.robot.mujoco_model import settle
+    from wirebayes.robot.export.mujoco_model import settle
 
     robot = schema.read(name)
     rng = np.random.default_rng(12)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from tests.robot import cases
-from wirebayes.robot import forward, rotation, schema
-from wirebayes.robot.reach import apart, reach
-from wirebayes.robot.wires import Wires
+from wirebayes.robot.mechanics import rotation, schema
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward
+from wirebayes.robot.proof.reach import apart, reach
 
 
 def _case(name, law, make=cases.commanded, seed=0):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from wirebayes.errors import InputError
-from wirebayes.robot import schema
+from wirebayes.robot.mechanics import schema
 
 GOOD = """version = 1
 name = "tripod"

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from wirebayes.robot import rotation, schema, statics
-from wirebayes.robot.wires import tension
+from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.mechanics.wires import tension
 
 from . import cases
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from wirebayes.robot import inverse, schema, statics, tensions
+from wirebayes.robot.mechanics import schema, statics, tensions
+from wirebayes.robot.motion import inverse
 
 ROBOTS = schema.shipped()
 

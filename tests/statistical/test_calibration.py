@@ -5,16 +5,19 @@ import pytest
 
 from analyses.calibration.__main__ import run, shares
 from analyses.calibration.study import BROKEN, STUDIES, Study
-from wirebayes.bayes import calibration
-from wirebayes.bayes.policy import Policy
+from wirebayes.inference import simulation_based_calibration
+from wirebayes.inference.policy import Policy
 
 pytestmark = pytest.mark.statistical
 
 
 def test_the_band_holds_uniform_shares_with_the_stated_probability():
     rng = np.random.default_rng(0)
-    level = calibration.threshold(60, 4, 0.9, replicates=20_000)
-    hits = [min(calibration.extremeness(rng.uniform(size=60)) for _ in range(4)) >= level for _ in range(1000)]
+    level = simulation_based_calibration.threshold(60, 4, 0.9, replicates=20_000)
+    hits = [
+        min(simulation_based_calibration.extremeness(rng.uniform(size=60)) for _ in range(4)) >= level
+        for _ in range(1000)
+    ]
     assert np.mean(hits) == pytest.approx(0.9, abs=4 * np.sqrt(0.09 / 1000))
 
 
@@ -24,18 +27,18 @@ def test_the_band_holds_uniform_shares_with_the_stated_probability():
 def test_shares_that_lean_crowd_or_flee_are_outside(bend):
     rng = np.random.default_rng(1)
     made = {f"q{i}": rng.uniform(size=300) for i in range(8)}
-    assert calibration.verdict(made, replicates=20_000)["inside"]
-    found = calibration.verdict(made | {"q3": bend(rng.uniform(size=300))}, replicates=20_000)
+    assert simulation_based_calibration.verdict(made, replicates=20_000)["inside"]
+    found = simulation_based_calibration.verdict(made | {"q3": bend(rng.uniform(size=300))}, replicates=20_000)
     assert found["outside"] == ["q3"]
 
 
 def test_the_band_s_edges_are_the_verdict():
     shares = np.random.default_rng(2).uniform(size=100) ** 1.3
-    level = calibration.threshold(100, 1, 0.9, replicates=5_000)
-    points, lower, upper = calibration.band(100, level)
+    level = simulation_based_calibration.threshold(100, 1, 0.9, replicates=5_000)
+    points, lower, upper = simulation_based_calibration.band(100, level)
     counted = np.searchsorted(np.sort(shares), points, side="right") / 100
     inside = ((counted >= lower) & (counted <= upper)).all()
-    assert inside == (calibration.extremeness(shares) >= level)
+    assert inside == (simulation_based_calibration.extremeness(shares) >= level)
 
 
 def test_a_data_set_is_the_same_whoever_fits_it_and_a_cut_file_is_finished(tmp_path):
@@ -53,12 +56,12 @@ def test_a_data_set_is_the_same_whoever_fits_it_and_a_cut_file_is_finished(tmp_p
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
 def test_forty_data_sets_of_each_study_lie_in_the_band(study, tmp_path):
     rows = run(study, 40, tmp_path, 1, 2)
-    found = calibration.verdict(shares(rows), replicates=20_000)
+    found = simulation_based_calibration.verdict(shares(rows), replicates=20_000)
     assert found["inside"], found
     assert sum(not row["converged"] for row in rows) <= 1
 
 
 @pytest.mark.slow
 def test_a_likelihood_without_the_setting_error_is_found_out(tmp_path):
-    found = calibration.verdict(shares(run(BROKEN, 100, tmp_path, 1, 2)), replicates=20_000)
+    found = simulation_based_calibration.verdict(shares(run(BROKEN, 100, tmp_path, 1, 2)), replicates=20_000)
     assert {"k1", "preload"} & set(found["outside"])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.problem import build
-from wirebayes.paper import experiments
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
 
 dynesty = pytest.importorskip("dynesty")
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.bayes.coordinates import Coordinates
-from wirebayes.bayes.fit import fit
-from wirebayes.bayes.policy import Policy
-from wirebayes.bayes.pooling import pooled
-from wirebayes.bayes.problem import Problem, build
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.simulate import Bench, Truth, draw
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.transform import Coordinates
+from wirebayes.model.pooling import pooled
+from wirebayes.model.problem import Problem, build
+from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 pytestmark = pytest.mark.statistical
 POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0)

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussian, grid, sixteen_modes
-from wirebayes.bayes import burn_in, convergence, ensemble, moves, walkers
-from wirebayes.bayes.ensemble import sample
-from wirebayes.bayes.optimum import Optimum
-from wirebayes.bayes.policy import Policy
+from wirebayes.inference import convergence
+from wirebayes.inference.modes import Optimum
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import burn_in, ensemble, moves
+from wirebayes.inference.sampler import state as sampler_state
+from wirebayes.inference.sampler.ensemble import sample
 
 pytestmark = pytest.mark.statistical
 SMALL = Policy(ensembles=4, walkers=48, ess=300.0, rounds=3, round_draws=2304, most_rounds=4, block=24, most_steps=240)
@@ -85,7 +87,7 @@ class _ForgetsTheProposal(moves.PoolMove):
 
 
 def test_a_sampler_that_forgets_the_proposal_s_density_fails(monkeypatch):
-    monkeypatch.setattr(walkers, "PoolMove", _ForgetsTheProposal)
+    monkeypatch.setattr(sampler_state, "PoolMove", _ForgetsTheProposal)
     t, _ = worst(gaussian)
     assert t > LIMIT
 
@@ -160,7 +162,9 @@ def fake(draws):
     """A state that kept (ensembles, steps, walkers, d) draws of a Gaussian, and the target that it came from."""
     ensembles, steps, walkers_, d = draws.shape
     z = np.moveaxis(draws, 0, 1).reshape(steps, ensembles * walkers_, d)
-    state = walkers.State(z[-1], np.zeros(len(z[-1])), None, None, None, np.random.default_rng(0), 1, 0, learned=False)
+    state = sampler_state.State(
+        z[-1], np.zeros(len(z[-1])), None, None, None, np.random.default_rng(0), 1, 0, learned=False
+    )
     state.frozen, state.kept_z, state.kept_log_density = True, [z], [np.zeros(z.shape[:2])]
     return state, SimpleNamespace(coordinates=gaussian(d).coordinates, problem=gaussian(d).problem)
 
@@ -272,7 +276,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(policy, blow, tmp_path, monkeypa
     path = tmp_path / "checkpoint"
     calls = 0
 
-    def mortal(*arguments, advance=walkers.advance):
+    def mortal(*arguments, advance=sampler_state.advance):
         nonlocal calls
         calls += 1
         if calls == blow:

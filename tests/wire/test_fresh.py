@@ -8,9 +8,10 @@ from tests.effects.test_catalogue import HenckyStrain, strong
 from tests.wire.protocols import PLAIN, columns, protocol
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.effects.rivals import DAY_S, AtOnce, Logarithmic, NotInTime, PowerLaw, TwoModes
-from wirebayes.robot import export, schema
-from wirebayes.robot.creep import HoldCreep, fresh
-from wirebayes.robot.draws import WireDraws, for_robot, warnings
+from wirebayes.robot.export import files
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot, warnings
+from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model, simulate
@@ -231,7 +232,7 @@ def test_a_robots_wire_under_a_constant_tension_is_a_fresh_sample(key, follow):
 @pytest.mark.parametrize("key", sorted(ROBOT))
 def test_the_exported_creep_table_is_the_fresh_sample(key):
     given = line(key)
-    rows = export.creep_table(schema.read("hangprinter-4"), given, [2.0, LOAD], TIMES[1:])
+    rows = files.creep_table(schema.read("hangprinter-4"), given, [2.0, LOAD], TIMES[1:])
     expected = np.concatenate([alone(given).creep_mm(load, TIMES[1:]) for load in (2.0, LOAD)])
     assert [row[2] for row in rows] == pytest.approx(expected.mean(1), rel=1e-12, abs=1e-15)
 

@@ -41,14 +41,14 @@ def compare(
     """
     from wirebayes import __version__
     from wirebayes.cli.progress import progress
-    from wirebayes.data_checks import of_experiments
-    from wirebayes.discrepancy.candidates import BASE, Candidate, candidates, problem_of
-    from wirebayes.discrepancy.compare import Task, run, side_by_side
+    from wirebayes.comparison.candidates import BASE, Candidate, candidates, problem_of
+    from wirebayes.comparison.compare import Task, run, side_by_side
     from wirebayes.effects import catalogue, source_of
     from wirebayes.errors import InputError
-    from wirebayes.experiment import read_experiments, select
-    from wirebayes.output import open_run, read_json, stored_results, write_json
-    from wirebayes.report import compare as pictures
+    from wirebayes.io.data_checks import of_experiments
+    from wirebayes.io.experiment import read_experiments, select
+    from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
+    from wirebayes.report.pictures import compare as pictures
 
     experiments = select(read_experiments(file), experiment)
     base = Candidate(BASE, "", "The plain model.", elastic_law, history, likelihood)

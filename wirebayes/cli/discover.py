@@ -18,7 +18,7 @@ from wirebayes.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from wirebayes.discrepancy.discover import Findings
+    from wirebayes.discovery.search import Findings
 
 
 def discover(
@@ -37,13 +37,13 @@ def discover(
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
     from wirebayes import __version__
-    from wirebayes.bayes.jobs import run
     from wirebayes.cli.progress import progress
-    from wirebayes.discrepancy.discover import catalogue_without, investigate
-    from wirebayes.discrepancy.settings import Settings
+    from wirebayes.discovery.search import catalogue_without, investigate
+    from wirebayes.discovery.settings import Settings
     from wirebayes.effects import catalogue, source_of
-    from wirebayes.experiment import read_experiments, select
-    from wirebayes.output import open_run, read_json, stored_results, write_json
+    from wirebayes.io.experiment import read_experiments, select
+    from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
+    from wirebayes.results.jobs import run
     from wirebayes.workers import workers
 
     experiments = select(read_experiments(file), experiment)
@@ -80,8 +80,8 @@ def discover(
 
 def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type: ignore[no-untyped-def]
     """Plain fit of every experiment, and the final ones."""
-    from wirebayes.bayes.jobs import Job
-    from wirebayes.discrepancy.discover import Joint, final_models
+    from wirebayes.discovery.search import Joint, final_models
+    from wirebayes.results.jobs import Job
 
     plain = [("plain", Joint((e,))) for block in findings.final for e in block.experiments]
     out = []
@@ -96,7 +96,7 @@ def _jobs(findings: "Findings", law, history, own_effects: Path | None):  # type
 
 def _say_posterior(findings: "Findings", output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
-    from wirebayes.output import read_json
+    from wirebayes.io.run_folder import read_json
 
     for e in (e for block in findings.final for e in block.experiments):
         parameters = read_json(output / e.name / "final" / "summary.json")["parameters"]
@@ -107,7 +107,7 @@ def _say_posterior(findings: "Findings", output: Path) -> None:
 
 def _pictures(findings: "Findings", output: Path, own_effects: Path | None) -> None:
     """Before and after, hold by hold, and one of each finding."""
-    from wirebayes.report.discover import before_and_after, pictures_of_findings
+    from wirebayes.report.pictures.discover import before_and_after, pictures_of_findings
 
     for e in (e for block in findings.final for e in block.experiments):
         verdict = findings.report["experiments"][e.name]

@@ -46,14 +46,14 @@ def fit(
     from scipy import stats
 
     from wirebayes import __version__
-    from wirebayes.bayes.jobs import Job, run
-    from wirebayes.bayes.problem import build
     from wirebayes.cli.progress import progress
-    from wirebayes.discrepancy.model_check import write_checks
+    from wirebayes.discovery.model_check import write_checks
     from wirebayes.effects import catalogue, named, source_of
     from wirebayes.errors import InputError
-    from wirebayes.experiment import read_experiments, select
-    from wirebayes.output import open_run, read_json, stored_results
+    from wirebayes.io.experiment import read_experiments, select
+    from wirebayes.io.run_folder import open_run, read_json, stored_results
+    from wirebayes.model.problem import build
+    from wirebayes.results.jobs import Job, run
 
     experiments = select(read_experiments(file), experiment)
     if train_holds is not None:

@@ -26,9 +26,7 @@ TrainHolds = Annotated[
 ]
 ElasticLawOption = Annotated[
     Literal["hooke", "modified"],
-    typer.Option(
-        "--elastic-law", help="Strain relative to zero-tension length, eq (1), or stretched length, eq (3)."
-    ),
+    typer.Option("--elastic-law", help="Strain relative to zero-tension length, eq (1), or stretched length, eq (3)."),
 ]
 HistoryOption = Annotated[
     Literal["saturating", "additive"],

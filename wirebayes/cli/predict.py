@@ -8,7 +8,7 @@ import typer
 from wirebayes.cli.options import ExperimentName, Seed
 
 if TYPE_CHECKING:
-    from wirebayes.bayes.result import Stored
+    from wirebayes.results.store import Stored
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by fit or discover.")]
 ProtocolFile = Annotated[
@@ -44,9 +44,9 @@ def predict(
     training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
     fit's. A first reading in tension_N conditions its hold and those after it.
     """
-    from wirebayes.discrepancy.question import read_question
-    from wirebayes.discrepancy.table import HEADER, table
-    from wirebayes.output import check_file, write_csv
+    from wirebayes.io.run_folder import check_file, write_csv
+    from wirebayes.prediction.request import read_question
+    from wirebayes.prediction.table import HEADER, table
 
     stored = find_posterior(folder, experiment, model, own_effects)
     asked = read_question(protocol, stored, fresh=fresh)
@@ -65,8 +65,8 @@ def find_posterior(
     InputError
         When there is none, several to choose from, or not the one asked for.
     """
-    from wirebayes.bayes.result import experiments_in, load
     from wirebayes.errors import InputError
+    from wirebayes.results.store import experiments_in, load
 
     if not folder.is_dir():
         raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")

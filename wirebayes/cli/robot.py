@@ -41,7 +41,7 @@ def pose(
 
     Give the final fit of discover as --wires and its plain one as --told to see what the effects are worth.
     """
-    from wirebayes.robot import schema
+    from wirebayes.robot.mechanics import schema
 
     machine = schema.read(robot)
     line = read_wires(wires, draws, experiment, own_effects)
@@ -51,11 +51,11 @@ def pose(
     _above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", spread))
     other = read_wires(told, draws, experiment, own_effects) if told else None
 
-    from wirebayes.output import open_run, write_json
-    from wirebayes.report import robot as pictures
-    from wirebayes.robot.answer import answer
-    from wirebayes.robot.question import Question
-    from wirebayes.robot.rotation import matrix
+    from wirebayes.io.run_folder import open_run, write_json
+    from wirebayes.report.pictures import robot as pictures
+    from wirebayes.robot.mechanics.rotation import matrix
+    from wirebayes.robot.pose.answer import answer
+    from wirebayes.robot.pose.request import Question
 
     asked = Question(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), spread, seed)
     limits = (tolerance, tolerance_tilt, spread)
@@ -97,10 +97,11 @@ def calibrate(
     import numpy as np
 
     from wirebayes.errors import InputError
-    from wirebayes.output import open_run, read_json, stored_results, write_json
-    from wirebayes.robot import schema, session_file
-    from wirebayes.robot.calibration_answer import answer
-    from wirebayes.robot.session import Prior
+    from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
+    from wirebayes.robot.mechanics import schema
+    from wirebayes.robot.self_calibration import session_file
+    from wirebayes.robot.self_calibration.answer import answer
+    from wirebayes.robot.self_calibration.session import Prior
 
     _above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd))
     if not 0 <= spread < 1:
@@ -139,9 +140,9 @@ def export(
 ) -> None:
     """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
     from wirebayes.errors import InputError
-    from wirebayes.output import open_run, write_csv, write_text
-    from wirebayes.robot import export as files
-    from wirebayes.robot import schema
+    from wirebayes.io.run_folder import open_run, write_csv, write_text
+    from wirebayes.robot.export import files
+    from wirebayes.robot.mechanics import schema
 
     machine = schema.read(robot)
     loads, moments = numbers("--tensions", tensions), rising_times(times)

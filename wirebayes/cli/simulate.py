@@ -57,8 +57,8 @@ def simulate(
     from wirebayes import __version__
     from wirebayes.effects import catalogue, source_of
     from wirebayes.errors import InputError
-    from wirebayes.output import check_run, open_run
-    from wirebayes.simulate import Bench, Truth, draw, effect_option, number, write
+    from wirebayes.io.run_folder import check_run, open_run
+    from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
 
     chosen: dict[str, float] = {}
     for text in parameter or ():
@@ -112,6 +112,6 @@ def _name(tests: int, lengths: list[float], test: int, length: float) -> str:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    from wirebayes.simulate import number
+    from wirebayes.simulation.synthetic import number
 
     return [number(option, word) for word in text.split(",")]

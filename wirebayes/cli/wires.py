@@ -4,14 +4,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from wirebayes.bayes.result import Stored
-    from wirebayes.robot.draws import WireDraws
+    from wirebayes.results.store import Stored
+    from wirebayes.robot.mechanics.draws import WireDraws
 
 
 def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> "WireDraws":
     """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
-    from wirebayes.bayes.result import load
     from wirebayes.errors import InputError
+    from wirebayes.results.store import load
 
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / "posterior.nc").is_file():
@@ -29,7 +29,7 @@ def wire_draws(stored: "Stored", count: int) -> "WireDraws":
     """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
     import numpy as np
 
-    from wirebayes.robot.draws import CORE, LENGTH_EXPONENT, WireDraws, material
+    from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
 
     sample = stored.sample
     effects = tuple(sample.model.effects)

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from wirebayes.bayes.result import unit_of
 from wirebayes.report.blocks import unit_text
+from wirebayes.results.store import unit_of
 from wirebayes.wire.protocol import Protocol
 
 Array = NDArray[Any]

@@ -9,17 +9,17 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from wirebayes import __version__
 from wirebayes.errors import InputError
-from wirebayes.output import CONFIGURATION, check_file, read_json, stored_results, write_text
+from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
 from wirebayes.report.blocks import Page
 
 # who knows how to tell a command's results; each module has ``page(folder, configuration)``
 _TELLERS = {
-    "reproduce": "wirebayes.report.of_reproduce",
-    "fit": "wirebayes.report.of_fit",
-    "compare": "wirebayes.report.of_compare",
-    "discover": "wirebayes.report.of_discover",
-    "pose": "wirebayes.report.of_pose",
-    "calibrate": "wirebayes.report.of_calibrate",
+    "reproduce": "wirebayes.report.pages.reproduce",
+    "fit": "wirebayes.report.pages.fit",
+    "compare": "wirebayes.report.pages.compare",
+    "discover": "wirebayes.report.pages.discover",
+    "pose": "wirebayes.report.pages.pose",
+    "calibrate": "wirebayes.report.pages.calibrate",
 }
 
 

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.robot import claim, draws, drift, schema
-from wirebayes.robot.description import Robot
-from wirebayes.robot.draws import WireDraws
-from wirebayes.robot.rotation import matrix
-from wirebayes.robot.wires import Wires
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import claim, drift
 
 STEPS = ("table_4_elongation", "table_4_strain", "chain_strain", "chain_workspace")
 _GRID = (3, 3, 2)

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.noise import hold_courses
-from wirebayes.bayes.result import Stored
-from wirebayes.discrepancy.predictive import Question, predict
-from wirebayes.experiment import Experiment
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.noise import hold_courses
+from wirebayes.prediction.predictive import Question, predict
+from wirebayes.results.store import Stored
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 

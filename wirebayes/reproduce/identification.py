@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.bayes.fit import seed_of
-from wirebayes.bayes.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
-from wirebayes.experiment import Experiment
+from wirebayes.inference.fit import seed_of
+from wirebayes.inference.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
+from wirebayes.io.experiment import Experiment
 from wirebayes.workers import Each
 
 Row = dict[str, Any]

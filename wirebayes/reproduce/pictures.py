@@ -8,15 +8,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from wirebayes.bayes.least_squares import Variant, at, residuals
-from wirebayes.bayes.problem import build
-from wirebayes.bayes.replicate import readings as replicate
-from wirebayes.bayes.result import Stored
-from wirebayes.experiment import Experiment
-from wirebayes.output import write_bytes, write_json
-from wirebayes.report import figures, paper_figures
+from wirebayes.inference.least_squares import Variant, at, residuals
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import write_bytes, write_json
+from wirebayes.model.problem import build
+from wirebayes.model.replicate import readings as replicate
+from wirebayes.report import figures
 from wirebayes.report.blocks import number, svg
+from wirebayes.report.pictures import paper_figures
 from wirebayes.reproduce.held_out import HeldOut, last_hold_course, published_course, some
+from wirebayes.results.store import Stored
 from wirebayes.wire.laws import creep_fraction
 
 Array = NDArray[Any]
@@ -83,9 +84,7 @@ class Gallery:
         k1, B, k2 = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B", "k2"))
         figure = figures.joint(k1, B, figures.named("k1"), figures.named("B"), e.name, mark)
         low, high = np.quantile(full["hold"].draws["k1"], [0.05, 0.95])
-        caption = (
-            f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
-        )
+        caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
         jump = stiffest_step(e)
         if abs(jump / published["k1"] - 1) < 0.02:
             told = f"{number(published['k1'], 4)} N is within 2 % of the stiffest single step between two holds"

@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes import __version__, paper
-from wirebayes.bayes.fit import seed_of
-from wirebayes.bayes.jobs import Job
-from wirebayes.bayes.jobs import run as run_jobs
-from wirebayes.bayes.policy import Policy, describe
-from wirebayes.bayes.problem import Likelihood, build
-from wirebayes.bayes.result import Stored, load
-from wirebayes.experiment import Experiment
-from wirebayes.output import open_run, write_csv, write_json
+from wirebayes import __version__
+from wirebayes.inference.fit import seed_of
+from wirebayes.inference.policy import Policy, describe
+from wirebayes.io import paper
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.model.problem import Likelihood, build
 from wirebayes.report.page import write as write_page
 from wirebayes.reproduce import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.reproduce.held_out import HeldOut, held_out
+from wirebayes.results.jobs import Job
+from wirebayes.results.jobs import run as run_jobs
+from wirebayes.results.store import Stored, load
 from wirebayes.workers import workers
 
 Array = NDArray[Any]

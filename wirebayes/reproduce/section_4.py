@@ -9,17 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.fit import seed_of
-from wirebayes.bayes.result import Stored
+from wirebayes.inference.fit import seed_of
 from wirebayes.report.blocks import number
-from wirebayes.report.paper_figures import drifts
-from wirebayes.report.robot import scene
-from wirebayes.report.robot_lines import budgets, drifts_in_time
-from wirebayes.report.robot_space import workspace_map
+from wirebayes.report.pictures.paper_figures import drifts
+from wirebayes.report.pictures.robot import scene
+from wirebayes.report.pictures.robot_lines import budgets, drifts_in_time
+from wirebayes.report.pictures.robot_space import workspace_map
 from wirebayes.reproduce.pictures import Gallery
-from wirebayes.robot import claim, draws, drift, schema, shares
-from wirebayes.robot.draws import WireDraws
-from wirebayes.robot.rotation import matrix
+from wirebayes.results.store import Stored
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import claim, drift
+from wirebayes.robot.pose import variance_shares
 
 Row = dict[str, Any]
 ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as the paper's; the second is redundant
@@ -100,7 +102,7 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
             gallery.add("robot", "scene", scene(robot, x, R, course), alt, caption)
         distance = 1e3 * np.linalg.norm(course.position_m - x, axis=-1)
         moved[wire] = np.where(course.found[:, None], distance, np.nan)
-        budget[wire] = shares.shares({name: line.parameters[name] for name in draws.CORE}, distance[:, -1])
+        budget[wire] = variance_shares.shares({name: line.parameters[name] for name in draws.CORE}, distance[:, -1])
     alt = f"Distance of the platform of {MAPPED} from its pose while new wires of one line creep, for an hour."
     caption = "New wires, the actuators still. Band: 90 % of the posterior draws; beyond 120 s extrapolated."
     gallery.add("robot", "drift", drifts_in_time(moved, _TIMES_S, limit_mm, f"Robot {MAPPED}: drift"), alt, caption)

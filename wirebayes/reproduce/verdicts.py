@@ -10,27 +10,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.bayes.problem import MATERIAL
-from wirebayes.bayes.result import CREEP_TIMES_S, unit_of
+from wirebayes.model.problem import MATERIAL
+from wirebayes.results.contraction import LEAST_CONTRACTION, contraction, interval
+from wirebayes.results.store import CREEP_TIMES_S, unit_of
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model
 
 Array = NDArray[Any]
 Verdict = Literal["inside", "outside", "not determined"]
-LEAST_CONTRACTION = 2.0 / 3.0
 PRODUCT = "k1*B"  # the only combination that one hold alone determines
-
-
-def interval(values: Array) -> tuple[float, float, float]:
-    """5 %, 50 % and 95 % quantile."""
-    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
-    return float(low), float(middle), float(high)
-
-
-def contraction(posterior: Array, prior: Array) -> float:
-    """Share by which the width of the 90 % interval of a positive quantity shrank, on a logarithmic scale."""
-    before, after = interval(prior), interval(posterior)
-    return 1.0 - float(np.log(after[2] / after[0]) / np.log(before[2] / before[0]))
 
 
 def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict:

@@ -167,9 +167,7 @@ class Placed:
         self.at: dict[str, list[Effect]] = {}
         for effect in effects:
             self.at.setdefault(effect.place, []).append(effect)
-        self.own = {
-            e.key: {a.name: theta[c] for a, c in zip(e.amplitudes, e.columns(), strict=True)} for e in effects
-        }
+        self.own = {e.key: {a.name: theta[c] for a, c in zip(e.amplitudes, e.columns(), strict=True)} for e in effects}
 
     def change(self, place: Place, value: Any, hold: HoldContext) -> Any:
         """A quantity after all effects at its place."""

@@ -23,9 +23,7 @@ def strain(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke
     return 1.0 - zero_tension_mm / stretched_mm
 
 
-def strain_slopes(
-    stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke"
-) -> tuple[Array, Array]:
+def strain_slopes(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> tuple[Array, Array]:
     """Derivatives of `strain` by stretched and by zero-tension length, 1/mm."""
     if law == "hooke":
         by_stretched = 1.0 / zero_tension_mm

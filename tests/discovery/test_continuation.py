@@ -1,0 +1,158 @@
+"""Effects led up a ladder of amplitudes, and the global test over names."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery import refit, screening
+from wirebayes.discovery.continuation import climb, ladders, outward, strengths
+from wirebayes.discovery.linear_scan import Scan, expand, scan
+from wirebayes.discovery.name_evidence import choose
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.io.experiment import read_experiments
+from wirebayes.model.noise import reading_variance
+from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.staircase import simulate
+
+STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1, "sensor_sd": 0.02, "setting_sd": 0.01}
+
+
+def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed: int) -> Block:
+    write(folder, [Bench()], Truth(STIFF | truth, effects), seed)
+    experiments = read_experiments(folder / "experiments.toml")
+    return fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+
+
+def scanned(block: Block, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
+    trials, candidates = screening.candidate_probes([block], kinds)
+    return trials, candidates, scan(expand(block.target, block.modes.z[:1], trials))
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("creep_threshold", 12.0), ("strain_stiffening", 12.0), ("tension_dependent_rate", 1.5)]
+)
+def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, name: str, size: float) -> None:
+    """Newton's method on the density itself, noise and all, pinned at many amplitudes, shares no step with it."""
+    effect = named(name)
+    block = block_of(tmp_path, {effect.columns()[0]: size}, [effect], 1)
+    trials, candidates, data = scanned(block, {name: CATALOGUE[name]})
+    ways = ladders([block], trials, candidates, [data])
+    found = strengths(ways, [{0: climb(block, way, block.modes.z[:1])} for way in ways])
+    best = max(range(len(trials)), key=lambda k: data.effects[0, k])
+    per_delta = 1.0 / float(data.norm[0, best])
+    truth = refit.refit([block], (0,), trials[best].effect, per_delta, float(data.amplitude[0, best]))
+    assert truth.log_bayes > 5.0  # the case is worth testing
+    assert max(float(v[0]) for v in found.values()) == pytest.approx(truth.log_bayes, abs=1.5)
+
+
+def test_a_wire_that_goes_slack_in_every_hold_is_climbed_past() -> None:
+    """No setting error moves a reading there, so that what setting errors do has no size to be measured in."""
+    experiments = read_experiments(Path(__file__).parents[1] / "data" / "all-slack.toml")
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
+    (way,) = ladders([block], trials, candidates, [data])
+    found = climb(block, way, block.modes.z[:1])
+    assert np.isfinite([found.log_bayes, found.amplitude, found.norm]).all() and found.log_bayes.max() > -2.0
+
+
+def test_a_data_set_without_a_tangent_says_nothing_and_changes_no_other(tmp_path: Path) -> None:
+    block = block_of(tmp_path, {}, [], 3)
+    trials, _ = screening.candidate_probes([block], {"toe": CATALOGUE["toe"]})
+    x = expand(block.target, np.repeat(block.modes.z[:1], 3, axis=0), trials)
+    for name in ("parameters", "residual", "flexible", "signatures"):
+        for wild in (np.nan, np.inf, 1e200):
+            part = getattr(x, name).copy()
+            part[1] = wild
+            found, before = scan(replace(x, **{name: part})), scan(x)
+            assert found.effects[1] == pytest.approx(0.0) and found.flexible[1] == pytest.approx(0.0)
+            np.testing.assert_allclose(found.effects[[0, 2]], before.effects[[0, 2]], rtol=1e-6, atol=1e-6)
+
+
+def test_rows_climb_alone(tmp_path: Path) -> None:
+    """A data set says the same in any company."""
+    block = block_of(tmp_path, {}, [], 3)
+    trials, candidates, data = scanned(block, {"toe": CATALOGUE["toe"]})
+    drawn = screening.replicated(block, trials, 5, np.random.default_rng(0))
+    way = ladders([block], trials, candidates, [data])[0]
+    together = climb(block, way, drawn.z, drawn.readings).log_bayes
+    alone = climb(block, way, drawn.z[2:3], [y[..., 2:3] for y in drawn.readings]).log_bayes
+    np.testing.assert_allclose(together[:, 2], alone[:, 0], rtol=1e-6, atol=1e-6)
+
+
+def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path: Path) -> None:
+    kinds = {name: CATALOGUE[name] for name in ("creep_threshold", "permanent_creep", "strain_stiffening")}
+    block = block_of(tmp_path, {"creep_threshold.tau_c": 16.0}, [named("creep_threshold")], 1)
+    trials, candidates, data = scanned(block, kinds)
+    drawn = screening.replicated(block, trials, 199, np.random.default_rng(1))
+    near = screening.global_test(candidates, [data], [drawn.scan])
+    far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
+    assert far.surprises["creep_threshold"] > near.surprises["creep_threshold"] + 1.0
+    assert far.p == pytest.approx(1 / 200) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
+
+
+def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(tmp_path: Path) -> None:
+    """Seven dense holds with a clamp transient: the best plain fit has a setting error of three steps."""
+    times = (0.0, *np.geomspace(1.0, 600.0, 24).round(1).tolist())
+    bench = Bench(length_mm=1272.0, resolution_N=0.0, displacements_mm=tuple(range(1, 8)), times_s=times)
+    wire = {"k1": 500.0, "B": 0.04, "U": 0.75, "k2": 0.008, "N": 0.5, "sensor_sd": 0.007, "setting_sd": 0.026}
+    effect = named("clamp_transient")
+    write(tmp_path, [bench], Truth(wire | {"clamp_transient.a": -0.05, "clamp_transient.T": 31.0}, [effect]), 0)
+    experiments = read_experiments(tmp_path / "experiments.toml")
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    assert block.parameters("simulated")["setting_sd"] > 1.0
+    kinds = {name: CATALOGUE[name] for name in ("clamp_transient", "strain_stiffening")}
+    trials, candidates, data = scanned(block, kinds)
+    drawn = screening.replicated(block, trials, 99, np.random.default_rng(1))
+    near = screening.global_test(candidates, [data], [drawn.scan])
+    far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
+    assert near.p > 0.04 and far.p == pytest.approx(0.01)
+    chosen = choose([block], trials, candidates, [data], log_bayes)
+    assert chosen.best == "clamp_transient"
+    assert chosen.winners["clamp_transient"][0].amplitude == pytest.approx(-0.05, abs=0.005)
+
+
+def test_a_ladder_broken_off_keeps_the_places_of_its_rungs(tmp_path: Path) -> None:
+    """Blocks that share an amplitude are added rung by rung, also where one of them gave up."""
+    block = block_of(tmp_path, {}, [], 3)
+    trials, candidates, data = scanned(block, {"permanent_creep": CATALOGUE["permanent_creep"]})
+    way = ladders([block], trials, candidates, [data])[0]
+    found = climb(block, way, block.modes.z[:1])
+    rungs, starts = way.amplitudes.shape
+    assert found.log_bayes.shape == found.amplitude.shape == found.norm.shape == ((rungs + 1) * starts, 1)
+    assert (found.log_bayes < -1e200).any()  # it was broken off: no more than all creep can be permanent
+
+
+def test_the_noise_ratio_of_a_fit_is_that_of_its_setting_and_sensor_errors(tmp_path: Path) -> None:
+    """Sensor variance times I + ρKKᵀ is the covariance that steps of each hold's setting error give."""
+    block = block_of(tmp_path, {}, [], 3)
+    x, sample = expand(block.target, block.modes.z[:1], []), block.target.problem.samples[0]
+    own = block.target.problem.parameters(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
+    mask, holds, step = sample.protocol.mask, len(sample.readings), 1e-5
+    each = {name: np.repeat(value, holds) for name, value in own.items()}
+    up, down = (simulate(sample.protocol, each, sample.model, s * np.eye(holds))[mask] for s in (step, -step))
+    by_setting = (up - down) / (2 * step)
+    variance = float(reading_variance(own["sensor_sd"], sample.resolution_N)[0])
+    covariance = variance * np.eye(mask.sum()) + float(own["setting_sd"][0]) ** 2 * by_setting @ by_setting.T
+    told = variance * (np.eye(mask.sum()) + x.ratio[0] * x.left[0] * x.singular[0] ** 2 @ x.left[0].T)
+    np.testing.assert_allclose(told, covariance, rtol=1e-4, atol=1e-6 * covariance.max())
+
+
+@pytest.mark.statistical
+def test_the_most_surprising_name_is_as_surprising_as_said() -> None:
+    """p is uniform whatever the tails and the correlations of the names: an analytic case, one row as the data."""
+    rng = np.random.default_rng(0)
+    values = []
+    for _ in range(2000):
+        common = rng.exponential(size=100)
+        names = {str(k): np.maximum(common, s * rng.exponential(size=100)) for k, s in enumerate((0.3, 1.0, 1.0, 3.0))}
+        chance = {name: v[1:] for name, v in names.items()}
+        found = {name: screening.surprise(float(v[0]), chance[name]) for name, v in names.items()}
+        null = np.max([screening.surprises(v) for v in chance.values()], axis=0)
+        values.append(screening.GlobalTest(chance, found, null).p)
+    for alpha in (0.02, 0.04, 0.1, 0.5):
+        share, sd = np.mean(np.array(values) <= alpha), np.sqrt(alpha * (1 - alpha) / 2000)
+        assert abs(share - alpha) < 4 * sd, alpha

@@ -1,0 +1,129 @@
+"""The check at the end of every fit: calibrated, first in the summary, and the same question as `discover` asks."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes import cli
+from wirebayes.discovery import global_test, model_check
+from wirebayes.discovery.model_check import ModelCheck, check_model, level
+from wirebayes.discovery.search import discover
+from wirebayes.discovery.settings import ALPHA
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.results.jobs import Job
+from wirebayes.simulation.synthetic import Bench, Truth, write
+
+WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
+BENCH = Bench(displacements_mm=tuple(range(1, 8)))
+
+
+def simulated(folder: Path, truth: dict[str, float] | None = None, effects: tuple[str, ...] = ()) -> Experiment:
+    """One test of seven holds, read back from its files."""
+    folder.mkdir(exist_ok=True)
+    write(folder, [BENCH], Truth(WIRE | (truth or {}), [named(key) for key in effects]), seed=2)
+    return read_experiments(folder / "experiments.toml")[0]
+
+
+def test_a_p_near_the_level_is_told_from_one_that_is_not() -> None:
+    """A test that exceeds the level by chance with a risk of more than .00135 is not yet decided."""
+    for larger in range(100):
+        risk = min(stats.binom.cdf(larger, 999, ALPHA), 1.0 - stats.binom.cdf(larger - 1, 999, ALPHA))
+        assert global_test.is_close((1 + larger) / 1000, ALPHA, 999) == (risk > 0.00135)
+    assert not global_test.is_close(0.02, ALPHA, 999) and not global_test.is_close(0.065, ALPHA, 999)
+    # No exceedance at all decides, also against the smaller level of one of four fits.
+    assert not global_test.is_close(0.001, level(4), 999)
+
+
+def test_a_p_too_close_to_the_level_gets_more_simulations(tmp_path: Path) -> None:
+    small = simulated(tmp_path, {"strain_stiffening.c": 6.0}, ("strain_stiffening",))
+    block = fitted([small], (), "hooke", "saturating", np.random.default_rng(0))
+    kinds = {name: CATALOGUE[name] for name in ("strain_stiffening", "sensor_drift")}
+
+    def p_and_count(alpha: float) -> tuple[float, int]:
+        found = global_test.examine([block], kinds, 49, np.random.default_rng(1), alpha=alpha)
+        return found.test.p, len(found.test.null)
+
+    p, count = p_and_count(alpha=0.5)
+    assert count == 49 and p < 0.2
+    more, count = p_and_count(alpha=p)
+    assert count == 49 * global_test.MOST_TIMES or (count > 49 and not global_test.is_close(more, p, count))
+
+
+def test_the_level_of_several_fits_keeps_the_risk_of_the_command() -> None:
+    for tests in (1, 2, 7):
+        assert 1.0 - (1.0 - level(tests)) ** tests == pytest.approx(ALPHA, rel=1e-12)
+    assert ModelCheck(0.04, level(1), 999).passed is False  # as `discover` decides
+    assert ModelCheck(0.041, level(1), 999).passed is True
+
+
+def test_one_experiment_gets_the_p_that_discover_reports(tmp_path: Path) -> None:
+    experiment = simulated(tmp_path)
+    check = check_model(Job("", (experiment,)), seed=5, simulations=19)
+    report = discover([experiment], seed=5, simulations=19)["experiments"][experiment.name]
+    assert check.p == report["p_global"] and check.passed == (report["verdict"] == "nothing-missing")
+
+
+def test_a_missing_effect_fails_the_check_and_the_model_with_it_passes(tmp_path: Path) -> None:
+    experiment = simulated(tmp_path, {"strain_stiffening.c": 60.0}, ("strain_stiffening",))
+    plain = check_model(Job("", (experiment,)), simulations=49)
+    assert plain.passed is False and plain.p == pytest.approx(1 / (1 + plain.simulations))
+    assert "strain_stiffening" in plain.surprising
+    assert "wirebayes discover" in plain.sentence and "does not describe" in plain.sentence
+    whole = check_model(Job("", (experiment,), ("strain_stiffening",)), simulations=49)
+    assert whole.passed is True and whole.surprising == () and "describes the readings" in whole.sentence
+
+
+def test_a_gross_error_is_set_aside_and_reported(tmp_path: Path) -> None:
+    experiment = simulated(tmp_path)
+    hold = experiment.holds[3]
+    tension = np.array(hold.tension_N)
+    tension[2] += 0.5
+    wrong = replace(experiment, holds=(*experiment.holds[:3], replace(hold, tension_N=tension), *experiment.holds[4:]))
+    check = check_model(Job("", (wrong,)), simulations=19)
+    assert [(g["hold"], g["reading"]) for g in check.gross_errors] == [(4, 2)]
+    assert "Reading 3 of hold 4" in check.sentence and check.passed
+
+
+def test_what_cannot_be_checked_says_so(tmp_path: Path) -> None:
+    experiment = simulated(tmp_path)
+    for job in (Job("", (experiment,), likelihood="hold"), Job("", (experiment,), ("discrepancy@7:0.1:120.0",))):
+        check = check_model(job)
+        assert check.passed is None and check.p is None and check.to_dict()["passed"] is None
+        assert check.sentence.startswith("The model was not checked")
+
+
+def test_fit_puts_a_failed_check_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulated(tmp_path / "wire", {"strain_stiffening.c": 60.0}, ("strain_stiffening",))
+    monkeypatch.setattr(model_check, "SIMULATIONS", 49)
+    monkeypatch.setattr(model_check, "workers", lambda own_effects: _Serial())
+    out = tmp_path / "fit"
+    command = ["fit", str(tmp_path / "wire" / "experiments.toml"), "--output", str(out)]
+    assert cli.main(command) == 0
+    summary = json.loads((out / "simulated" / "summary.json").read_text())
+    assert next(iter(summary)) == "model_check" and summary["model_check"]["passed"] is False
+    captured = capsys.readouterr().err.strip()
+    assert captured == f"simulated: {summary['model_check']['sentence']}"
+    page = (cli.main(["report", str(out)]), (out / "report.html").read_text())[1]
+    assert page.index("does not describe the readings") < page.index("What was measured")
+    assert "times the longest hold" in page
+    for claim in ("the data hold it together", "hardly depends on the prior", "What the readings determine (90"):
+        assert claim not in page
+    assert cli.main(command) == 0 and capsys.readouterr().err.strip() == captured  # also when there is nothing to do
+
+
+class _Serial:
+    """The processes that a small test does not need."""
+
+    def __enter__(self) -> type[map]:
+        return map
+
+    def __exit__(self, *about: object) -> None:
+        pass

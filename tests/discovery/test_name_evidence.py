@@ -1,0 +1,123 @@
+"""Where evidence turns into a verdict: each threshold against the law it stands for."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from tests.simulated import simulated_tests
+from wirebayes.discovery import name_evidence, refit, screening, verdict
+from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, probes
+from wirebayes.discovery.power import amplitude_80
+from wirebayes.discovery.screening import Candidate
+from wirebayes.discovery.search import discover
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.simulation.synthetic import Bench, Truth
+
+NORM = 25.0  # δ per unit of amplitude in these scans
+
+
+def log_evidence(best: float, one_sided: bool) -> float:
+    """Log of the mean likelihood ratio over δ uniform up to 40, the ratio a normal curve with its top at `best`."""
+    low = 0.0 if one_sided else -40.0
+    mean, _ = integrate.quad(lambda d: np.exp(0.5 * best**2 - 0.5 * (d - best) ** 2), low, 40.0, points=[best])
+    return float(np.log(mean / (40.0 - low)))
+
+
+def scan_of(delta: np.ndarray, one_sided: bool, flexible: float = 0.0) -> Scan:
+    """Scans of one probe on data whose signature has these lengths (n,), in sensor errors; the noise is known."""
+    n, degrees = len(delta), 10**8  # so many readings that the integral over the noise is a normal
+    pieces = Pieces(
+        shared=np.zeros((1, n)), rss=np.full((1, n), float(degrees)), along=NORM * delta[None, :, None],
+        square=np.full((1, n, 1), NORM**2), degrees=degrees, least=np.zeros(n), one_sided=np.array([one_sided]),
+    )  # fmt: skip
+    return Scan(0.5 * delta[:, None] ** 2, np.full(n, flexible), delta[:, None] / NORM, np.full((n, 1), NORM), pieces)
+
+
+def test_an_alarm_is_raised_below_four_per_cent_and_not_above(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four false alarms in a hundred clean files are promised, so p = .05 is none and p = .035 is one."""
+    bench = Bench(displacements_mm=(1, 2, 3))  # too few holds to hold some out, which would take longer
+    experiments = simulated_tests([bench], Truth({"k1": 900.0, "B": 0.25, "setting_sd": 0.01}), seed=1)
+    kinds = {"strain_stiffening": CATALOGUE["strain_stiffening"]}
+    for exceeding, alarm in ((9, False), (6, True)):  # of 199 simulations
+        monkeypatch.setattr(screening.GlobalTest, "p", (1 + exceeding) / 200)
+        found = discover(experiments, simulations=19, kinds=kinds)["experiments"]["simulated"]
+        assert (found["verdict"] != "nothing-missing") == alarm, found["p_global"]
+
+
+@pytest.mark.parametrize("one_sided", [True, False])
+def test_evidence_is_the_likelihood_averaged_over_the_prior(one_sided: bool) -> None:
+    for best in (6.0, 15.0, 30.0):
+        found = screening.log_bayes(Candidate(0, "toe", (0,), True), [scan_of(np.array([best]), one_sided)])[0]
+        assert found[0] == pytest.approx(log_evidence(best, one_sided), abs=1e-6)
+    # on two samples with an amplitude each, the prior is paid for twice
+    both = [scan_of(np.array([best]), one_sided) for best in (6.0, 15.0)]
+    found = screening.log_bayes(Candidate(0, "toe", (0, 1), False), both)[0]
+    assert found[0] == pytest.approx(log_evidence(6.0, one_sided) + log_evidence(15.0, one_sided), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["toe", "strain_stiffening"])
+def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The likelihood by amplitude is replaced by a normal curve, whose average is known."""
+    effect = named(name)
+    per_delta = 0.1 * float(effect.amplitudes[0].prior.std())
+    top = 9.0 * per_delta
+
+    class Curve:
+        def __init__(self, block: Any, effect: Any) -> None:
+            pass
+
+        def starts(self) -> np.ndarray:
+            return np.zeros((1, 1))
+
+        def climb(self, start: np.ndarray, amplitude: np.ndarray) -> SimpleNamespace:
+            ratio = 0.5 * 9.0**2 - 0.5 * ((amplitude - top) / per_delta) ** 2
+            return SimpleNamespace(converged=np.ones(len(start), bool), log_evidence=ratio, z=start)
+
+        def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+            return z
+
+    monkeypatch.setattr(refit, "Pinned", Curve)
+    found = refit.refit([SimpleNamespace(log_evidence=0.0)], (0,), effect, per_delta, 8.0 * per_delta)  # type: ignore[list-item]
+    assert found.amplitude == pytest.approx(top, rel=0.02) and found.sd == pytest.approx(per_delta, rel=1e-3)
+    one_sided = effect.amplitudes[0].prior.support()[0] >= effect.amplitudes[0].neutral
+    assert one_sided == (name == "toe")
+    assert found.log_bayes == pytest.approx(log_evidence(9.0, one_sided), abs=0.02)
+
+
+def test_something_unknown_is_believed_as_readily_as_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even odds before the test: with equal evidence *unknown* is as probable as the name, with less it is less."""
+    trials = probes(named("strain_stiffening"))[:1]
+    candidate = Candidate(0, "strain_stiffening", (0,), True)
+    value = log_evidence(8.0, False)
+
+    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float) -> refit.Refit:
+        return refit.Refit(effect, tuple(which), value, 8.0, 1.0, ())
+
+    monkeypatch.setattr(name_evidence, "refit", refitted)
+    for ahead in (-2.0, 0.0, 3.0):
+        data = scan_of(np.array([8.0]), False, flexible=value + ahead)
+        chosen = name_evidence.choose([SimpleNamespace()], trials, [candidate], [data])  # type: ignore[list-item]
+        assert chosen.shares["unknown"] == pytest.approx(1.0 / (1.0 + np.exp(-ahead)))
+        # weighed once more when second effects have been tried
+        assert verdict._weighed(chosen).shares == pytest.approx(chosen.shares)
+
+
+@pytest.mark.parametrize("one_sided", [True, False])
+def test_the_amplitude_that_four_tests_in_five_would_show(one_sided: bool) -> None:
+    """Known noise: z is normal about δ with sd 1, and an effect passes where z²/2 and the prior beat the threshold."""
+    z = stats.norm.ppf((np.arange(300) + 0.5) / 300)
+    trial = Probe(named("toe"), {}, 1.0, one_sided)
+    for threshold in (0.5, 3.0):
+        found = amplitude_80(scan_of(z, one_sided), trial, 0, threshold)
+        assert found is not None
+        prior = np.log(np.sqrt(2 * np.pi) / (40.0 if one_sided else 80.0))
+        needed = np.sqrt(2 * (threshold - prior))
+        passing = stats.norm.sf(needed - found * NORM) + (0 if one_sided else stats.norm.cdf(-needed - found * NORM))
+        assert passing == pytest.approx(0.8, abs=0.01)
+
+
+def test_an_effect_that_hardly_shows_has_no_such_amplitude() -> None:
+    assert amplitude_80(scan_of(np.zeros(10), True), Probe(named("toe"), {}, 1.0, True), 0, threshold=900.0) is None

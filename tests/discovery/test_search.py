@@ -1,0 +1,229 @@
+"""The missing effect: found, named, added; or nothing; or something unknown."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wirebayes import cli, workers
+from wirebayes.discovery import gap, linear_scan, power, screening
+from wirebayes.discovery.search import discover, final_models, investigate
+from wirebayes.discovery.settings import Settings
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.errors import InputError
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.io import paper
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.wire.effect import Effect
+
+WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
+UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
+DENSE_S = (0.0, *np.geomspace(2, 600, 24).round(1))
+FEW = 199  # simulations behind a p-value here; the command uses 999
+
+
+def made(
+    folder: Path, benches: list[Bench], truth: dict[str, float], effects: list[Effect], seed: int = 2
+) -> list[Experiment]:
+    """Simulated tests, read back from their files."""
+    write(folder, benches, Truth(WIRE | truth, effects), seed)
+    return read_experiments(folder / "experiments.toml")
+
+
+def answer(experiments: list[Experiment], **options: object) -> dict:
+    return discover(experiments, simulations=FEW, **options)["experiments"][experiments[0].name]
+
+
+def test_nothing_is_missing_from_clean_data(tmp_path: Path) -> None:
+    found = answer(made(tmp_path, [Bench(resolution_N=0.01)], {}, []))
+    assert found["verdict"] == "nothing-missing" and found["p_global"] > 0.04
+    assert found["effects"] == [] and found["accepted"] == [] and found["probabilities"] == {}
+    # An amplitude that would have been seen, for everything this protocol can show, and nothing for the rest.
+    assert found["power"]["toe"]["amplitude_80"] > 0 and "lost_motion" not in found["power"]
+    assert any(line.startswith("lost_motion") for line in found["not_identifiable"])
+
+
+@pytest.mark.statistical
+def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
+    """p-values of clean data are uniform: of 24, more than five below 0.08 has a chance of one in 300."""
+    values = []
+    for seed in range(24):
+        (folder := tmp_path / str(seed)).mkdir()
+        rng = np.random.default_rng(seed)
+        block = fitted(made(folder, [Bench(resolution_N=0.01)], {}, [], seed), (), "hooke", "saturating", rng)
+        trials, candidates = screening.candidate_probes([block], CATALOGUE)
+        data = linear_scan.scan(linear_scan.expand(block.target, block.modes.z[:1], trials))
+        values.append(screening.global_test(candidates, [data], [screening.replicated(block, trials, 99, rng).scan]).p)
+    assert sum(p <= 0.08 for p in values) <= 5
+    assert 0.3 < np.mean(values) < 0.7  # the mean of 24 uniforms has a standard deviation of 0.06
+
+
+def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
+    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
+    found = answer(experiments)
+    assert found["best"] == "toe" and found["effects"][0] == "toe" and "toe" in found["set"]
+    size = found["amplitudes"]["toe"]
+    assert size["q05"] < 0.0015 < size["q95"] and size["unit"] == "-"
+    held = found["held_out"]
+    assert held["final"]["rmse_N"] < 0.5 * held["plain"]["rmse_N"] and held["gap_closed"] > 0.8 and held["shrinks"]
+    # A smooth curve follows, but does not predict as well.
+    assert held["plain"]["rmse_N"] > held["flexible"]["rmse_N"] > held["final"]["rmse_N"]
+    assert held["leave_one_hold_out"]["elpd_difference"] > held["leave_one_hold_out"]["flexible_elpd_difference"]
+    # Without it in the catalogue, no certainty about another name that does not look like it.
+    bare = answer(experiments, without=["toe"])
+    assert bare["verdict"] != "nothing-missing" and "toe" not in bare["probabilities"]
+
+
+def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_path: Path) -> None:
+    experiments = made(tmp_path, [Bench()], {"creep_threshold.tau_c": 2.5}, [named("creep_threshold")])
+    found = answer(experiments, kinds={name: CATALOGUE[name] for name in ("steady_creep", "guide_friction", "toe")})
+    assert found["verdict"] == "unknown" and found["best"] == "unknown" and found["accepted"] == []
+    held = found["held_out"]
+    assert held["final"]["rmse_N"] < held["plain"]["rmse_N"] and held["gap_closed"] > 0
+    gain, se, flexible = held["leave_one_hold_out"].values()
+    assert held["shrinks"] == (gain > max(4.0, 2.0 * se)) and gain == flexible
+    assert held["flexible"].items() <= held["final"].items()
+
+
+def test_findings_do_not_depend_on_how_many_processes_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
+    kinds = {name: CATALOGUE[name] for name in ("toe", "memory", "steady_creep")}
+    reports = []
+    for cores in (1, 2):
+        monkeypatch.setattr(workers, "cores", lambda cores=cores: cores)
+        with workers.workers() as each:
+            reports.append(investigate(experiments, Settings(kinds=kinds, simulations=FEW), 0, each=each).report)
+    assert json.dumps(reports[0]) == json.dumps(reports[1])
+
+
+def test_a_slip_names_its_hold(tmp_path: Path) -> None:
+    found = answer(made(tmp_path, [Bench()], {"grip_slip.w": 0.15}, [named("grip_slip@7")]))
+    assert found["best"] == "grip_slip" and found["amplitudes"]["grip_slip"]["hold"] == 7
+
+
+def test_play_shows_on_the_way_back(tmp_path: Path) -> None:
+    bench = Bench(displacements_mm=UP_AND_DOWN)
+    found = answer(made(tmp_path, [bench], {"lost_motion.w": 0.08}, [named("lost_motion")]))
+    assert found["best"] == "lost_motion"
+
+
+@pytest.mark.parametrize("bench", [
+    Bench(displacements_mm=(1, 3, 5, 3, 1, -0.5, 1, 3, 5)),  # goes slack in between
+    Bench(times_s=DENSE_S, displacements_mm=(1, 2, 3, 4, 5, 6)),
+], ids=["slack", "25 readings"])  # fmt: skip
+def test_other_protocols_are_answered(tmp_path: Path, bench: Bench) -> None:
+    # Of seeds 0 to 24, three slack files have p below .04, seed 0 among them.
+    found = answer(made(tmp_path, [bench], {}, [], seed=1))
+    assert found["verdict"] == "nothing-missing"
+
+
+def test_two_lengths_tell_the_fixture(tmp_path: Path) -> None:
+    benches = [
+        Bench(name="short", length_mm=600.0),
+        Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
+    ]
+    # In the files of seed 2 the test with the name inside has p = .03, as in one right answer of 33.
+    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
+    findings = investigate(experiments, Settings(kinds=CATALOGUE, simulations=199))
+    found = findings.report["experiments"]["short"]
+    assert found["best"] == "fixture_compliance" and found["shared_with"] == []
+    assert "length_dependence" in found["power"]
+    # one length alone cannot know it: both samples are sampled together, and each stored with what both know
+    [model] = final_models(findings)
+    assert [e.name for e in model.experiments] == ["short", "long"]
+    assert [e.name for e in model.effects] == ["fixture_compliance"] and "preload[long]" in model.near
+
+
+def test_what_two_lengths_leave_open_a_third_one_tells(tmp_path: Path) -> None:
+    benches = [
+        Bench(name="short", length_mm=600.0),
+        Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
+    ]
+    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    probes = {p.effect.name: p for p in screening.candidate_probes([block], CATALOGUE)[0]}
+    told = power.next_measurement(block, (probes["fixture_compliance"], probes["length_dependence"]), None)
+    assert "another length, 3600 mm" in told
+    possible = list(probes)
+    assert not any("compliance" in s for s in power.not_identifiable(block, list(CATALOGUE.values()), possible))
+
+
+def test_a_gross_reading_is_struck_out_and_nothing_else_is_missing(tmp_path: Path) -> None:
+    made(tmp_path, [Bench()], {}, [])
+    lines = (tmp_path / "simulated.csv").read_text().splitlines()
+    row = lines[33].split(",")
+    lines[33] = ",".join([*row[:3], str(float(row[3]) - 0.5)])
+    (tmp_path / "simulated.csv").write_text("\n".join(lines) + "\n")
+    found = answer(read_experiments(tmp_path / "experiments.toml"))
+    assert [(g["hold"], g["reading"]) for g in found["gross_errors"]] == [(int(row[0]), 2)]
+    assert found["verdict"] == "nothing-missing"
+
+
+def test_a_user_finds_an_effect_of_their_own(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text('''
+import numpy as np
+from scipy import stats
+from wirebayes.wire.effect import Amplitude, Effect
+
+
+class ScrewWobble(Effect):
+    """The screw's thread is periodic: one turn is 2 mm."""
+
+    name, place, scope = "screw_wobble", "position", "instrument"
+    amplitudes = (Amplitude("a", "mm", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The screw wobbles once a turn."
+
+    def apply(self, value, own, hold):
+        return value + own["a"] * np.sin(np.pi * (hold.displacement_mm + 0.5))
+''')
+    from wirebayes.effects import catalogue
+
+    kinds = catalogue(own)
+    experiments = made(tmp_path, [Bench()], {"screw_wobble.a": 0.05}, [kinds["screw_wobble"]()])
+    assert answer(experiments, kinds=kinds)["best"] == "screw_wobble"
+    out = tmp_path / "out"
+    arguments = ["discover", str(tmp_path / "experiments.toml"), "--output", str(out), "--own-effects", str(own)]
+    assert cli.main(arguments) == 0
+    found = json.loads((out / "discovery.json").read_text())
+    assert found["version"] == 1 and found["experiments"]["simulated"]["best"] == "screw_wobble"
+    for model in ("plain", "final"):
+        assert json.loads((out / "simulated" / model / "summary.json").read_text())["converged"]
+    assert "screw_wobble.a" in json.loads((out / "simulated" / "final" / "summary.json").read_text())["parameters"]
+    # one picture a finding, and none of what shows no pattern
+    seen = {w["covariate"].replace(" ", "-") for w in found["experiments"]["simulated"]["where"] if w["p"] <= 0.05}
+    drawn = {path.stem.removeprefix("where-") for path in (out / "simulated").glob("where-*.png")}
+    assert seen and drawn == seen
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(InputError, match="--without tow: no such effect"):
+        discover(paper.experiments()[:1], without=["tow"])
+
+
+def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp_path: Path) -> None:
+    """Projected length at the fitted noise, against generalised least squares written out."""
+    block = fitted(
+        made(tmp_path, [Bench()], {"toe.c": 0.001}, [named("toe")]), (), "hooke", "saturating", np.random.default_rng(0)
+    )
+    trials = linear_scan.probes(named("strain_stiffening"))
+    x = linear_scan.expand(block.target, block.modes.z[:1], trials)
+    whitened = linear_scan.projected(x, float(x.ratio[0]))[:, 0]
+    k = np.sqrt(float(x.ratio[0])) * x.left[0] * x.singular[0]
+    inverse = np.linalg.inv(np.eye(len(k)) + k @ k.T)
+    a, s = x.parameters[0], x.signatures[0][:, 0]
+    square = s @ inverse @ s - s @ inverse @ a @ np.linalg.solve(a.T @ inverse @ a, a.T @ inverse @ s)
+    np.testing.assert_allclose(whitened @ whitened, square, rtol=1e-8)
+
+
+def test_the_gap_is_measured_against_the_noise_floor() -> None:
+    def held(rmse: float) -> gap.HeldOut:
+        return gap.HeldOut([9], rmse**2, 5, 0.01**2, np.zeros(1), 0.9)
+
+    assert gap.gap_closed(held(0.10), held(0.01)) == pytest.approx(1.0)
+    assert gap.gap_closed(held(0.10), held(0.10)) == pytest.approx(0.0)
+    assert gap.gap_closed(held(0.005), held(0.004)) is None

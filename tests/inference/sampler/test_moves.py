@@ -1,0 +1,121 @@
+"""Pools of draws: every place of a stretch has the target's law, and importance sampling's worth."""
+
+import emcee
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.inference.convergence import autocorrelation_steps
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
+
+WIDE = Mixture(np.ones(1), np.zeros((1, 1)), np.full((1, 1, 1), 2.0), 1e6)  # normal, twice the target's width
+
+
+def density(x):
+    return -0.5 * x[:, 0] ** 2
+
+
+class Stay(emcee.moves.Move):
+    def propose(self, model, state):
+        return state, np.zeros(len(state.coords), bool)
+
+
+def walked(walkers, steps, most, seed=1):
+    """(steps, walkers) places, begun at exact draws; the move between pools does nothing."""
+    sampler = emcee.EnsembleSampler(walkers, 1, density, moves=PoolMove(WIDE, Stay(), steps, most), vectorize=True)
+    random = np.random.RandomState(seed)
+    sampler.random_state = random.get_state()
+    sampler.run_mcmc(random.normal(size=(walkers, 1)), steps, skip_initial_state_check=True)
+    return sampler
+
+
+@pytest.mark.parametrize("most", [2, 3, 8, 32])
+def test_every_place_of_a_pool_has_the_target_s_law(most):
+    places = walked(20_000, 32, most).get_chain()[..., 0]
+    for at in places:
+        assert stats.kstest(at, "norm").pvalue > 1e-4
+
+
+def test_a_circle_that_begins_where_the_walker_stands_fails(monkeypatch):
+    class Origin:
+        """A generator whose origins are all one; its draws are as ever."""
+
+        def __init__(self, random):
+            self.random = random
+
+        def __getattr__(self, name):
+            return getattr(self.random, name)
+
+        def uniform(self, size):
+            return np.zeros(size)
+
+    def biased(self, model, state, k, pooled=PoolMove._pooled):
+        return pooled(self, model._replace(random=Origin(model.random)), state, k)
+
+    monkeypatch.setattr(PoolMove, "_pooled", biased)
+    places = walked(20_000, 32, 8).get_chain()[..., 0]
+    assert min(stats.kstest(at, "norm").pvalue for at in places) < 1e-12
+
+
+def test_effective_draws_are_those_of_importance_sampling_and_reported_as_they_are():
+    """A sign does not know the weight: 1 / E_p[p/q] effective draws each, sqrt(7) / 4 here, less what the walker's own
+    place takes of its pool and what is drawn between pools."""
+    chain = walked(20_000, 256, 64).get_chain()
+    sign = np.sign(chain).reshape(256, 4, 5000, 1).swapaxes(0, 1)
+    found = 1.0 / autocorrelation_steps(sign)[0]
+    assert 0.85 * np.sqrt(7) / 4 < found < np.sqrt(7) / 4
+    # the spread of means over many runs of 100 walkers, in place of the walkers' own
+    runs = sign.reshape(4, 256, 50, 100).mean(axis=(1, 3)).ravel()
+    assert 1.0 / (256 * 100 * runs.var(ddof=1)) == pytest.approx(found, rel=0.3)
+
+
+def test_steps_that_moved_are_counted_and_the_steps_between_are_spread_evenly():
+    sampler = walked(50, 70, 32)
+    chain = sampler.get_chain()[..., 0]
+    still = np.flatnonzero((chain[1:] == chain[:-1]).all(axis=1)) + 1
+    assert list(still) == [24, 47]  # 24, 23 and 23 steps
+    assert np.array_equal(sampler.backend.accepted, (np.diff(chain, axis=0) != 0).sum(axis=0))
+    assert np.array_equal(sampler.get_log_prob(), -0.5 * chain**2)
+
+
+def squared_jumps(before, proposed, log_factor, target):
+    """Mean squared distance a Metropolis step goes, refusals counted as zero."""
+    accepted = np.minimum(0.0, target(proposed) - target(before) + log_factor)
+    return np.mean(np.exp(accepted) * np.sum((proposed - before) ** 2, axis=1))
+
+
+@pytest.mark.parametrize("dimensions", [3, 8, 20])
+@pytest.mark.parametrize("straightened", [False, True])
+def test_steps_of_differential_evolution_are_nearly_the_best_length(dimensions, straightened):
+    """Against normal random walks of every length on a normal target; a tenth of the length goes a hundredth as far."""
+    random, n = np.random.RandomState(2), 20_000
+
+    def target(x):
+        return -0.5 * np.sum(x**2, axis=1)
+
+    x, others = random.normal(size=(2, n, dimensions))
+    step = random.normal(size=(n, dimensions))
+    walks = [squared_jumps(x, x + length * step, 0.0, target) for length in np.geomspace(0.05, 3.0, 60)]
+
+    class Round:  # a round cloud is straight already
+        def forward(self, x):
+            return x, np.zeros(len(x))
+
+        def inverse(self, u):
+            return u
+
+    move = EvolutionMove(1, Round() if straightened else None)
+    found = squared_jumps(x, *move.get_proposal(x, [others], random), target)
+    # the rest is spent on steps from mode to mode, or on short ones
+    assert found > 0.7 * max(walks)
+
+
+def test_without_straightening_some_steps_lead_from_mode_to_mode():
+    """Two modes a hundred widths apart: one step in five is a whole difference, a quarter of those leads across."""
+    random = np.random.RandomState(3)
+    x, others = (random.normal(size=(10_000, 2)) + 100.0 * (np.arange(10_000) % 2)[:, None] for _ in range(2))
+    proposed, _ = EvolutionMove(1).get_proposal(x, [others], random)
+    nearest = np.clip(np.round(proposed / 100.0), 0, 1) * 100.0
+    arrived = (np.abs(proposed - nearest) < 5.0).all(axis=1) & (np.abs(proposed - x) > 50.0).all(axis=1)
+    assert arrived.mean() == pytest.approx(0.05, abs=0.01)

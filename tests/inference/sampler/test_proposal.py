@@ -1,0 +1,152 @@
+"""The map that straightens, what is drawn through it, and the search for modes behind it."""
+
+import emcee
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.statistical.targets import two_modes
+from wirebayes.inference import modes
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import burn_in, mixture, moves, proposal, transport_map
+
+
+def crescent(n, rng):
+    """x2 bends with the square of x0 and is the wider, the larger x1."""
+    x = rng.normal(size=(n, 3))
+    x[:, 2] = 2.0 + x[:, 0] ** 2 + np.exp(0.4 * x[:, 1]) * x[:, 2]
+    return x
+
+
+@pytest.fixture(scope="module")
+def points():
+    return crescent(6000, np.random.default_rng(1))
+
+
+def test_a_crescent_becomes_a_heap_within_the_points_and_beyond(points):
+    straight = transport_map.fit(points, np.arange(3))
+    u, _ = straight.forward(crescent(6000, np.random.default_rng(2)))
+    assert np.abs(np.cov(u.T) - np.eye(3)).max() < 0.1
+    assert abs(np.corrcoef(u[:, 2], points[:, 0] ** 2)[0, 1]) < 0.05
+    far = np.array([[4.5, 0.0, 2.0 + 4.5**2]])
+    assert abs(straight.forward(far)[0][0, 2]) < 2.0
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 0, 1]])
+def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
+    straight = transport_map.fit(points, np.array(order))
+    x = np.vstack([points[:20], 3.0 * points[:20]])
+    u, jacobian = straight.forward(x)
+    assert straight.inverse(u) == pytest.approx(x, rel=1e-9, abs=1e-9)
+    h = 1e-6
+    moved = [(straight.forward(x + h * e)[0] - straight.forward(x - h * e)[0]) / (2 * h) for e in np.eye(3)]
+    assert np.linalg.slogdet(np.moveaxis(moved, 0, 2))[1] == pytest.approx(jacobian, abs=1e-4)
+
+
+def test_a_cloud_without_bends_gets_none():
+    straight = transport_map.fit(np.random.default_rng(3).normal(size=(4000, 6)), np.arange(6))
+    assert not straight.quadratic.any()
+
+
+def test_what_is_skewed_becomes_even():
+    rng = np.random.default_rng(6)
+    own = 1.0 + 2.0 * np.sinh(np.arcsinh(rng.normal(size=20000)) + 0.7)
+    x = np.column_stack([own, stats.gamma(2.0).rvs(20000, random_state=rng)])
+    u, _ = transport_map.fit(x, np.arange(2)).forward(x)
+    before, after = ([stats.kstest(c, "norm").statistic for c in p.T] for p in (stats.zscore(x), u))
+    assert before[0] > 0.08 and after[0] < 0.015
+    assert after[1] < 0.6 * before[1]  # a gamma is not of the family, and comes nearer all the same
+
+
+def test_evolution_in_straight_coordinates_keeps_the_density():
+    """On a bend whose map is fitted to other points than its own, so that slopes differ from place to place."""
+    rng = np.random.default_rng(7)
+
+    def draws(n):
+        x = rng.normal(size=(n, 2))
+        return np.column_stack([x[:, 0], x[:, 0] ** 2 + np.exp(0.5 * x[:, 0]) * x[:, 1]])
+
+    def log_density(z):
+        return -0.5 * (z[:, 0] ** 2 + ((z[:, 1] - z[:, 0] ** 2) * np.exp(-0.5 * z[:, 0])) ** 2) - 0.5 * z[:, 0]
+
+    move = moves.EvolutionMove(4, transport_map.fit(draws(4000) * [1.2, 0.8], np.arange(2)))
+    found = []
+    for seed in range(12):
+        walkers = emcee.EnsembleSampler(400, 2, log_density, moves=[move], vectorize=True)
+        walkers.random_state = np.random.RandomState(seed).get_state()
+        walkers.run_mcmc(draws(400), 200)
+        z = walkers.get_chain(discard=20)
+        found.append([z[..., 0].mean(), z[..., 0].var() - 1.0, z[..., 1].mean() - 1.0])
+    # the spread of independent runs: walkers of an ensemble know of one another
+    t = np.mean(found, axis=0) / (np.std(found, axis=0, ddof=1) / np.sqrt(12.0))
+    assert np.abs(t).max() < 4.5
+
+
+@pytest.mark.parametrize("mapped", [False, True])
+def test_evolution_takes_its_differences_within_an_ensemble(mapped):
+    """The second ensemble stands still wherever its own walkers do, whatever the first one does."""
+    rng = np.random.default_rng(3)
+    straight = transport_map.fit(rng.normal(size=(500, 2)), np.arange(2)) if mapped else None
+    spread, still = rng.normal(size=(20, 2)), np.tile([1.0, 2.0], (20, 1))
+    start = np.concatenate([spread, still])
+    walkers = emcee.EnsembleSampler(
+        40, 2, lambda z: np.zeros(len(z)), moves=[moves.EvolutionMove(2, straight)], vectorize=True
+    )
+    end = walkers.run_mcmc(start, 5, skip_initial_state_check=True).coords
+    assert np.abs(end[20:] - still).max() < 1e-9
+    assert (np.abs(end[:20] - spread).max(axis=1) > 1e-3).all()
+
+
+def test_points_that_do_not_span_their_space_are_refused():
+    with pytest.raises(np.linalg.LinAlgError):
+        transport_map.fit(np.ones((100, 2)), np.arange(2))
+
+
+def test_the_density_of_a_proposal_is_that_of_its_draws(points):
+    """The mean of 1/q over draws of q inside a box is the box's volume."""
+    rng = np.random.default_rng(4)
+    start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
+    q = proposal.fit(points, points, start, np.arange(3), rng, proposal.SHARES, most=3)
+    x = q.rvs(200000, rng)
+    inside = (np.abs(x - [0.0, 0.0, 2.5]) < [1.0, 1.0, 1.0]).all(axis=1)
+    weight = inside * np.exp(-q.log_density(x))
+    assert weight.mean() == pytest.approx(8.0, abs=5 * weight.std() / np.sqrt(len(x)))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mode_that_died_out_on_the_way_is_still_found(seed):
+    found = modes.modes(two_modes(), np.random.default_rng(seed))
+    assert sorted(found.z[:, 0].round(3)) == [0.0, 10.0]
+
+
+def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
+    policy = Policy(ensembles=2, walkers=64, rounds=3, round_draws=1024, most_rounds=3)
+    target = two_modes()
+    state, shares = burn_in.begin(target, 1, policy, None, None, None), []
+    while not state.frozen:
+        shares.append(state.proposal.shares)
+        burn_in.one_round(target, state, policy)
+    assert shares == [proposal.ROUGH_SHARES, proposal.EXPLORING, proposal.EXPLORING]
+    assert state.proposal.shares == proposal.SHARES
+
+
+def test_a_climb_is_given_up_on_the_way_and_no_other_with_it():
+    asked = []
+
+    def density(z, rows):
+        asked.append(len(z))
+        return -0.5 * (z**2).sum(axis=1) ** 2
+
+    start = np.array([[3.0, 3.0], [-3.0, 3.0]])
+    whole = modes.climb(density, start)
+    whole_cost, asked = sum(asked), []
+    left = modes.climb(density, start, until=lambda z: z[:, 0] < 0.0)
+    assert np.isinf(left.log_density).tolist() == [False, True]
+    assert left.z[0] == pytest.approx(whole.z[0]) and left.converged.tolist() == [True, False]
+    assert sum(asked) < 0.7 * whole_cost
+
+
+def test_degrees_of_freedom_reach_the_density():
+    x = np.array([[3.0], [0.5]])
+    light = mixture.Mixture(np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1)), 40.0)
+    assert light.log_density(x) == pytest.approx(stats.t(40.0).logpdf(x[:, 0]))

@@ -1,0 +1,149 @@
+"""The sampled coordinates: back and forth, volume, and that the target is the posterior in them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.effects import named
+from wirebayes.inference.transform import Coordinates, Target
+from wirebayes.model.pooling import pooled
+from wirebayes.model.problem import Problem, build
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+from wirebayes.wire.staircase import simulate
+
+LINE = [Bench("a", "line", 1000.0), Bench("b", "line", 1710.0, unrecorded=frozenset({4}))]
+PROBLEMS = {
+    "chain": draw([Bench()], Truth({"k1": 800.0}), seed=1).problem,
+    "additive": draw([Bench()], Truth({"k1": 800.0}, history="additive"), seed=1).problem,
+    "effects": draw([Bench()], Truth(effects=(named("second_relaxation"), named("grip_slip@5"))), seed=2).problem,
+    "edges": draw([Bench()], Truth(effects=(named("permanent_creep"), named("creep_threshold"))), seed=4).problem,
+    "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
+    "pooled": pooled(draw(LINE, seed=5).problem, ("k1", "B", "N")),
+    "slack": build([Bench().experiment()]),  # every reading zero
+    "hold": build([Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 10.0)).experiment()], likelihood="hold"),
+}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_back_and_forth_returns_the_parameters(name):
+    problem = PROBLEMS[name]
+    theta = problem.prior.rvs(50, np.random.default_rng(0))
+    coordinates = Coordinates(problem)
+    assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_the_jacobian_is_the_determinant_of_the_map(name):
+    problem = PROBLEMS[name]
+    coordinates, d = Coordinates(problem), len(problem.names)
+    theta = problem.prior.rvs(5, np.random.default_rng(1))
+    z, step = coordinates.to_sampled(theta), 1e-6
+    for row, natural in zip(z, theta, strict=True):
+        up, down = (coordinates.to_natural(row + sign * step * np.eye(d)) for sign in (1, -1))
+        matrix = (up - down) / (2 * step) / np.abs(natural)[:, None].T  # relative: the columns differ by many orders
+        expected = np.linalg.slogdet(matrix)[1] + np.log(np.abs(natural)).sum()
+        assert coordinates.log_jacobian(natural[None])[0] == pytest.approx(expected, abs=1e-5)
+
+
+def test_the_target_is_prior_likelihood_and_volume():
+    problem = PROBLEMS["chain"]
+    target = Target(problem)
+    theta = problem.prior.rvs(20, np.random.default_rng(2))
+    prior = sum(d.logpdf(theta[:, i]) for i, d in enumerate(problem.prior.distributions.values()))
+    expected = prior + problem.log_likelihood(theta) + target.coordinates.log_jacobian(theta)
+    assert target(target.coordinates.to_sampled(theta)) == pytest.approx(expected, rel=1e-9)
+    assert target.evaluations == 20
+
+
+def test_outside_the_prior_the_density_is_zero():
+    made = draw([Bench()], Truth({"k1": 800.0}), seed=2)
+    narrow = made.problem.prior.distributions | {"U": stats.uniform(0.4, 0.2)}
+    target = Target(replace(made.problem, prior=replace(made.problem.prior, distributions=narrow)))
+    theta = np.repeat(made.theta, 2, axis=0)
+    theta[:, made.problem.names.index("U")] = 0.5, 0.7
+    assert np.isfinite(target(target.coordinates.to_sampled(theta))).tolist() == [True, False]
+
+
+def test_amplitudes_with_an_edge_are_standard_normal_under_their_prior():
+    problem = PROBLEMS["edges"]
+    columns = [problem.names.index(name) for name in ("permanent_creep.psi", "creep_threshold.tau_c")]
+    coordinates = Coordinates(problem)
+    theta = problem.prior.rvs(2000, np.random.default_rng(5))
+    z = coordinates.to_sampled(theta)
+    for column in columns:
+        assert stats.kstest(z[:, column], "norm").pvalue > 1e-3
+    theta[:2, columns] = [[0.0, 0.0], [1.0, 40.0]]  # on the edge, and far out in the half-normal of 2 N
+    z = coordinates.to_sampled(theta[:2])
+    assert np.isfinite(z).all()
+    assert coordinates.to_natural(z)[:, columns] == pytest.approx(theta[:2, columns], rel=1e-8, abs=1e-7)
+
+
+def test_a_prior_that_allows_negative_values_is_sampled_as_it_is():
+    experiment = Bench().experiment()
+    experiment.priors["U"] = {"distribution": "normal", "mean": 0.5, "sd": 1.0}
+    problem = build([experiment])
+    assert not Coordinates(problem).log_columns[problem.names.index("U")]
+    theta = problem.prior.rvs(50, np.random.default_rng(0))
+    coordinates = Coordinates(problem)
+    assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9)
+
+
+def test_fixed_parameters_are_not_sampled():
+    experiment = Bench().experiment()
+    experiment.priors["N"] = {"fixed": 1.0}
+    problem = build([experiment])
+    assert "N" not in problem.names
+    theta = problem.prior.rvs(20, np.random.default_rng(0))
+    assert (problem.parameters(theta, problem.samples[0])["N"] == 1.0).all()
+    coordinates = Coordinates(problem)
+    assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9)
+
+
+def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates():
+    """Parameters that lose the same tension in a hold lie at the same coordinate, whatever k2, U and N make of it."""
+    made = draw(
+        [Bench(resolution_N=0.0)], Truth({"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.3}), 1
+    )
+    coordinates, names = Coordinates(made.problem), made.problem.names
+    rng, column = np.random.default_rng(0), names.index("B")
+    theta = np.repeat(made.theta, 200, axis=0)
+    for name, spread in (("U", 0.2), ("k2", 0.5), ("N", 0.2)):
+        theta[:, names.index(name)] *= np.exp(spread * rng.normal(size=200))
+    z = coordinates.to_sampled(theta)
+    z[:, column] = coordinates.to_sampled(made.theta)[0, column]
+    level = coordinates.to_natural(z)
+
+    def lost(rows):
+        own = made.problem.parameters(rows, made.problem.samples[0])
+        tension = simulate(made.problem.samples[0].protocol, own)
+        return np.sqrt(((tension[:, 0] - tension[:, -1]) ** 2).mean(axis=0))
+
+    assert np.log(lost(level)).std() < 0.15 * np.log(lost(theta)).std()
+    assert stats.spearmanr(np.log(lost(theta)), coordinates.to_sampled(theta)[:, column]).statistic > 0.98
+
+
+def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread():
+    class Silent(Problem):
+        def log_likelihood(self, theta, readings=None):
+            return np.zeros(len(theta))
+
+    problem = PROBLEMS["pooled"]
+    silent, names = Silent(problem.samples, problem.prior, problem.likelihood), problem.names
+    theta = problem.prior.rvs(500, np.random.default_rng(3))
+    z = Coordinates(silent).to_sampled(theta)
+    at = {name: i for i, name in enumerate(names)}
+    seen = Coordinates(problem).to_sampled(theta)
+    for line, spread, own in problem.prior.pools:
+        for name in own:
+            deviation = np.log(theta[:, at[name]] / theta[:, at[line]]) / theta[:, at[spread]]
+            assert z[:, at[name]] == pytest.approx(deviation, rel=0.05, abs=0.05)
+    # readings say much of k1: with a wide spread a specimen's value counts, and its line's does not matter
+    theta = theta[:2]
+    theta[:, at["spread_k1"]], theta[1] = 10.0, theta[0]
+    theta[1, at["k1"]] *= 1.1
+    moved = np.diff(Coordinates(problem).to_sampled(theta), axis=0)[0]
+    own = [at[name] for name in problem.prior.pools[0][2]]
+    assert np.abs(moved[own]).max() < 0.01 < np.abs(np.diff(z[:2], axis=0)[0][own]).max()
+    assert np.isfinite(seen).all()

@@ -1,0 +1,133 @@
+"""Warnings of readings that a bench hardly gives: said at their thresholds, silent on sound tests."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analyses.hidden_effects.noise import measure
+from analyses.hidden_effects.truth import PROTOCOLS, draw_rig
+from wirebayes.io import data_checks, paper
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+from wirebayes.wire.protocol import Protocol
+
+WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
+
+
+@pytest.fixture(scope="module")
+def sound():
+    """Protocol and (H, R) tensions of a sound test, resolution 0.01 N."""
+    sample = draw([Bench()], Truth(WIRE), seed=1).problem.samples[0]
+    return sample.protocol, sample.readings[..., 0]
+
+
+def said(protocol, tension, resolution=0.01):
+    return " | ".join(data_checks.warnings(protocol, tension, resolution))
+
+
+def test_a_sound_test_gets_no_warning(sound):
+    assert said(*sound) == ""
+    assert data_checks.of_experiments(paper.experiments()) == []
+
+
+def test_times_of_the_whole_test_are_suspected_where_they_are_not_certain():
+    protocol = Protocol(
+        1000.0, np.array([1.0, 2.0]), np.arange(10.0).reshape(2, 5), np.ones((2, 5), bool),
+        np.array([4.0, 9.0]), np.array([1, 2]),
+    )  # fmt: skip
+    tension = np.array([[1.0] * 5, [2.0] * 5])
+    assert "time_s counts from the beginning of each hold" in said(protocol, tension)
+    assert said(replace(protocol, time_s=protocol.time_s % 5), tension) == ""
+
+
+def test_tensions_below_zero_by_more_than_an_offset(sound):
+    protocol, tension = sound
+    for depth, warned in ((0.04, False), (0.06, True)):
+        slack = tension.copy()
+        slack[0] = -depth * tension.max()
+        assert ("hold 1, while a wire only pulls" in said(protocol, slack)) == warned
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t, rng: np.round(5.0 + 0.006 * rng.normal(size=t.shape), 2), "tension stays at 5 N while"),
+        (lambda t, rng: np.round(0.006 * rng.normal(size=t.shape), 2), "no reading stands out from the scatter"),
+        (lambda t, rng: t[::-1], "tension falls as the displacement rises"),
+        (lambda t, rng: t[:, ::-1], "tension rises within 12 of 12 holds on loading"),
+        (lambda t, rng: np.where(np.arange(5) % 2, 4.3 * t, t), "rows of other tests are mixed in"),
+        (lambda t, rng: t / 9.80665, "readings change by less than resolution_N"),
+        (lambda t, rng: np.round(t / 1000.0, 6), "readings change by less than resolution_N"),
+    ],
+)
+def test_absurd_tensions_are_named(sound, change, words):
+    protocol, tension = sound
+    assert words in said(protocol, change(tension, np.random.default_rng(0)))
+
+
+def test_one_gross_outlier_is_named_with_its_place(sound):
+    protocol, tension = sound
+    for share, warned in ((0.9, False), (1.3, True)):  # of the range of all others
+        gross = tension.copy()
+        gross[5, 2] += share * data_checks.GROSS * np.ptp(tension)
+        assert ("in hold 6 at 60 s is" in said(protocol, gross)) == warned
+    last = tension.copy()
+    last[11, 4] *= 10
+    assert "in hold 12 at 120 s is" in said(protocol, last)
+
+
+@pytest.mark.parametrize(("strain", "warned"), [(4e-5, True), (6e-5, False), (0.4, False), (0.6, True)])
+def test_displacements_beside_the_length(sound, strain, warned):
+    protocol, tension = sound
+    length = np.ptp(protocol.displacement_mm) / strain
+    assert (
+        "displacement_mm and length_mm are both in mm" in said(replace(protocol, length_mm=length), tension)
+    ) == warned
+
+
+def test_threads_and_ropes_get_no_warning(sound):
+    """Ten grams and fifty tonnes, in N and mm, with sensors to match."""
+    protocol, tension = sound
+    for scale in (0.1 / tension.max(), 5e5 / tension.max()):
+        assert said(protocol, scale * tension, scale * 0.01) == ""
+
+
+def test_the_same_place_throughout(sound):
+    protocol, tension = sound
+    still = replace(protocol, displacement_mm=np.ones_like(protocol.displacement_mm))
+    assert "all holds have the same displacement_mm" in said(still, tension)
+
+
+def test_clean_simulated_tests_get_no_warning():
+    """199 tests: wires from the prior and from the benchmark, with unloading, slack, odd times, few readings."""
+    benches = [
+        Bench(),
+        Bench(displacements_mm=(1, 2, 3, 4, 5, 6, 5, 4, 3, 2)),
+        Bench(length_mm=2500.0, displacements_mm=(0.5, 1.5, 2.0, 4.0, 6.0), times_s=(0.0, 1.0, 5.0, 20.0, 600.0)),
+        Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 30.0), resolution_N=0.0),
+    ]
+    tests = []
+    for seed in range(25):
+        for bench in benches:
+            sample = draw([bench], seed=seed).problem.samples[0]
+            tests.append((sample.protocol, sample.readings[..., 0], bench.resolution_N))
+    for index, name in enumerate(PROTOCOLS):
+        rng = np.random.default_rng(index)
+        for _ in range(9):
+            rig = draw_rig(rng, name)
+            readings = measure(rig, None, rng, "gross")
+            for bench, part in zip(rig.benches, rig.bench_slices, strict=True):
+                tests.append((*_padded(bench, readings[part]), bench.resolution_N or 0.0))
+    assert len(tests) == 199
+    assert [said(*test) for test in tests if said(*test)] == []
+
+
+def _padded(bench, readings):
+    width = max(len(hold.times_s) for hold in bench.holds)
+    times, mask = np.zeros((len(bench.holds), width)), np.zeros((len(bench.holds), width), bool)
+    for j, hold in enumerate(bench.holds):
+        times[j, : len(hold.times_s)], mask[j, : len(hold.times_s)] = hold.times_s, True
+    tension = np.zeros(mask.shape)
+    tension[mask] = readings
+    moved, lasted = bench.displacements_mm, np.array([hold.duration_s for hold in bench.holds])
+    return Protocol(bench.length_mm, moved, times, mask, lasted, np.array([h.number for h in bench.holds])), tension

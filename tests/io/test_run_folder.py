@@ -1,0 +1,130 @@
+"""Files are written whole, and a folder belongs to one configuration."""
+
+import json
+import stat
+
+import numpy as np
+import pytest
+
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import check_file, check_run, open_run, write_bytes, write_csv, write_json
+
+CONFIGURATION = {"command": "fit", "seed": 0, "data": {"wire-a": "abc"}, "effects": ["toe"]}
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
+    path = tmp_path / "a.json"
+    write_json(path, {"b": 1})
+    with pytest.raises(TypeError):
+        write_json(path, {"b": object()})
+    with pytest.raises(TypeError):
+        write_bytes(path, "text, not bytes")
+    assert json.loads(path.read_text()) == {"b": 1}
+    assert [file.name for file in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_what_a_killed_run_was_writing_is_removed_by_the_next_command(tmp_path):
+    folder, table = tmp_path / "out", tmp_path / "predicted.csv"
+    open_run(folder, CONFIGURATION)
+    (folder / "wire-a").mkdir()
+    left = [folder / ".configuration.json.x.partial", folder / "wire-a" / ".posterior.nc.partial"]
+    left.append(tmp_path / ".predicted.csv.x.partial")
+    others = [folder / "wire-a" / "thesis.partial", tmp_path / ".other.csv.x.partial"]
+    for path in [*left, *others]:
+        path.write_text("half")
+    open_run(folder, CONFIGURATION)
+    check_file(table)
+    assert [path for path in left if path.exists()] == []
+    assert all(path.exists() for path in others)
+
+
+def test_files_are_readable_by_others_as_usual(tmp_path):
+    (tmp_path / "usual").write_text("")
+    write_bytes(tmp_path / "ours", b"")
+    modes = {stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("usual", "ours")}
+    assert len(modes) == 1
+
+
+def test_json_keeps_order_and_exact_numbers(tmp_path):
+    path = tmp_path / "a.json"
+    write_json(path, {"k1": np.float64(0.1), "B": np.arange(2), "x": (np.nan, np.inf), "ok": np.True_, "p": tmp_path})
+    assert path.read_text().endswith("}\n")
+    found = json.loads(path.read_text())
+    assert list(found.items()) == [
+        ("k1", 0.1),
+        ("B", [0, 1]),
+        ("x", [None, None]),
+        ("ok", True),
+        ("p", str(tmp_path)),
+    ]
+
+
+def test_csv_round_trips(tmp_path):
+    write_csv(tmp_path / "a.csv", ["name", "mean_N"], [("a,b", np.float64(1 / 3)), ("c", np.nan)])
+    assert (tmp_path / "a.csv").read_bytes() == b'name,mean_N\n"a,b",0.3333333333333333\nc,\n'
+
+
+def test_a_folder_is_new_then_resumed_then_done(tmp_path):
+    folder = tmp_path / "out" / "fit"
+    run = open_run(folder, CONFIGURATION)
+    assert run.state == "new"
+    assert json.loads((folder / "configuration.json").read_text()) == CONFIGURATION
+    assert open_run(folder, CONFIGURATION).state == "resumed"
+    run.finish()
+    assert open_run(folder, CONFIGURATION).state == "done"
+
+
+def test_an_empty_folder_or_one_left_by_a_kill_is_new(tmp_path):
+    (tmp_path / ".configuration.json.x.partial").write_text("{")
+    assert open_run(tmp_path, CONFIGURATION).state == "new"
+
+
+def test_checking_makes_nothing(tmp_path):
+    assert check_run(tmp_path / "out", CONFIGURATION) == "new"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"seed": 1}, "seed is 0 there, 1 here;"),
+        ({"data": {"wire-a": "abd"}}, "data.wire-a is abc there, abd here;"),
+        ({"effects": []}, 'effects is ["toe"] there, [] here;'),
+        ({"history": "additive"}, "history is nothing there, additive here;"),
+    ],
+)
+def test_another_configuration_is_refused_by_name(tmp_path, change, said):
+    open_run(tmp_path / "out", CONFIGURATION)
+    before = (tmp_path / "out" / "configuration.json").read_bytes()
+    with pytest.raises(InputError) as caught:
+        open_run(tmp_path / "out", CONFIGURATION | change)
+    assert str(caught.value).startswith(f"{tmp_path / 'out'}: made with another configuration: {said} expected a new")
+    assert (tmp_path / "out" / "configuration.json").read_bytes() == before
+
+
+def test_a_key_that_is_gone_is_a_difference_too(tmp_path):
+    open_run(tmp_path / "out", CONFIGURATION)
+    with pytest.raises(InputError, match="seed is 0 there, nothing here"):
+        open_run(tmp_path / "out", {key: value for key, value in CONFIGURATION.items() if key != "seed"})
+
+
+def test_what_is_not_ours_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(InputError, match="found thesis.tex but no configuration.json"):
+        open_run(tmp_path, CONFIGURATION)
+    with pytest.raises(InputError, match="found a file, expected a folder"):
+        open_run(tmp_path / "thesis.tex", CONFIGURATION)
+    with pytest.raises(InputError, match="expected a (writable )?folder"):
+        open_run(tmp_path / "thesis.tex" / "deeper", CONFIGURATION)
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "configuration.json").write_text("{")
+    with pytest.raises(InputError, match="found no readable configuration"):
+        open_run(tmp_path / "broken", CONFIGURATION)
+
+
+def test_a_file_that_cannot_be_written_is_refused_beforehand(tmp_path):
+    check_file(tmp_path / "new.csv")
+    with pytest.raises(InputError, match="found a folder"):
+        check_file(tmp_path)
+    with pytest.raises(InputError, match="found no writable folder"):
+        check_file(tmp_path / "absent" / "new.csv")

@@ -1,0 +1,100 @@
+"""Amplitudes integrated out: against the normal density written out, and against the density that keeps them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.model import dense
+from wirebayes.effects import named
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.io import paper
+from wirebayes.model.marginal import Integrated, completed, integrated
+from wirebayes.model.problem import build
+
+WIRES = {e.name: e for e in paper.experiments()}
+UNNAMED = "discrepancy@13:0.08:120.0"
+
+
+def problem_of(name: str, *effects: str):
+    return build([WIRES[name]], [named(key) for key in (*effects, UNNAMED)])
+
+
+def likely(problem, n: int):
+    """Parameters not far from the paper's wires, prior draws of the others."""
+    theta = problem.prior.rvs(n, np.random.default_rng(3))
+    for name, value in {"k1": 900.0, "B": 0.4, "U": 0.6, "k2": 0.03, "N": 0.6, "preload": 0.3}.items():
+        theta[:, problem.names.index(name)] = value * np.exp(0.2 * np.random.default_rng(len(name)).normal(size=n))
+    return theta
+
+
+@pytest.mark.parametrize("name", ["roc-line-1m", "kite-1.5m"])
+def test_the_density_is_the_normal_one_with_the_amplitudes_covariance(name):
+    inner = integrated(problem_of(name))
+    theta = likely(inner, 5)
+    found = inner.log_likelihood(theta)
+    [sample], [shapes] = inner.samples, inner.shapes
+    own = inner.parameters(theta, sample)
+    added = shapes[sample.protocol.mask] * inner.sd
+    for i in range(len(theta)):
+        row = {key: value[i] for key, value in own.items()}
+        r, covariance, _ = dense.normal(
+            sample.protocol, row, sample.model, sample.readings[..., 0], sample.resolution_N
+        )
+        expected = dense.log_density(r, covariance + added @ added.T)
+        assert found[i] == pytest.approx(expected, rel=1e-9, abs=1e-6)
+
+
+@pytest.mark.parametrize("effects", [(), ("toe",)])
+def test_bayes_rule_holds_at_every_completed_draw(effects):
+    whole = problem_of("roc-line-1m", *effects)
+    wide = stats.norm(0.01, 0.05)  # one prior that is not centred
+    priors = whole.prior.distributions | {"discrepancy.course1": wide}
+    whole = replace(whole, prior=replace(whole.prior, distributions=priors))
+    inner = integrated(whole)
+    assert isinstance(inner, Integrated)
+    theta = likely(inner, 50)
+    problem, draws, log_density = completed(inner, theta, np.random.default_rng(1))
+    assert problem is whole
+    np.testing.assert_array_equal(draws[:, [whole.names.index(n) for n in inner.names]], theta)
+    gone = [i for i, n in enumerate(whole.names) if n not in inner.names]
+    prior = sum(whole.prior.distributions[whole.names[i]].logpdf(draws[:, i]) for i in gone)
+    np.testing.assert_allclose(
+        whole.log_likelihood(draws) + prior - log_density, inner.log_likelihood(theta), rtol=1e-9, atol=1e-6
+    )
+
+
+def test_absurd_parameters_have_no_density_and_stop_nobody():
+    inner = integrated(problem_of("kite-1.5m"))
+    rng = np.random.default_rng(0)
+    theta = likely(inner, 2000)
+    theta[1:] *= 10.0 ** rng.uniform(-40, 40, size=theta[1:].shape)
+    value = inner.log_likelihood(theta)
+    assert value[0] == pytest.approx(inner.log_likelihood(theta[:1])[0])
+    assert not np.isnan(value).any() and (value == -np.inf).any()
+
+
+def test_only_what_is_linear_to_the_end_is_integrated_out():
+    assert integrated(build([WIRES["roc-line-1m"]], [named("sensor_drift")])).names[-1] == "setting_sd"
+    plain = build([WIRES["roc-line-1m"]], [named("toe")])
+    assert integrated(plain) is plain
+    before = problem_of("roc-line-1m", "sensor_nonlinearity")
+    assert isinstance(integrated(before), Integrated)
+    after = build([WIRES["roc-line-1m"]], [named(UNNAMED), named("sensor_nonlinearity")])
+    assert integrated(after) is after
+    wide = before.prior.distributions | {"discrepancy.level0": stats.uniform(-1.0, 2.0)}
+    uniform = replace(before, prior=replace(before.prior, distributions=wide))
+    assert integrated(uniform) is uniform
+
+
+def test_a_fit_has_all_parameters_and_what_no_reading_shows_keeps_its_prior():
+    whole = problem_of("roc-line-1m")
+    fitted = fit(whole, 1, policy=Policy(walkers=64, ess=1000.0))
+    assert fitted.theta.shape[-1] == len(whole.names)
+    beyond = fitted.flat[:, whole.names.index("discrepancy.level5")]
+    sd = whole.prior.distributions["discrepancy.level5"].std()
+    assert stats.kstest(beyond, stats.norm(0.0, sd).cdf).pvalue > 1e-3
+    within = fitted.flat[:, whole.names.index("discrepancy.course2")]
+    assert within.std() < 0.5 * sd

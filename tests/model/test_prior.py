@@ -1,0 +1,77 @@
+"""One prior object for sampling, calibration and prediction agrees with scipy; a wrong table is named."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.errors import InputError
+from wirebayes.model.prior import Prior, fast_logpdf, from_table, wire_defaults
+
+FORMS = [
+    stats.norm(0.5, 2.0), stats.halfnorm(0.0, 0.3), stats.lognorm(1.2, scale=0.03), stats.uniform(-1.0, 3.0),
+    stats.beta(1.0, 30.0), stats.lognorm(0.5, loc=1.0, scale=2.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_fast_density_is_scipy_s_inside_and_outside(form):
+    x = np.concatenate([form.rvs(50, random_state=0), [-3.0, 0.0, 1e-12, 1.0, 7.0]])
+    assert fast_logpdf(form)(x) == pytest.approx(form.logpdf(x), rel=1e-12)
+
+
+def test_draws_quantiles_and_density_belong_to_one_distribution():
+    prior = Prior(wire_defaults(1000.0), {}, frozenset())
+    draws = prior.rvs(4000, np.random.default_rng(0))
+    for i, distribution in enumerate(prior.distributions.values()):
+        # Kolmogorov-Smirnov at a level that eight tests together miss once in ten thousand
+        assert stats.kstest(draws[:, i], distribution.cdf).pvalue > 1e-5
+    cube = np.random.default_rng(1).uniform(size=(100, len(prior.names)))
+    theta = prior.ppf(cube)
+    for i, distribution in enumerate(prior.distributions.values()):
+        assert distribution.cdf(theta[:, i]) == pytest.approx(cube[:, i], rel=1e-9)
+    expected = sum(d.logpdf(theta[:, i]) for i, d in enumerate(prior.distributions.values()))
+    assert prior.log_density()(theta) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_stated_ranges_are_the_5_and_95_percent_points():
+    stated = {
+        "k1": (170, 24000), "B": (0.05, 2.7), "U": (0.16, 1.6), "k2": (0.0042, 0.22), "N": (0.31, 1.4),
+        "preload": (-1.1, 2.1), "sensor_sd": (0.0014, 0.1), "setting_sd": (0.004, 0.2),
+    }  # fmt: skip
+    for name, distribution in wire_defaults(1000.0).items():
+        assert distribution.ppf([0.05, 0.95]) == pytest.approx(stated[name], rel=0.15)
+
+
+def test_tables_become_distributions_and_fixed_values():
+    made = from_table("prior.k1", {"distribution": "log-normal", "median": 700.0, "sd_log": 0.3})
+    assert made.median() == pytest.approx(700.0)
+    assert from_table("prior.N", {"fixed": 1}) == 1.0
+    assert from_table("prior.U", {"distribution": "uniform", "low": 0.1, "high": 0.9}).support() == pytest.approx(
+        (0.1, 0.9)
+    )
+    assert from_table("prior.p", {"distribution": "normal", "mean": 1.0, "sd": 2.0}).std() == pytest.approx(2.0)
+    assert from_table("prior.p", {"distribution": "half-normal", "sd": 2.0}).support()[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (3.0, "expected a table"),
+        ({}, "prior.k1.distribution: found no such key, expected one of normal"),
+        ({"distribution": "gamma"}, "expected one of normal, half-normal, log-normal, uniform"),
+        ({"distribution": "normal", "mean": 1.0}, "takes mean, sd"),
+        ({"distribution": "normal", "mean": 1.0, "sd": 1.0, "low": 0.0}, "takes mean, sd"),
+        ({"distribution": "normal", "mean": 1.0, "sd": 0.0}, "prior.k1.sd: found 0.0"),
+        ({"distribution": "normal", "mean": "1", "sd": 1.0}, "prior.k1.mean: found '1'"),
+        ({"distribution": "normal", "mean": True, "sd": 1.0}, "expected a finite number"),
+        ({"distribution": "log-normal", "median": -1.0, "sd_log": 1.0}, "prior.k1.median"),
+        ({"distribution": "uniform", "low": 1.0, "high": 1.0}, "above low = 1.0"),
+        ({"fixed": float("nan")}, "prior.k1.fixed"),
+    ],
+)
+def test_a_malformed_table_is_named_with_what_was_expected(table, said):
+    with pytest.raises(InputError) as complaint:
+        from_table("prior.k1", table)
+    assert "prior.k1" in str(complaint.value)
+    assert said in str(complaint.value)
+    assert len(str(complaint.value).splitlines()) == 1

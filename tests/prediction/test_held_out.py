@@ -1,0 +1,127 @@
+"""Scores of held-out holds against closed forms, and bands against readings they must and must not cover."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.inference.fit import Fit, fit
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
+from wirebayes.prediction.held_out import _scores, held_out, pit_band, train_counts, two_thirds
+from wirebayes.wire.staircase import simulate
+
+QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Fit:
+    return fit(build([experiments()[1].train(8)]), 1, policy=QUICK)
+
+
+def at_one_point(fitted: Fit) -> Fit:
+    """A posterior that is a single point, so that the predictive is a known normal."""
+    return replace(fitted, theta=np.tile(np.median(fitted.flat, axis=0), (2, 2000, 1)))
+
+
+def dense_conditional(fitted: Fit, experiment: Experiment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean and covariance of the readings to come given the trained ones, and the measured ones."""
+    truth = dict(zip(fitted.problem.names, np.median(fitted.flat, axis=0), strict=True))
+    trained = len(fitted.problem.samples[0].protocol.number)
+    protocol = experiment.protocol()
+    holds, step = len(protocol.number), 1e-6
+    many = {name: np.full(holds, value) for name, value in truth.items()}
+    jacobian = (simulate(protocol, many, setting_mm=step * np.eye(holds))
+                - simulate(protocol, many, setting_mm=-step * np.eye(holds))) / (2 * step)  # fmt: skip
+    nominal = simulate(protocol, {name: value[:1] for name, value in many.items()})[..., 0]
+    past = np.arange(holds) < trained
+    j = jacobian.reshape(-1, holds)
+    v = (truth["sensor_sd"] ** 2 + 0.01**2 / 12) * np.eye(len(j)) + truth["setting_sd"] ** 2 * j @ j.T
+    rows = np.repeat(past, protocol.time_s.shape[1])
+    gain = v[np.ix_(~rows, rows)] @ np.linalg.inv(v[np.ix_(rows, rows)])
+    residual = (experiment.tension() - nominal).ravel()
+    mean = nominal.ravel()[~rows] + gain @ residual[rows]
+    return mean, v[np.ix_(~rows, ~rows)] - gain @ v[np.ix_(rows, ~rows)], experiment.tension().ravel()[~rows]
+
+
+def test_log_scores_are_those_of_the_dense_normal(fitted: Fit) -> None:
+    experiment = experiments()[1]
+    result = held_out(at_one_point(fitted), experiment, np.random.default_rng(0))
+    mean, cov, measured = dense_conditional(fitted, experiment)
+    assert result.free is not None
+    assert result.free.elpd_together == pytest.approx(stats.multivariate_normal(mean, cov).logpdf(measured), abs=1e-4)
+    for i in range(4):
+        rows = slice(5 * i, 5 * i + 5)
+        whole = stats.multivariate_normal(mean[rows], cov[rows, rows]).logpdf(measured[rows])
+        first = stats.norm(mean[5 * i], np.sqrt(cov[5 * i, 5 * i])).logpdf(measured[5 * i])
+        assert result.free.elpd[i] == pytest.approx(whole, abs=1e-4)
+        assert result.given.elpd[i] == pytest.approx(whole - first, abs=1e-4)
+    assert result.trained == 8
+    assert list(np.unique(result.given.hold)) == [9, 10, 11, 12]
+    assert len(result.given.observed_N) == 16
+
+
+def test_predictive_moments_and_transform_are_those_of_the_dense_normal(fitted: Fit) -> None:
+    experiment = experiments()[1]
+    free = held_out(at_one_point(fitted), experiment, np.random.default_rng(0)).free
+    mean, cov, measured = dense_conditional(fitted, experiment)
+    assert free is not None
+    sd = np.sqrt(np.diag(cov))
+    assert np.abs((free.mean_N - mean) / sd).max() < 5 / np.sqrt(4000)
+    assert np.abs(free.pit - stats.norm.cdf((measured - mean) / sd)).max() < 0.05
+    inside = np.abs((measured - mean) / sd) < stats.norm.ppf(0.95)
+    assert free.coverage()[0.9] == pytest.approx(inside.mean(), abs=0.11)
+
+
+def test_central_intervals_hold_the_share_they_name() -> None:
+    """Standard normal predictive; readings at 200 evenly spaced quantiles of it, so that the shares are known."""
+    draws = stats.norm.ppf((np.arange(4000) + 0.5) / 4000)
+    readings = stats.norm.ppf((np.arange(200) + 0.5) / 200)[:, None]
+    mask, times = np.ones((200, 1), bool), np.zeros((200, 1))
+    found = _scores(np.tile(draws, (200, 1, 1)), mask, np.arange(200), times, readings, np.zeros(200), 0.0)
+    assert found.coverage() == {0.5: 0.5, 0.9: 0.9, 0.99: 0.99}
+    assert found.pit == pytest.approx((np.arange(200) + 0.5) / 200, abs=1 / 4000)
+
+
+def test_hold_by_hold_has_no_free_prediction() -> None:
+    experiment = experiments()[1]
+    fitted = fit(build([experiment.train(8)], likelihood="hold"), 1, policy=QUICK)
+    result = held_out(fitted, experiment, np.random.default_rng(0))
+    assert result.free is None
+    assert result.given.rmse_N < 0.05
+
+
+@pytest.mark.statistical
+def test_transform_band_holds_as_often_as_it_says_with_dependent_readings() -> None:
+    rng = np.random.default_rng(7)
+    shared = 0.8 * np.tile(np.eye(4), 5).T.reshape(20, 4)  # five readings share an error
+
+    def draws(n: int) -> np.ndarray:
+        return shared @ rng.normal(size=(4, n)) + 0.4 * rng.normal(size=(20, n))
+
+    predictive = draws(800)
+    trials = 200
+    outside = sum(pit_band(predictive, observed)[1] < 0.05 for observed in draws(trials).T)
+    assert stats.binomtest(outside, trials, 0.05).pvalue > 0.001
+    # a predictive that is too narrow is caught, one shifted by two sd too
+    assert pit_band(predictive, draws(1)[:, 0] * 4)[1] < 0.05
+    assert pit_band(predictive, draws(1)[:, 0] + 2.0)[1] < 0.05
+
+
+def test_band_itself_covers_the_diagonal_and_is_ordered() -> None:
+    rng = np.random.default_rng(8)
+    band, p = pit_band(rng.normal(size=(30, 1000)), rng.normal(size=30))
+    level, low, high = band
+    assert np.all(low <= level + 0.03) and np.all(level <= high + 0.03) and np.all(low <= high)
+    assert 0 <= p <= 1
+
+
+def test_training_counts() -> None:
+    assert train_counts(12) == [5, 8]
+    assert train_counts(11) == [5, 7, 8]
+    assert train_counts(8) == [5]
+    assert two_thirds(8) == 5
+    assert train_counts(3) == []

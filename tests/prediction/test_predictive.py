@@ -1,0 +1,157 @@
+"""Predicted readings against the dense normal of the whole staircase, and against importance weights."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.effects import named
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
+from wirebayes.prediction.predictive import Question, predict
+from wirebayes.wire.staircase import simulate
+
+TRUTH = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.006, "setting_sd": 0.02}
+DRAWS = 4000
+
+
+def wire(name: str = "roc-line-1m") -> Experiment:
+    return next(e for e in experiments() if e.name == name)
+
+
+def question_of(experiment: Experiment, train: int, first: dict[int, float] | None = None) -> Question:
+    """Trained holds as replicates, the others free or given their first reading (by row)."""
+    protocol = experiment.protocol()
+    given = np.full(len(protocol.number), np.nan)
+    for row, value in (first or {}).items():
+        given[row] = value
+    return Question(protocol, len(experiment.train(train).holds), protocol.recorded, given)
+
+
+def rows(values: dict[str, float], problem_names: tuple[str, ...], n: int = DRAWS) -> np.ndarray:
+    return np.tile([values[name] for name in problem_names], (n, 1))
+
+
+def dense(experiment: Experiment, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Nominal readings (rows,) and their derivative by every setting error, by differences of the exact staircase."""
+    protocol = experiment.protocol()
+    theta = {name: np.array([value]) for name, value in values.items()}
+    holds, step = len(protocol.number), 1e-6
+    moved = np.eye(holds) * step
+    many = {name: np.full(holds, value) for name, value in values.items()}
+    up, down = simulate(protocol, many, setting_mm=moved), simulate(protocol, many, setting_mm=-moved)
+    return simulate(protocol, theta)[..., 0], (up - down) / (2 * step)
+
+
+@pytest.mark.statistical
+def test_holds_to_come_follow_the_dense_conditional_normal() -> None:
+    experiment, train = wire(), 8
+    trained = experiment.train(train)
+    problem = build([trained])
+    drawn = predict(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
+                    np.random.default_rng(1))  # fmt: skip
+    nominal, jacobian = dense(experiment, TRUTH)
+    past = np.zeros(nominal.shape, bool)
+    past[: len(trained.holds)] = experiment.protocol().mask[: len(trained.holds)]
+    to_come = experiment.protocol().mask & ~past
+    variance = TRUTH["sensor_sd"] ** 2 + 0.01**2 / 12
+    scale = TRUTH["setting_sd"] ** 2
+    j_past, j_next = jacobian[past], jacobian[to_come]
+    v = variance * np.eye(past.sum()) + scale * j_past @ j_past.T
+    gain = scale * j_next @ j_past.T @ np.linalg.inv(v)
+    mean = nominal[to_come] + gain @ (experiment.tension()[past] - nominal[past])
+    cov = variance * np.eye(to_come.sum()) + scale * j_next @ j_next.T - scale * gain @ j_past @ j_next.T
+    found = drawn[to_come]
+    sd = np.sqrt(np.diag(cov))
+    # exact setting errors differ from the linearised ones by far less than the Monte-Carlo error
+    assert np.abs((found.mean(axis=1) - mean) / sd).max() < 5 / np.sqrt(DRAWS)
+    assert np.abs(np.cov(found) - cov).max() < 6 * sd.max() ** 2 * np.sqrt(2 / DRAWS)
+    # and the history matters: forgetting the training readings is a difference this test sees
+    assert np.abs(gain @ (experiment.tension()[past] - nominal[past]) / sd).max() > 10 / np.sqrt(DRAWS)
+
+
+@pytest.mark.statistical
+def test_replicates_have_new_noise_and_new_setting_error() -> None:
+    experiment, train = wire(), 8
+    problem = build([experiment.train(train)])
+    drawn = predict(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
+                    np.random.default_rng(2))  # fmt: skip
+    nominal, jacobian = dense(experiment, TRUTH)
+    trained = np.flatnonzero(experiment.protocol().recorded)[:train]
+    for row in trained[1:]:
+        own = TRUTH["setting_sd"] * jacobian[row, 0, row]
+        sd = np.sqrt(own**2 + TRUTH["sensor_sd"] ** 2 + 0.01**2 / 12)
+        # the creep carried in is known from the readings to a small part of the hold's own setting error
+        assert drawn[row, 0].std() == pytest.approx(sd, rel=0.06)
+
+
+@pytest.mark.statistical
+def test_given_first_reading_agrees_with_importance_weights() -> None:
+    experiment, train = wire("roc-line-1.71m"), 6
+    values = TRUTH | {"k1": 690.0, "B": 0.3}
+    problem = build([experiment.train(train)])
+    rng = np.random.default_rng(3)
+    n = 60000
+    theta = rows(values, problem.names, n)
+    spread = {"k1": 4.0, "B": 0.01, "U": 0.01, "preload": 0.01}
+    for name, sd in spread.items():
+        theta[:, problem.names.index(name)] += sd * rng.normal(size=n)
+    free = question_of(experiment, train)
+    row = len(experiment.train(train).holds)
+    drawn = predict(problem, theta, problem.samples[0], free, rng)
+    observed = float(drawn[row, 0].mean() + 1.0 * drawn[row, 0].std())
+    given = predict(problem, theta, problem.samples[0], question_of(experiment, train, {row: observed}), rng)
+    # the same by keeping the free draws whose first reading comes out near the given one
+    near = np.abs(drawn[row, 0] - observed) < 0.1 * drawn[row, 0].std()
+    kept = drawn[row:, :, near]
+    assert near.sum() > 2000
+    for j, k in [(0, 1), (0, 4), (1, 0), (3, 4)]:
+        sd = kept[j, k].std()
+        assert abs(given[row + j, k].mean() - kept[j, k].mean()) < 5 * sd / np.sqrt(near.sum())
+        assert given[row + j, k].std() == pytest.approx(sd, rel=0.06)
+    assert np.all(given[row, 0] == observed)
+    assert given[row, 1].std() < 0.7 * drawn[row, 1].std()
+
+
+def test_a_later_given_reading_leaves_earlier_holds_alone() -> None:
+    experiment, train = wire("roc-line-1.71m"), 6
+    problem = build([experiment.train(train)])
+    theta = rows(TRUTH | {"k1": 690.0}, problem.names, 200)
+    row = len(experiment.train(train).holds)
+    free, given = (
+        predict(problem, theta, problem.samples[0], question_of(experiment, train, first), np.random.default_rng(4))
+        for first in ({}, {row + 2: 3.3})
+    )
+    assert np.array_equal(free[: row + 2], given[: row + 2])
+    assert not np.allclose(free[row + 3], given[row + 3])
+
+
+@pytest.mark.parametrize("key", ["second_relaxation", "memory", "permanent_creep", "sensor_drift", "ageing"])
+def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
+    experiment, train = wire("nylon-1.5m"), 5
+    effect = named(key)
+    problem = build([experiment.train(train)], [effect])
+    values = TRUTH | {"sensor_sd": 1e-7, "setting_sd": 1e-13} | {
+        c: a.neutral + (0.0 if a.is_shape else 0.3 if a.unit == "-" else 1e-3)
+        for c, a in zip(effect.columns(), effect.amplitudes, strict=True)
+    }  # fmt: skip
+    sample = replace(problem.samples[0], resolution_N=1e-9)
+    theta = rows(values, problem.names, 3)
+    drawn = predict(problem, theta, sample, question_of(experiment, train), np.random.default_rng(5))
+    whole = simulate(experiment.protocol(), {n: np.array([values[n]]) for n in problem.names}, sample.model)
+    assert np.allclose(drawn, whole, atol=1e-6)
+
+
+@pytest.mark.statistical
+def test_hold_by_hold_spreads_the_first_readings_own_error() -> None:
+    experiment = wire("roc-line-1.71m")
+    problem = build([experiment], likelihood="hold")
+    theta = rows(TRUTH, problem.names, 20000)
+    protocol = experiment.protocol()
+    question = Question(protocol, len(protocol.number), protocol.recorded, experiment.tension()[:, 0])
+    drawn = predict(problem, theta, problem.samples[0], question, np.random.default_rng(6))
+    assert np.all(drawn[:, 0] == experiment.tension()[:, :1])
+    # with no creep left to matter both readings' errors add: slopes by length are nearly equal
+    expected = np.sqrt(2 * (TRUTH["sensor_sd"] ** 2 + 0.01**2 / 12))
+    assert drawn[5, 1].std() == pytest.approx(expected, rel=0.1)

@@ -1,0 +1,129 @@
+"""What a protocol file asks: temperatures, absent holds, fresh samples and their events."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wirebayes.effects import named
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import read_experiments
+from wirebayes.model.problem import build
+from wirebayes.prediction.request import read_question
+from wirebayes.results.store import Stored
+
+TRAINED = """hold,displacement_mm,time_s,tension_N,temperature_C
+1,1,0,1.00,20.0
+1,1,60,0.90,20.5
+3,2,0,2.00,21.0
+3,2,60,1.90,21.5
+4,3,0,2.90,22.0
+"""
+TOML = """[[experiment]]
+name = "warm"
+material = "line"
+length_mm = 1000.0
+readings = "warm.csv"
+unrecorded_holds = [{ before_hold = 3, displacement_mm = 1.5, duration_s = 30.0 }]
+"""
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> Stored:
+    (tmp_path / "warm.csv").write_text(TRAINED)
+    (tmp_path / "warm.toml").write_text(TOML)
+    effects = [named("thermal_expansion"), named("grip_slip@3")]
+    (experiment,) = read_experiments(tmp_path / "warm.toml")
+    sample = build([experiment.train(2)], effects).samples[0]
+    return Stored({"k1": np.ones(3)}, sample, "chain")
+
+
+def ask(folder: Path, text: str) -> Path:
+    path = folder / "protocol.csv"
+    path.write_text(text)
+    return path
+
+
+def test_holds_to_come_follow_all_that_was_held(tmp_path: Path, stored: Stored) -> None:
+    text = "hold,displacement_mm,time_s,temperature_C\n3,2,0,21.0\n3,2,60,21.5\n7,4,0,25\n7,4,10,25\n7,4,90,26\n"
+    asked = read_question(ask(tmp_path, text), stored)
+    question = asked.question
+    assert question.trained == 3
+    assert list(question.asked) == [False, False, True, True]
+    assert list(question.protocol.number) == [1, -1, 3, 7]
+    assert list(question.protocol.duration_s) == [60, 30, 60, 90]
+    assert question.protocol.warming_K is not None
+    # warming counts from the first temperature of the training, hold 1's 20.0, which this file does not repeat
+    assert question.protocol.warming_K[3] == pytest.approx([5.0, 5.0, 6.0])
+    assert asked.stored is stored
+    assert asked.sentence == (
+        "hold 3 of the training predicted as replicates; hold 7 predicted as a continuation of the tested sample from "
+        "the end of hold 3 on, given all training readings (--fresh for a fresh sample); "
+        "nothing is assumed to have happened in between: holds 4 to 6 not in its history"
+    )
+
+
+def test_later_holds_continue_the_test_though_no_training_hold_is_repeated(tmp_path: Path, stored: Stored) -> None:
+    later = "7,4,0,25\n7,4,10,25\n7,4,90,26\n9,5,0,25\n10,4.5,0,25\n"
+    header = "hold,displacement_mm,time_s,temperature_C\n"
+    alone = read_question(ask(tmp_path, header + later), stored)
+    repeating = read_question(ask(tmp_path, header + "3,2,0,21.0\n3,2,60,21.5\n" + later), stored)
+    assert alone.question.trained == repeating.question.trained == 3
+    assert list(alone.question.asked) == [False, False, False, True, True, True]
+    one, other = alone.question.protocol, repeating.question.protocol
+    for name in ("number", "displacement_mm", "duration_s", "start_s", "time_s", "mask", "warming_K"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    # the slip at hold 3 goes on, the temperature reference is the training's, the clock goes on after 150 s
+    assert [e.key for e in alone.stored.sample.model.effects] == ["thermal_expansion", "grip_slip@3"]
+    assert one.warming_K is not None and one.warming_K[3] == pytest.approx([5.0, 5.0, 6.0])
+    assert one.start_s[3] == 150.0
+    assert "holds 7, 9 to 10 predicted as a continuation" in alone.sentence
+    assert "holds 4 to 6, 8 not in its history" in alone.sentence and "replicate" not in alone.sentence
+
+
+@pytest.mark.parametrize("number", [1, 2, 101])
+def test_a_fresh_sample_starts_anew_without_the_others_events(tmp_path: Path, stored: Stored, number: int) -> None:
+    text = f"hold,displacement_mm,time_s,temperature_C\n{number},3,0,24\n{number},3,60,26\n"
+    asked = read_question(ask(tmp_path, text), stored, fresh=True)
+    protocol = asked.question.protocol
+    assert asked.question.trained == 0 and list(protocol.start_s) == [0.0]
+    assert protocol.warming_K is not None and protocol.warming_K[0] == pytest.approx([0.0, 2.0])
+    assert [e.key for e in asked.stored.sample.model.effects] == ["thermal_expansion"]
+    assert "fresh sample with no history" in asked.sentence
+
+
+def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) -> None:
+    text = "hold,displacement_mm,time_s,temperature_C\n1,1,0,20\n1,1,60,20.5\n3,2,0,21\n3,2,60,21.5\n"
+    assert read_question(ask(tmp_path, text), stored).sentence == "holds 1, 3 of the training predicted as replicates"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("hold,displacement_mm,time_s\n3,2,0\n3,2,60\n", "no column temperature_C"),
+        (
+            "hold,displacement_mm,time_s,temperature_C\n1,1,0,20\n1,1,60,20.5\n3,2,0,21\n3,2,60,23\n",
+            "line 5, column 4 (temperature_C): found 23, expected 21.5",
+        ),
+        (
+            "hold,temperature_C,displacement_mm,time_s\n2,20,1.5,0\n3,21,2,0\n3,21.5,2,60\n",
+            "line 2, column 1 (hold): found 2, expected one of the trained holds (1, 3), or one after hold 3",
+        ),
+        (
+            "hold,temperature_C,displacement_mm,time_s\n0,20,1.5,0\n",
+            "line 2, column 1 (hold): found 0, expected one of the trained holds (1, 3), or one after hold 3",
+        ),
+        (  # the whole file shifted by a degree: the reference is known, not guessed from the file
+            "hold,displacement_mm,time_s,temperature_C\n3,2,0,22\n3,2,60,22.5\n",
+            "line 2, column 4 (temperature_C): found 22, expected 21, as hold 3 was trained on",
+        ),
+        (
+            "hold,temperature_C,displacement_mm,time_s\n3,21,2.5,0\n3,21.5,2.5,60\n",
+            "line 2, column 3 (displacement_mm): found 2.5, expected 2",
+        ),
+    ],
+)
+def test_refusals_say_where(tmp_path: Path, stored: Stored, text: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_question(ask(tmp_path, text), stored)
+    assert words in str(caught.value)

@@ -1,0 +1,39 @@
+"""The table of `predict` against the normal distribution that a single hold of a known wire has."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.model.dense import normal
+from tests.simulated import simulated_tests
+from wirebayes.model.problem import build
+from wirebayes.prediction.predictive import Question
+from wirebayes.prediction.table import HEADER, table
+from wirebayes.results.store import Stored
+from wirebayes.simulation.synthetic import Bench, Truth
+from wirebayes.wire.staircase import Model
+
+WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 0.01}
+DRAWS = 40000
+
+
+def test_quantiles_are_those_of_the_known_normal() -> None:
+    bench = Bench(displacements_mm=(2, 4, 7), resolution_N=0.02)
+    experiment = simulated_tests([bench], Truth(WIRE), seed=1)[0]
+    sample, protocol = build([experiment]).samples[0], experiment.protocol()
+    stored = Stored({name: np.full(DRAWS, value) for name, value in WIRE.items()}, sample, "chain")
+    every = np.ones(3, bool)
+    question = Question(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
+    asked = SimpleNamespace(stored=stored, question=question, holds=experiment.holds)
+    rows = [dict(zip(HEADER, row, strict=True)) for row in table(asked, draws=DRAWS)]  # type: ignore[arg-type]
+    r, covariance, hold = normal(protocol, WIRE, Model(), experiment.tension(), 0.02)
+    mean, sd = experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))
+    assert [row["hold"] for row in rows] == list(hold + 1)
+    for row, middle, width in zip(rows, mean, sd, strict=True):
+        # standard errors over 40000 draws: 0.005 of the mean, 0.011 of an outer quantile, in standard deviations
+        assert (row["mean_N"] - middle) / width == pytest.approx(0.0, abs=0.03)
+        assert row["sd_N"] / width == pytest.approx(1.0, abs=0.03)
+        for name, level in (("q05_N", 0.05), ("q50_N", 0.5), ("q95_N", 0.95)):
+            assert (row[name] - middle) / width == pytest.approx(stats.norm.ppf(level), abs=0.06)

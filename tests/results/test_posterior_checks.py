@@ -1,0 +1,90 @@
+"""Warnings of posteriors that no sound test gives."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.model.problem import FINEST, build, with_readings
+from wirebayes.report.pages.fit import _cautions
+from wirebayes.results import posterior_checks, store
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+
+HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=4)
+WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    return draw([Bench()], Truth(WIRE), seed=1)
+
+
+def test_a_sound_test_gets_no_warning_and_a_gross_one_is_first_in_summary_and_page(simulated, tmp_path):
+    problem = simulated.problem
+    sound = store.save(fit(problem, 1, policy=HASTY), tmp_path, {})
+    assert sound["warnings"] == []
+    mixed = problem.samples[0].readings[np.random.default_rng(0).permutation(12)]
+    store.save(fit(with_readings(problem, [mixed]), 1, policy=HASTY), tmp_path, {})
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert any("setting_sd is at least" in said and "steps by 1 mm" in said for said in summary["warnings"])
+    first = _cautions(summary)[0]
+    assert first.strong and "Check the readings" in first.text
+
+
+def draws(problem, **changes):
+    """Draws of every parameter within a thousandth of the truth, some of them changed."""
+    rng = np.random.default_rng(0)
+    return {name: value * np.exp(0.001 * rng.normal(size=500)) for name, value in (WIRE | changes).items()}
+
+
+def test_the_setting_error_is_compared_with_the_steps(simulated):
+    sample = simulated.problem.samples[0]
+    for sd, warned in ((0.49, False), (0.51, True)):
+        assert bool(posterior_checks.loose_steps(draws(simulated.problem, setting_sd=sd), sample)) == warned
+
+
+def test_the_sensor_error_is_compared_with_the_signal(simulated):
+    sample = simulated.problem.samples[0]
+    signal = np.ptp(sample.readings)
+    for share, warned in ((0.24, False), (0.26, True)):
+        own = draws(simulated.problem, sensor_sd=share * signal)
+        assert ("in all" in posterior_checks.noise(own, sample)) == warned
+
+
+def test_a_stiffness_outside_its_prior_is_named(simulated):
+    prior = simulated.problem.parameters(
+        simulated.problem.prior.rvs(4000, np.random.default_rng(0)), simulated.problem.samples[0]
+    )
+    for k1, warned in ((0.7, True), (7.0, True), (20.0, False), (2e5, False), (1e6, True), (6.9e8, True)):
+        assert ("prior of its own" in posterior_checks.stiffness(draws(simulated.problem, k1=k1), prior)) == warned
+    rope = prior | {"k1": prior["k1"] * 1e5}  # as a prior in the file says
+    assert posterior_checks.stiffness(draws(simulated.problem, k1=5e7), rope) == ""
+
+
+def test_a_posterior_that_is_the_prior_is_named(simulated):
+    problem = simulated.problem
+    one, other = (problem.prior.rvs(4000, np.random.default_rng(seed)) for seed in (0, 1))
+    own, prior = (problem.parameters(theta, problem.samples[0]) for theta in (one, other))
+    assert "say nothing of the wire" in posterior_checks.taught(own, prior)
+    assert posterior_checks.taught(own | {"k1": 700.0 + own["k1"] / 100.0}, prior) == ""
+
+
+def test_readings_without_noise_have_a_floor_and_say_so(simulated):
+    sample = simulated.problem.samples[0]
+    bare = draw([Bench(resolution_N=0.0)], Truth(WIRE | {"sensor_sd": 1e-12}), seed=1)
+    experiment = Bench(resolution_N=0.0).experiment()
+    assert build([experiment]).samples[0].resolution_N == 0.0  # no tension, no floor
+    read = with_tensions(experiment, bare.problem.samples[0].readings[..., 0])
+    problem = build([read])
+    assert problem.samples[0].resolution_N == pytest.approx(FINEST * np.max(bare.problem.samples[0].readings))
+    assert build([with_tensions(Bench().experiment(), sample.readings[..., 0])]).samples[0].resolution_N == 0.01
+    quiet = fit(problem, 1, policy=HASTY)
+    assert any("carry no noise" in said for said in posterior_checks.warnings(quiet, problem.samples[0]))
+
+
+def with_tensions(experiment, tension):
+    holds = [replace(h, tension_N=tension[j, : h.time_s.size]) for j, h in enumerate(experiment.holds)]
+    return replace(experiment, holds=tuple(holds))

@@ -1,0 +1,104 @@
+"""A joint fit of two lengths, stored and read back at each sample's own length."""
+
+import json
+
+import numpy as np
+import pytest
+
+from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
+from wirebayes.effects.elastic import LengthDependence
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import read_experiments
+from wirebayes.model.problem import build
+from wirebayes.results import jobs, store
+from wirebayes.results.jobs import Job
+from wirebayes.simulation.synthetic import Bench, Truth, draw, write
+from wirebayes.wire.staircase import simulate
+
+HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=4)
+BENCHES = [Bench("short", "line", 800.0), Bench("long", "line", 1700.0)]
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    effects = [SecondRelaxation(), SteadyCreep(), LengthDependence("k1")]
+    joint = draw(BENCHES, Truth({"length_dependence.p": 0.4}, effects), seed=3).problem
+    return fit(joint, 1, policy=HASTY)
+
+
+@pytest.mark.parametrize("sample", [0, 1])
+@pytest.mark.parametrize("apart", [False, True])
+def test_what_is_read_back_predicts_as_the_joint_fit_does(fitted, sample, apart, tmp_path):
+    joint = fitted.problem
+    here = joint.samples[sample]
+    store.save(fitted, tmp_path, {}, sample=here if apart else None)
+    stored = store.load(tmp_path, here.name)
+    theta = np.concatenate(list(fitted.theta))[:20]
+    read = {name: values[:20] for name, values in stored.draws.items()}
+    expected = simulate(here.protocol, joint.parameters(theta, here), here.model)
+    assert simulate(stored.sample.protocol, read, stored.sample.model) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire(fitted, tmp_path):
+    """Each written out here, for the sample at its own length."""
+    joint = fitted.problem
+    here = joint.samples[1]
+    summary = store.save(fitted, tmp_path, {}, sample=here)
+    said, load = summary["derived"], summary["derived"]["tension_N"]
+
+    def creep(own, t):
+        mode = own["second_relaxation.A"] * load * (1 - np.exp(-t / own["second_relaxation.T2"]))
+        slow = own["B"] * load ** own["U"] * (1 - np.exp(-own["k2"] * t ** own["N"]))
+        return slow + mode + own["steady_creep.a"] * load * t
+
+    draws = joint.parameters(fitted.flat, here)
+    for key, time in store.CREEP_TIMES_S.items():
+        values = creep(draws, time)
+        assert [said[key][q] for q in ("q05", "q50", "q95")] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]))
+        assert said[key]["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert said["final_creep_mm"] is None and said["median_creep_time_s"] is None  # steady creep never ends
+    stiffness = draws["k1"] * (1700.0 / here.model.length_ref_mm) ** draws["length_dependence.p"]
+    assert said["stiffness_N"]["q50"] == pytest.approx(np.median(stiffness), rel=1e-12)
+    ahead = summary["extrapolation"]
+    rows = fitted.flat[np.linspace(0, len(fitted.flat) - 1, min(4000, len(fitted.flat))).round().astype(int)]
+    expected = [np.median(creep(joint.parameters(rows, here), t)) for t in ahead["time_s"]]
+    assert list(ahead["posterior_mm"]["q50"]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_sample_twice_as_long_moved_twice_as_far_reads_the_same():
+    """Creep and what flows beside it are strains of the whole wire."""
+    effects = [SecondRelaxation(), SteadyCreep()]
+    far = Bench("long", "line", 2000.0, displacements_mm=tuple(range(2, 26, 2)))
+    problem = draw([Bench("short", "line", 1000.0), far], Truth(effects=effects), seed=1).problem
+    short, long = (problem.parameters(problem.prior.rvs(5, np.random.default_rng(0)), s) for s in problem.samples)
+    long["preload"] = 2.0 * short["preload"]
+    one, two = (simulate(s.protocol, own, s.model) for s, own in zip(problem.samples, (short, long), strict=True))
+    assert two == pytest.approx(one, rel=1e-9)
+
+
+def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(tmp_path):
+    write(tmp_path, BENCHES, Truth(), 3)
+    experiments = tuple(read_experiments(tmp_path / "experiments.toml"))
+    job = Job("short/final", experiments, apart=("short/final", "long/final"))
+    jobs.run([job], tmp_path, 0, policy=HASTY)
+    said = [(tmp_path / folder / "summary.json").read_text() for folder in job.folders]
+    short, long = (json.loads(text)["parameters"] for text in said)
+    assert short["k1"] == long["k1"] and short["preload"] != long["preload"]
+    (tmp_path / "long/final/summary.json").unlink()
+    jobs.run([job], tmp_path, 0, policy=HASTY)
+    assert [(tmp_path / folder / "summary.json").read_text() for folder in job.folders] == said
+
+
+def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):
+    """Later holds need it: their warming counts from a temperature that their protocol does not repeat."""
+    write(tmp_path, BENCHES, Truth(), 3)
+    table = (tmp_path / "long.csv").read_text().splitlines()
+    logged = [table[0] + ",temperature_C", *(f"{row},{21.5 + 0.1 * i}" for i, row in enumerate(table[1:]))]
+    (tmp_path / "long.csv").write_text("\n".join(logged) + "\n")
+    experiments = read_experiments(tmp_path / "experiments.toml")
+    store.save(fit(build(experiments), 1, policy=HASTY), tmp_path, {})
+    short, long = (store.load(tmp_path, e.name).sample.protocol for e in experiments)
+    assert short.reference_C is None and short.warming_K is None
+    assert long.reference_C == 21.5
+    assert np.array_equal(long.warming_K, experiments[1].protocol().warming_K)

@@ -1,0 +1,141 @@
+"""The models that a comparison sets side by side, each differing from a base in one thing."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from wirebayes.effects import named
+from wirebayes.effects.rivals import RIVALS
+from wirebayes.inference.modes import modes
+from wirebayes.inference.transform import Target
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.prior import Prior
+from wirebayes.model.problem import Likelihood, Problem, build
+from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.laws import ElasticLaw, History
+
+HOOKE, TIME = "Is Hooke's law enough?", "Which time law?"
+LAW, HISTORY, LIKELIHOOD = "Which elastic law?", "Which history?", "One history, or every hold by itself?"
+SETTING, ABSENT = "Do setting errors matter?", "Was the wire held where readings are missing?"
+EFFECT = "Which effect helps?"
+BASE = "plain"
+_NO_CREEP = {"B": 0.0, "U": 1.0, "k2": 1.0, "N": 1.0}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One model of a comparison.
+
+    Attributes
+    ----------
+    name : str
+        ``plain`` for the base.
+    question, sentence : str
+        What its comparison with the base answers, and what it says of the wire.
+    law, history, likelihood
+        See `wirebayes.model.problem.build`.
+    effects : tuple of str
+        Keys; an event without its hold (``grip_slip``) stands for the hold with the most evidence in the training.
+    fixed : dict
+        Parameters kept at a value.
+    unrecorded : bool
+        False to skip the holds without readings, as if they had not been.
+    """
+
+    name: str
+    question: str
+    sentence: str
+    law: ElasticLaw = "hooke"
+    history: History = "saturating"
+    likelihood: Likelihood = "chain"
+    effects: tuple[str, ...] = ()
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    unrecorded: bool = True
+
+
+def candidates(
+    experiment: Experiment, base: Candidate, known: Mapping[str, type[Effect]], only: Sequence[str] | None = None
+) -> list[Candidate]:
+    """The base and everything that may be set beside it for this experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    base : Candidate
+        Law, history and likelihood that the others share.
+    known : mapping of name to effect class
+    only : sequence of str, optional
+        Keep only these names (and the base).
+    """
+
+    def other(name: str, question: str, sentence: str, **changes: Any) -> Candidate:
+        return replace(base, name=name, question=question, sentence=sentence, **changes)
+
+    out = [base]
+    out.append(other("hooke_without_creep", HOOKE, "The wire is a spring and does not creep.", fixed=_NO_CREEP))
+    out.append(other("creep_at_once", HOOKE, RIVALS["at_once"].sentence, effects=("at_once", "not_in_time"),
+                     fixed={"k2": 1.0, "N": 1.0}))  # fmt: skip
+    out.append(other("exponential", TIME, "The creep has one time constant: N = 1.", fixed={"N": 1.0}))
+    out.append(other("logarithmic", TIME, RIVALS["logarithmic"].sentence, effects=("logarithmic",),
+                     fixed={"k2": 1.0, "N": 1.0}))  # fmt: skip
+    out.append(other("power_law", TIME, RIVALS["power_law"].sentence, effects=("power_law",),
+                     fixed={"k2": 1.0, "N": 1.0}))  # fmt: skip
+    out.append(other("two_modes", TIME, RIVALS["two_modes"].sentence, effects=("two_modes",), fixed={"N": 1.0}))
+    if base.law == "hooke":
+        out.append(other("modified_hooke", LAW, "Strain is taken over the stretched length, eq (3).", law="modified"))
+    else:
+        out.append(other("hooke", LAW, "Strain is taken over the zero-tension length, eq (1).", law="hooke"))
+    if base.history == "saturating":
+        out.append(other("additive", HISTORY, "Every hold adds the creep of eq (4) anew.", history="additive"))
+    else:
+        out.append(other("saturating", HISTORY, "Creep saturates towards the amount of eq (4).", history="saturating"))
+    if base.likelihood == "chain":
+        out.append(other("hold_by_hold", LIKELIHOOD, "Every hold is a separate experiment.", likelihood="hold"))
+        out.append(other("independent_errors", SETTING, "Positions are exact; each reading has an independent error.",
+                         fixed={"setting_sd": 0.0}))  # fmt: skip
+    else:
+        out.append(other("chain", LIKELIHOOD, "The holds form one history.", likelihood="chain"))
+    if any(not hold.recorded for hold in experiment.holds):
+        out.append(other("unrecorded_skipped", ABSENT, "No time passed where readings are missing.", unrecorded=False))
+    protocol = experiment.protocol()
+    for name, kind in known.items():
+        for variant in [kind()] if issubclass(kind, EventEffect) else kind.variants([protocol]):
+            key = name if issubclass(kind, EventEffect) else variant.key
+            out.append(other(key, EFFECT, kind.sentence, effects=(key,)))
+    return [c for c in out if only is None or c.name in only or c is base]
+
+
+def effects_of(
+    candidate: Candidate, training: Experiment, known: Mapping[str, type[Effect]], seed: int
+) -> list[Effect]:
+    """The candidate's effects; an event is put at the training hold where it has the most evidence (Laplace)."""
+    out: list[Effect] = []
+    for key in candidate.effects:
+        name = key.split("@")[0]
+        if name in RIVALS:
+            out.append(RIVALS[name]())
+        elif "@" not in key and issubclass(known[name], EventEffect):
+            out.append(_most_evident(candidate, training, known[name].variants([training.protocol()]), seed))
+        else:
+            out.append(named(key, known))
+    return out
+
+
+def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence[Effect], seed: int) -> Effect:
+    evidence = []
+    for variant in variants:
+        target = Target(problem_of(candidate, training, [variant]))
+        found = modes(target, np.random.default_rng(seed))
+        evidence.append(np.where(found.converged, found.log_evidence, -np.inf).max())
+    return variants[int(np.argmax(evidence))]
+
+
+def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Effect]) -> Problem:
+    """The candidate's posterior of an experiment."""
+    problem = build([training], effects, law=candidate.law, history=candidate.history, likelihood=candidate.likelihood)
+    prior = problem.prior
+    here = {name: value for name, value in candidate.fixed.items() if name in prior.names}
+    free = {name: d for name, d in prior.distributions.items() if name not in here}
+    return replace(problem, prior=Prior(free, prior.fixed | here, prior.logarithmic & free.keys()))

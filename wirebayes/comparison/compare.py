@@ -1,0 +1,253 @@
+"""Models side by side: each hold left out in turn, and the last holds predicted from the first."""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.comparison.candidates import Candidate, effects_of, problem_of
+from wirebayes.effects import catalogue
+from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import write_json
+from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
+from wirebayes.prediction.leave_one_hold_out import loho, standard_error
+from wirebayes.workers import workers
+
+Array = NDArray[np.float64]
+POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=1200)
+MEANINGFUL_ELPD, MEANINGFUL_SE = 4.0, 2.0  # below either, the difference may be chance (Sivula et al. 2020)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One model to be judged on one experiment.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        All its holds.
+    candidate : Candidate
+    train_holds : int or None
+        Learn from the first so many recorded holds only, for both judgements. None: leave one out among all holds,
+        and predict the last third from the rest.
+    own_effects : Path or None
+    """
+
+    experiment: Experiment
+    candidate: Candidate
+    train_holds: int | None = None
+    own_effects: Path | None = None
+
+    @property
+    def file(self) -> Path:
+        """Where its result goes, below the run's folder."""
+        return Path(self.experiment.name) / "models" / f"{self.candidate.name.replace('@', '-')}.json"
+
+
+def judge(task: Task, seed: int, policy: Policy = POLICY) -> dict[str, Any]:
+    """Fit one model and score it; a failure is a result too.
+
+    Returns
+    -------
+    dict
+        Plain values; ``failed`` holds the reason, or None.
+    """
+    candidate = task.candidate
+    content: dict[str, Any] = {
+        "name": candidate.name, "question": candidate.question, "sentence": candidate.sentence,
+        "elastic_law": candidate.law, "history": candidate.history, "likelihood": candidate.likelihood,
+        "scored": "all readings" if candidate.likelihood == "chain" else "later readings given each hold's first",
+    }  # fmt: skip
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of proposals where the model cannot be computed
+            return content | _scores(task, seed, policy) | {"failed": None}
+    except Exception as error:  # a model that cannot be fitted stays in the table, with its reason
+        return content | {"failed": f"{type(error).__name__}: {error}"}
+
+
+def _scores(task: Task, seed: int, policy: Policy) -> dict[str, Any]:
+    candidate, known = task.candidate, catalogue(task.own_effects)
+    whole = task.experiment if candidate.unrecorded else task.experiment.without_unrecorded()
+    recorded = len(whole.recorded_holds)
+    first = task.train_holds or two_thirds(recorded)
+
+    def fitted(holds: int) -> Fit:
+        training = whole.train(holds)
+        own = seed_of(seed, task.experiment.name, candidate.name, str(holds))
+        return fit(problem_of(candidate, training, effects_of(candidate, training, known, seed)), own, policy=policy)
+
+    full = fitted(task.train_holds or recorded)
+    again = replace(policy, ess=policy.ess / 2, most_steps=min(policy.most_steps, 400))
+    left = loho(full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again)
+    early = full if task.train_holds else fitted(first)
+    content: dict[str, Any] = {
+        "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],
+        "parameters": len(full.problem.names),
+        "converged": full.chains.converged and early.chains.converged and left.converged,
+        "convergence": full.chains.why,
+        "leave_one_hold_out": {
+            "holds": left.hold, "elpd": left.total, "se": left.se, "per_hold": left.elpd,
+            "pareto_k": left.pareto_k, "refitted": left.hold[left.refitted],
+        },
+        "held_out": None,
+    }  # fmt: skip
+    if first < recorded:
+        rng = np.random.default_rng(seed_of(seed, task.experiment.name, "held out"))
+        content["held_out"] = _held_out(held_out(early, whole, rng))
+        content["held_out"]["effects"] = [e.key for e in early.problem.samples[0].model.effects]
+    return content
+
+
+def _keys(known: Mapping[str, Any], fitted: Fit) -> list[str]:
+    return [e.key for e in fitted.problem.samples[0].model.effects if e.name in known]
+
+
+def _held_out(result: HeldOut) -> dict[str, Any]:
+    return {
+        "trained_on": result.trained,
+        "holds": np.unique(result.given.hold),
+        "free": None if result.free is None else told(result.free),
+        "given_first": told(result.given),
+    }
+
+
+def told(scores: Scores) -> dict[str, Any]:
+    """Scores as plain values, with what the pictures need."""
+    return {
+        "rmse_N": scores.rmse_N, "elpd": float(scores.elpd.sum()), "per_hold": scores.elpd,
+        "elpd_together": scores.elpd_together,
+        "coverage": {f"{100 * level:g}": share for level, share in scores.coverage().items()}, "pit_p": scores.pit_p,
+        "readings": {
+            "hold": scores.hold, "time_s": scores.time_s, "observed_N": scores.observed_N, "mean_N": scores.mean_N,
+            "sd_N": scores.sd_N, "quantiles_N": scores.quantiles_N, "pit": scores.pit,
+        },
+        "pit_band": scores.pit_band,
+    }  # fmt: skip
+
+
+def run(
+    tasks: Sequence[Task],
+    directory: Path,
+    seed: int,
+    policy: Policy = POLICY,
+    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+) -> None:
+    """Judge all models whose file is not there yet, on all cores; the results do not depend on how many there are."""
+    todo = [task for task in tasks if not (directory / task.file).exists()]
+    for task in todo:
+        (directory / task.file).parent.mkdir(parents=True, exist_ok=True)
+    work = partial(_store, directory=directory, seed=seed, policy=policy)
+    with workers(len(todo)) as each:
+        for done, _ in enumerate(each(work, todo), 1):
+            report("models", done, len(todo))
+
+
+def _store(task: Task, directory: Path, seed: int, policy: Policy) -> None:
+    write_json(directory / task.file, judge(task, seed, policy))
+
+
+def side_by_side(models: Sequence[dict[str, Any]], base: str) -> dict[str, Any]:
+    """The table of one experiment: differences, weights and what they mean.
+
+    Parameters
+    ----------
+    models : sequence of dict
+        What `judge` told, read back from JSON.
+    base : str
+        Name of the model that the others are compared with.
+
+    Returns
+    -------
+    dict
+        ``models``, best first among those scored alike, failures last.
+    """
+    known = {m["name"]: m for m in models}
+    reference = known[base]
+    alike = [m for m in models if m["failed"] is None and m["scored"] == reference["scored"]]
+    weights = {}
+    if reference["failed"] is None:
+        per_hold = np.array([m["leave_one_hold_out"]["per_hold"] for m in alike], float).T
+        weights = dict(zip((m["name"] for m in alike), stacking(per_hold), strict=True))
+    rows = []
+    for m in models:
+        row = {k: v for k, v in m.items() if k != "held_out"}
+        row["weight"] = weights.get(m["name"])
+        row["difference"] = row["held_out_difference"] = row["given_first_difference"] = None
+        if m["failed"] is None:
+            row["held_out"] = _without_readings(m["held_out"])
+            if reference["failed"] is None:
+                row |= _differences(m, reference)
+        row["meaning"] = _meaning(row, base)
+        rows.append(row)
+    rows.sort(key=lambda r: (r["failed"] is not None, r["weight"] is None, -(_elpd(r) if r["failed"] is None else 0.0)))
+    return {"base": base, "models": rows}
+
+
+def _elpd(row: dict[str, Any]) -> float:
+    return float(row["leave_one_hold_out"]["elpd"])
+
+
+def _without_readings(held: dict[str, Any] | None) -> dict[str, Any] | None:
+    if held is None:
+        return None
+    long = ("readings", "pit_band")
+    return {k: {n: x for n, x in v.items() if n not in long} if isinstance(v, dict) else v for k, v in held.items()}
+
+
+def _differences(m: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    if m["scored"] == reference["scored"]:
+        per_hold = (x["leave_one_hold_out"]["per_hold"] for x in (m, reference))
+        out["difference"] = _difference(*per_hold)
+    if m["held_out"] and reference["held_out"]:
+        for key, way in (("held_out_difference", "free"), ("given_first_difference", "given_first")):
+            if m["held_out"][way] and reference["held_out"][way]:
+                out[key] = _difference(m["held_out"][way]["per_hold"], reference["held_out"][way]["per_hold"])
+    return out
+
+
+def _difference(one: Sequence[float], other: Sequence[float]) -> dict[str, float]:
+    gained = np.asarray(one, float) - np.asarray(other, float)
+    return {"elpd": float(gained.sum()), "se": standard_error(gained)}
+
+
+def _meaning(row: dict[str, Any], base: str) -> str:
+    if row["failed"] is not None:
+        return f"could not be judged ({row['failed']})"
+    if row["name"] == base:
+        return "the reference for the other models"
+    told = row["difference"]
+    where = "leaving out each hold in turn"
+    if told is None:
+        told, where = row["given_first_difference"], "on held-out holds given their first reading"
+    if told is None:
+        return "scored on other readings, so not comparable here"
+    size = f"elpd {told['elpd']:+.1f} ± {told['se']:.1f} against {base}, {where}"
+    if np.isnan(told["se"]):
+        return f"elpd {told['elpd']:+.1f} against {base}, {where}: one hold alone, which says nothing of its error"
+    if not row["converged"]:
+        return f"{size}; its sampling did not converge, so this may be wrong"
+    if abs(told["elpd"]) < MEANINGFUL_ELPD or abs(told["elpd"]) < MEANINGFUL_SE * told["se"]:
+        return f"{size}: no meaningful difference"
+    return f"{size}: predicts {'better' if told['elpd'] > 0 else 'worse'}"
+
+
+def stacking(log_density: Array, iterations: int = 2000) -> Array:
+    """Weights (models,) of the mixture that predicts best, from (holds, models) log densities of holds left out.
+
+    Expectation-maximisation of the concave ``sum over holds of log sum over models of w p``.
+    """
+    density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+    weights = np.full(density.shape[1], 1.0 / density.shape[1])
+    for _ in range(iterations):
+        share = density * weights
+        weights = (share / share.sum(axis=1, keepdims=True)).mean(axis=0)
+    return weights

@@ -1,0 +1,392 @@
+"""The test again from starting points with larger effects, to which the parameters have already adapted.
+
+The plain fit bends to take in what is missing, and from where it ends a large effect may look like nothing. So each
+effect is led up a ladder of amplitudes: at every rung the parameters follow by Gauss-Newton steps, and its log Bayes
+factor is taken there, linear over the stretch of amplitudes that the rung stands for. Simulated data sets climb the
+same ladders, so what is found on the way has its chance level.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.special import logsumexp
+
+from wirebayes.discovery.linear_scan import (
+    ABSORBED,
+    RATIOS,
+    Probe,
+    Scan,
+    Tangent,
+    damp,
+    forms,
+    moving_columns,
+    prior_density,
+    residuals,
+    tangent,
+)
+from wirebayes.discovery.refit import occam
+from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
+from wirebayes.inference.laplace_fit import Block, column_of
+from wirebayes.inference.transform import Target
+from wirebayes.linear_algebra import solve
+from wirebayes.model import noise
+from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.workers import Each
+
+Array = NDArray[Any]
+_FIRST, _LAST = 1.5, 24.0  # δ of the rungs
+_RAW = 10.0  # δ of the first one before the parameters take their part, if that is less
+_APART, _MOST = 2.0, 8  # largest ratio of neighbours, unless they would be more than that many
+_STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
+_LENGTHS = np.array([1.0, 0.4, 0.1])
+_SETTLED, _HOPELESS = 0.05, -15.0  # nats: a gain too small to go on for, a rung from which none leads up again
+_NEVER = -1e300
+_MIDDLE = 6.0  # δ for which a one-sided form is tried
+_LONGEST = 3.0  # of a step, in any sampled coordinate
+_JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
+_FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
+_ENOUGH = 6  # simulations as high at which no more are asked for
+_TRIED = 3  # names
+_LEVEL = 0.95  # of chance, above which a name is worth a try
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """A form of an effect and the amplitudes it is led through, from several starts at once.
+
+    Attributes
+    ----------
+    probes : tuple of Probe
+        One for each start: they differ in their shape constants.
+    amplitudes : (rungs, starts) array
+        Signed distances from neutral, growing in size.
+    candidates : tuple of Candidate
+        Of this form, on the blocks where it may act.
+    """
+
+    probes: tuple[Probe, ...]
+    amplitudes: Array
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def effect(self) -> Effect:
+        return self.probes[0].effect
+
+    @property
+    def blocks(self) -> set[int]:
+        return {b for c in self.candidates for b in c.blocks}
+
+
+def ladders(
+    blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], data: Sequence[Scan]
+) -> list[Ladder]:
+    """One ladder for each form that lasts, a start for each trial of its shape constants and each sign.
+
+    None for events: they move the level of their hold, which the linear scan sees.
+    """
+    alike: dict[str, dict[tuple[float, ...], list[int]]] = {}
+    for k, probe in enumerate(trials):
+        if not isinstance(probe.effect, EventEffect):
+            shape = tuple(probe.own[name] for name in probe.effect.columns()[1:])
+            alike.setdefault(probe.effect.key, {}).setdefault(shape, []).append(k)
+    out = []
+    for shapes in alike.values():
+        every = [k for numbers in shapes.values() for k in numbers]
+        here = tuple(c for c in candidates if c.probe == every[0])
+        on = sorted({b for c in here for b in c.blocks})
+        strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in every}
+        starts: list[tuple[Probe, float, float]] = []
+        for numbers in shapes.values():
+            visible = [k for k in numbers if strength[k] > 0]
+            if visible:
+                # Of a one-sided form the probe that lies in the middle of the ladder.
+                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
+                raw = float(np.sqrt(sum(_raw(blocks[b], trials[k]) for b in on)))
+                ends = min(_FIRST / strength[k], _RAW / raw), _LAST / strength[k]
+                starts += [(trials[k], s * ends[0], s * ends[1]) for s in ((1,) if trials[k].one_sided else (1, -1))]
+        if starts:
+            probes, first, last = zip(*starts, strict=True)
+            widest = float(np.max(np.divide(last, first)))
+            rungs = min(1 + int(np.ceil(np.log(widest) / np.log(_APART))), _MOST)
+            out.append(Ladder(probes, np.geomspace(first, last, rungs), here))
+    return out
+
+
+def _raw(block: Block, probe: Probe) -> float:
+    """Squared length of a unit of the effect in the readings, in standard deviations of one."""
+    shapes = forms(block.target, block.modes.z[:1], [probe])
+    theta, total = block.target.coordinates.to_natural(block.modes.z[:1]), 0.0
+    for sample, shape in zip(block.target.problem.samples, shapes, strict=True):
+        own = block.target.problem.parameters(theta, sample)
+        variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+        total += float((shape[sample.protocol.mask] ** 2).sum() / variance[0])
+    return total
+
+
+@dataclass(frozen=True)
+class Climbed:
+    """A block on a ladder ``(rungs starts, n)``: log Bayes factor over each stretch, where, and δ per amplitude."""
+
+    log_bayes: Array
+    amplitude: Array
+    norm: Array
+
+
+def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | None = None) -> Climbed:
+    """Lead an effect through its amplitudes.
+
+    Parameters
+    ----------
+    block : Block
+    ladder : Ladder
+    z : (n, d) array
+        The plain fits of n data sets, sampled coordinates. The ladder is also begun at the block's sober fit.
+    readings : sequence of (H, R, n) arrays, optional
+        Their readings, a sample; the measured ones when left out.
+    """
+    main, places = ladder.effect.amplitudes[0], [z, *(np.broadcast_to(s, z.shape) for s in block.sober)]
+    starts = len(ladder.probes) * len(places)
+    low, high = (float(v) for v in main.prior.support())
+    target, column, y = _with_effect(block, ladder, places)
+    moving = [i for i in moving_columns(target.problem) if i != column]
+    shapes = set(ladder.effect.columns()[1:])
+    rigid = [i for i in moving if target.problem.names[i].split("[")[0] not in shapes]
+    scale = target.coordinates.scale[column]
+    plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
+    degrees = plain.degrees
+    nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, degrees).height + prior_density(block.target, z)
+    # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
+    nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
+    nothing = np.tile(nothing, starts)
+    if readings is not None:
+        readings = [np.tile(r, (1, 1, starts)) for r in readings]
+    # From where to where a rung speaks: half way, by ratio, to its neighbours.
+    every = np.tile(ladder.amplitudes, len(places)).repeat(len(z), axis=1)
+    half = np.sqrt(every[1] / every[0])
+
+    def look(y: Array, amplitude: Array, free: list[int], steps: int) -> tuple[Array, ...]:
+        """Follow with the amplitudes (n,): the best place, the log Bayes factor there, amplitude and δ of one."""
+        at, near, far = (np.clip(main.neutral + amplitude * f, low, high) for f in (1.0, 1.0 / half, half))
+        y = y.copy()
+        y[:, column] = at / scale
+        first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
+        best = [y.copy(), np.full(len(y), _NEVER), at - main.neutral, np.zeros(len(y))]
+        for step in range(steps + 1):
+            with np.errstate(all="ignore"):
+                both = tangent(target, y, readings, [*free, column])
+            here = _weigh(_without_last(both), both.parameters[..., -1] / scale, first, last, degrees)
+            lr = np.nan_to_num(here.height + prior_density(target, y) - nothing, nan=_NEVER, neginf=_NEVER)
+            better, gain = lr > best[1], float(np.max(lr - best[1]))
+            for kept, new in zip(best, (y, lr, at - main.neutral + here.move, here.norm), strict=True):
+                kept[better] = new[better]
+            if gain < _SETTLED:
+                break
+            if step < steps:
+                # A step that led down, where the wire went slack say, is the last one.
+                ahead = _follow(target, y, readings, both, here, free, degrees)
+                y = np.where(better[:, None], ahead, best[0])
+        return tuple(best)
+
+    unseen = np.full(len(y), _NEVER), np.zeros(len(y)), np.zeros(len(y))
+    found: list[Sequence[Array]] = []
+    best = [y.copy(), *(v.copy() for v in unseen)]
+    for amplitudes in every:
+        # Shape constants mean nothing while the amplitude is small, and would wander.
+        is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(every[-1]) * _FIRST / _LAST).all())
+        y, *rung = look(y, amplitudes, rigid if is_low else moving, _FEW if is_low else _STEPS)
+        found.append(rung)
+        better = rung[0] > best[1]
+        for kept, new in zip(best, (y, *rung), strict=True):
+            kept[better] = new[better]
+        beyond = np.isin(np.clip(main.neutral + amplitudes, low, high), (low, high)).all()
+        if beyond or (not is_low and rung[0].max() < _HOPELESS):
+            found += [unseen] * (len(ladder.amplitudes) - len(found))
+            break
+    found.append(look(best[0], best[2], moving, _STEPS)[1:])
+    return Climbed(*(np.array(v).reshape(-1, len(z)) for v in zip(*found, strict=True)))
+
+
+def _with_effect(block: Block, ladder: Ladder, places: Sequence[Array]) -> tuple[Target, int, Array]:
+    """The block's density with the effect, its amplitude's column, and its points (places starts n, d) at each start.
+
+    `places` (n, d) are points of the density without the effect.
+    """
+    effect = ladder.effect
+    problem = block.problem_with(effect)
+    column = column_of(problem, effect)
+    # A prior that is not felt, in whose standard deviations the column counts.
+    wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
+    free = problem.prior.distributions | {problem.names[column]: wide}
+    target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
+    theta = []
+    for z in places:
+        values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))
+        for probe in ladder.probes:
+            own = probe.own | {effect.columns()[0]: effect.amplitudes[0].neutral}
+            each = [values.get(name, np.full(len(z), own.get(name.split("[")[0]))) for name in problem.names]
+            theta.append(np.stack(each, axis=1))
+    return target, column, target.coordinates.to_sampled(np.concatenate(theta))
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """At one place: log marginal density, best move of the amplitude, δ per amplitude, step of the parameters, ρ."""
+
+    height: Array
+    move: Array
+    norm: Array
+    step: Array
+    ratio: Array
+
+
+def _weigh(
+    x: Tangent,
+    signature: Array,
+    near: Array | float,
+    far: Array | float,
+    degrees: int,
+) -> _Weighed:
+    """Integrate the noise out, as the linear scan does, the amplitude moved to its best from `near` to `far`."""
+    n, p = x.parameters.shape[0], x.parameters.shape[2]
+    columns = np.concatenate([x.parameters, signature[..., None], x.residual[..., None]], axis=2)
+    with np.errstate(invalid="ignore"):
+        smooth = np.abs(columns).max(axis=(1, 2)) < _JUMP
+    columns = np.where(smooth[:, None, None], columns, 0.0)
+    levels = np.swapaxes(x.left, 1, 2) @ columns
+    whole = np.swapaxes(columns, 1, 2) @ columns
+    height, move, norm, steps = [], [], [], []
+    for ratio in RATIOS:
+        gram = whole - np.swapaxes(levels, 1, 2) @ (damp(x.singular, ratio)[..., None] * levels)
+        pp, pr, pm = gram[:, :p, :p] + x.prior_precision, gram[:, :p, -1] + x.prior_gradient, gram[:, :p, p]
+        solved = solve(pp, np.stack([pr, pm], axis=-1))
+        regular = np.asarray(np.isfinite(solved).all(axis=(1, 2)))
+        solved = np.where(regular[:, None, None], solved, 0.0)
+        # Not less what a further step promises: far out, steps promise more than they keep.
+        rss = gram[:, -1, -1]
+        b = gram[:, p, -1] - (pm * solved[..., 0]).sum(axis=1)
+        c = gram[:, p, p] - (pm * solved[..., 1]).sum(axis=1)
+        c = np.where(c > ABSORBED * gram[:, p, p], c, 0.0)
+        a = np.clip(np.divide(b, c, out=np.zeros(n), where=c > 0), near, far)
+        left = np.maximum(rss - 2.0 * a * b + a**2 * c, x.least)
+        volume = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
+        height.append(np.where(regular, volume - 0.5 * degrees * np.log(left), -np.inf))
+        move.append(a)
+        norm.append(np.sqrt(c * degrees / left))
+        steps.append(solved[..., 0])
+    k, rows = np.argmax(height, axis=0), np.arange(n)
+    moved, delta, steps_ = (np.array(v)[k, rows] for v in (move, norm, steps))
+    total = np.where(smooth, logsumexp(height, axis=0), -np.inf)
+    return _Weighed(total, moved, delta, steps_, RATIOS[k])
+
+
+def _without_last(x: Tangent) -> Tangent:
+    """The tangent with its last parameter held."""
+    precision = x.prior_precision[:, :-1, :-1]
+    return replace(
+        x, parameters=x.parameters[..., :-1], prior_gradient=x.prior_gradient[:, :-1], prior_precision=precision
+    )
+
+
+def _follow(
+    target: Target,
+    z: Array,
+    readings: Sequence[Array] | None,
+    x: Tangent,
+    here: _Weighed,
+    columns: list[int],
+    degrees: int,
+) -> Array:
+    """Move the parameters a step, or as much of it as is best, or not at all."""
+    step = here.step * np.minimum(1.0, _LONGEST / np.maximum(np.abs(here.step).max(axis=1, keepdims=True), 1e-300))
+    trial = np.repeat(z[None], len(_LENGTHS), axis=0)
+    trial[:, :, columns] += _LENGTHS[:, None, None] * step
+    trial = np.concatenate([z[None], trial])
+    many = len(trial)
+    flat = trial.reshape(-1, z.shape[1])
+    tiled = None if readings is None else [np.tile(y, (1, 1, many)) for y in readings]
+    r = residuals(target, flat, tiled).reshape(many, len(z), -1)
+    levels = np.einsum("nah,mna->mnh", x.left, r)
+    square = (r**2).sum(axis=2) - (damp(x.singular, here.ratio[:, None]) * levels**2).sum(axis=2)
+    with np.errstate(invalid="ignore"):
+        value = prior_density(target, flat).reshape(many, -1) - 0.5 * degrees * np.log(np.maximum(square, x.least))
+    best = np.argmax(np.where(np.isfinite(value), value, -np.inf), axis=0)
+    return np.asarray(trial[best, np.arange(len(z))])
+
+
+def strengths(ways: Sequence[Ladder], climbed: Sequence[Mapping[int, Climbed]]) -> dict[Candidate, Array]:
+    """(n,) log Bayes factor of each of the ladders' candidates, with the prior of `screen.log_bayes`."""
+    out = {}
+    for ladder, each in zip(ways, climbed, strict=True):
+        prior = occam(ladder.probes[0].one_sided)
+        for candidate in ladder.candidates:
+            here = [(each[b].log_bayes, each[b].amplitude, each[b].norm) for b in candidate.blocks]
+            if len(here) > 1 and candidate.shared:
+                value = shared_amplitude(*(np.array(v) for v in zip(*here, strict=True)))[0].max(axis=0) + prior
+            else:
+                value = np.sum([lr.max(axis=0) + prior for lr, _, _ in here], axis=0)
+            out[candidate] = value
+    return out
+
+
+def outward(
+    blocks: Sequence[Block],
+    trials: Sequence[Probe],
+    candidates: Sequence[Candidate],
+    data: Sequence[Scan],
+    simulated: Sequence[Replicates],
+    test: GlobalTest,
+    each: Each = map,
+) -> tuple[GlobalTest, dict[Candidate, float]]:
+    """The global test with every effect led up its ladder, in the data and in the simulations alike.
+
+    Only names that come above the linear scan's own level are tried in the simulations: others do not decide. How often
+    the most surprising of all names is that surprising is known from the linear scan of the same simulations.
+
+    Returns
+    -------
+    The test, and the log Bayes factor of every candidate that has a ladder.
+    """
+    ways = ladders(blocks, trials, candidates, data)
+    own = [(b.modes.z[:1], None) for b in blocks]
+    found = strengths(ways, list(each(_climbs, ways, repeat(blocks), repeat(own))))
+    linear = by_name(candidates, data)
+    value = {c.name: float(linear[c.name][0]) for c in found}
+    for c, strength in found.items():
+        value[c.name] = max(value[c.name], float(strength[0]))
+    lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in value.items()}
+    surprises = dict(test.surprises)
+    for name in sorted((n for n in lead if lead[n] > 0), key=lambda n: -lead[n])[:_TRIED]:
+        own_ways = [way for way in ways if way.effect.name == name]
+        chance = _chance(value[name], test.chance[name], blocks, own_ways, simulated, each)
+        surprises[name] = surprise(value[name], chance)
+        if surprises[name] > test.null.max():
+            break
+    return replace(test, surprises=surprises), {c: float(v[0]) for c, v in found.items()}
+
+
+def _climbs(way: Ladder, blocks: Sequence[Block], plain: Sequence[tuple[Array, Any]]) -> dict[int, Climbed]:
+    """A ladder climbed on all its blocks, from plain fits and their readings, a block each."""
+    return {b: climb(blocks[b], way, *plain[b]) for b in way.blocks}
+
+
+def _chance(
+    value: float,
+    linear: Array,
+    blocks: Sequence[Block],
+    ways: Sequence[Ladder],
+    simulated: Sequence[Replicates],
+    each: Each,
+) -> Array:
+    """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more of them than it takes."""
+    out = np.empty(0)
+    while len(out) < len(linear) and (out >= value).sum() < _ENOUGH:
+        rows = slice(len(out), len(out) + (_ROWS if len(out) else _FIRST_ROWS))
+        part = [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated]
+        climbed = strengths(ways, list(each(_climbs, ways, repeat(blocks), repeat(part))))
+        out = np.append(out, np.max([linear[rows], *climbed.values()], axis=0))
+    return out

@@ -1,0 +1,154 @@
+"""Whether an effect makes the gap smaller on readings it did not see: held-out holds, and leaving out one at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.inference import rough_draws
+from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.io.experiment import Experiment
+from wirebayes.linear_algebra import log_determinant, solve
+from wirebayes.model import noise
+from wirebayes.model.marginal import completed
+from wirebayes.model.problem import Problem, build
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.staircase import linearise
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A model's prediction of the holds it was not trained on, one experiment.
+
+    Attributes
+    ----------
+    holds : list of int
+        Their numbers.
+    squares : float
+        Mean squared error of the predictive mean, N².
+    readings : int
+    floor : float
+        Mean predictive variance if all parameters were known: sensor, rounding and setting error, N².
+    elpd : (h,) array
+        Log predictive density of each hold.
+    inside : float
+        Share of readings in their 90 % bands.
+    """
+
+    holds: list[int]
+    squares: float
+    readings: int
+    floor: float
+    elpd: Array
+    inside: float
+
+    @property
+    def rmse_N(self) -> float:
+        return float(np.sqrt(self.squares))
+
+
+def last_third(experiment: Experiment) -> int:
+    """Number of recorded holds to train on when the last third is held out (0: too few holds to hold any out)."""
+    holds = len(experiment.recorded_holds)
+    return holds - max(1, round(holds / 3)) if holds >= 4 else 0
+
+
+def held_out(
+    experiments: Sequence[Experiment],
+    train: Sequence[int],
+    effects: Sequence[Effect],
+    block: Block,
+    rng: np.random.Generator,
+) -> list[HeldOut]:
+    """Train a block's samples on their first holds with some effects, predict their other holds freely.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Of one material, whole.
+    train : sequence of int
+        Recorded holds to train on, each.
+    effects : sequence of Effect
+    block : Block
+        Says which laws, and where to look first if it has these effects.
+    rng : numpy Generator
+    """
+    first = [e.train(k) for e, k in zip(experiments, train, strict=True)]
+    near = block.target.coordinates.to_natural(block.modes.z[:1])[0] if block.effects == tuple(effects) else None
+    trained = fitted(first, effects, block.law, block.history, rng, near)
+    problem, theta = _draws(trained, rng, 500)
+    whole = build(experiments, effects, law=block.law, history=block.history)
+    # The training readings' reference tension belongs to the parameters.
+    models = [s.model for s in problem.samples]
+    out: list[HeldOut] = []
+    for sample, model, k in zip(whole.samples, models, train, strict=True):
+        own = problem.parameters(theta, problem.samples[len(out)])
+        line = linearise(sample.protocol, own, model)
+        variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+        last = np.flatnonzero(sample.protocol.recorded)[k:]
+        mask = sample.protocol.mask.copy()
+        mask[last] = False
+        free = noise.chain(line, sample.readings, mask, variance, own["setting_sd"])
+        error, floor, elpd, inside = [], [], [], []
+        for j in last:
+            keep = sample.protocol.mask[j]
+            c, s = line.by_creep[j][keep], line.by_setting[j][keep]
+            mean = line.tension[j][keep] + c * free.carried_mean[j]
+            p, q = free.carried_var[j], own["setting_sd"] ** 2
+            y = sample.readings[j][keep]
+            error.append(mean.mean(axis=1) - y[:, 0])
+            floor.append((variance + s**2 * q).mean(axis=1))
+            cov = (
+                np.einsum("rn,qn->nrq", c * p, c)
+                + np.einsum("rn,qn->nrq", s * q, s)
+                + variance[:, None, None] * np.eye(keep.sum())
+            )
+            r = (y - mean).T
+            logdet = log_determinant(cov)
+            square = np.einsum("nr,nr->n", r, solve(cov, r[..., None])[..., 0])
+            log_p = -0.5 * (square + logdet + len(y) * np.log(2 * np.pi))
+            elpd.append(logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf)) - np.log(len(theta)))
+            drawn = mean + rng.normal(size=mean.shape) * np.sqrt(variance + c**2 * p + s**2 * q)
+            low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
+            inside.append((y[:, 0] >= low) & (y[:, 0] <= high))
+        e = np.concatenate(error)
+        out.append(
+            HeldOut([int(n) for n in sample.protocol.number[last]], float((e**2).mean()), len(e),
+                    float(np.concatenate(floor).mean()), np.array(elpd), float(np.concatenate(inside).mean()))
+        )  # fmt: skip
+    return out
+
+
+def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:
+    """1 - (rmse_final² - s²) / (rmse_plain² - s²), s the final model's noise floor; None when plain is below it."""
+    excess = plain.squares - final.floor
+    return None if excess <= 0 else float(1.0 - (final.squares - final.floor) / excess)
+
+
+def leave_one_hold_out(block: Block, rng: np.random.Generator) -> Array:
+    """(H,) log predictive density of each recorded hold of a block from all its others, by importance sampling.
+
+    Weights are truncated at the square root of their number; a weight that would need more is a hold that the others
+    do not predict, which its small density says already.
+    """
+    problem, theta = _draws(block, rng, 1500)
+    values = np.concatenate(
+        [v[s.protocol.recorded] for v, s in zip(problem.leave_one_hold_out(theta), problem.samples, strict=True)]
+    )
+    values = np.where(np.isfinite(values), values, -1e6)
+    log_weight = -values - logsumexp(-values, axis=1, keepdims=True)
+    ceiling = -0.5 * np.log(values.shape[1])
+    log_weight = np.minimum(log_weight, ceiling)
+    log_weight -= logsumexp(log_weight, axis=1, keepdims=True)
+    return np.asarray(logsumexp(log_weight + values, axis=1))
+
+
+def _draws(block: Block, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:
+    """The problem with all parameters of a block, and n rough draws of its posterior."""
+    problem, theta, _ = completed(block.target.problem, rough_draws.draws(block.target, block.modes, rng, n), rng)
+    return problem, theta

@@ -1,0 +1,159 @@
+"""The gate to every verdict: fit, strike out gross errors, and ask whether anything at all is missing.
+
+The question is one global test whose p-value comes from data sets simulated at the fit and refitted. `discover` and the
+check at the end of every fit ask it here, so they give the same answer to the same readings.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from scipy.stats import binom
+
+from wirebayes.discovery import gross_errors, residual_patterns, screening
+from wirebayes.discovery.continuation import outward
+from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
+from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates
+from wirebayes.discovery.settings import ALPHA
+from wirebayes.errors import InputError
+from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.wire.effect import Effect
+from wirebayes.workers import Each
+
+Report = Callable[[str, float, float], None]
+PLAIN_TO_SEE = 0.002  # p of the linear scan at which no test from larger effects could change the verdict
+# Risk on either side that a p on the level itself gives so few, or so many, exceedances: three standard errors, as the
+# ranks of names add some error to the binomial one.
+CLOSE = 0.00135
+MOST_TIMES = 4  # as many simulations at the most, in units of those asked for
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Fitted blocks and the global test on them.
+
+    Attributes
+    ----------
+    blocks : list of Block
+        Gross errors struck out.
+    struck : list of dict
+        What was struck out: experiment, hold, reading, log Bayes factor.
+    trials, candidates
+        See `wirebayes.discovery.screening.candidate_probes`.
+    patterns : list
+        See `wirebayes.discovery.residual_patterns.patterns`, a block each.
+    expansions, data, nulls : list of Expansion, Scan and Scan
+        Of the readings, and of the simulations, a block each.
+    test : GlobalTest
+    further : dict of Candidate to float
+        Log Bayes factors of the effects that were tried from larger amplitudes.
+    """
+
+    blocks: list[Block]
+    struck: list[dict[str, Any]]
+    trials: list[Probe]
+    candidates: list[Candidate]
+    patterns: list[Any]
+    expansions: list[Expansion]
+    data: list[Scan]
+    nulls: list[Scan]
+    test: GlobalTest
+    further: dict[Candidate, float]
+
+
+def examine(
+    blocks: Sequence[Block],
+    kinds: Mapping[str, type[Effect]],
+    simulations: int,
+    rng: np.random.Generator,
+    *,
+    alpha: float = ALPHA,
+    report: Report = lambda name, done, total: None,
+    each: Each = map,
+) -> Gate:
+    """Test whether fitted blocks leave anything unexplained.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Fitted, with whatever effects they have already.
+    kinds : mapping of name to effect class
+        Which effects the test looks for, beside a smooth discrepancy.
+    simulations : int
+        Refitted data sets behind the p-value; up to `MOST_TIMES` as many where p is too close to `alpha` to tell.
+    rng : numpy Generator
+    alpha : float
+        The level p will be compared with.
+    report : function of (what, done, total)
+    each : function, optional
+        The built-in `map`, or one over processes; the result is the same.
+
+    Raises
+    ------
+    InputError
+        If no effect could show in these holds.
+    """
+    blocks = list(blocks)
+    trials, candidates = screening.candidate_probes(blocks, kinds)
+    if not candidates:
+        raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
+    struck: list[dict[str, Any]] = []
+    for i, block in enumerate(blocks):
+        blocks[i], gone = _strike_gross_errors(block, trials, candidates, i, rng)
+        struck += gone
+    data, patterns, expansions = [], [], []
+    for block in blocks:
+        listed, columns = residual_patterns.patterns(block.target.problem)
+        x = expand(block.target, block.modes.z[:1], trials, columns=columns)
+        expansions.append(x)
+        data.append(scan(x))
+        patterns.append(listed)
+    simulated: list[Replicates] = []
+    while True:
+        report("simulations", len(simulated), len(blocks))
+        n = len(simulated[0].z) if simulated else simulations  # as many again each time
+        more = list(each(_simulated, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
+        pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
+        simulated = [screening.joined_replicates(parts) for parts in pairs]
+        nulls = [s.scan for s in simulated]
+        test = screening.global_test(candidates, data, nulls)
+        further: dict[Candidate, float] = {}
+        if test.p > max(PLAIN_TO_SEE, 1.0 / (1 + simulations)):
+            report("larger effects", 0, 1)
+            test, further = outward(blocks, trials, candidates, data, simulated, test, each)
+            report("larger effects", 1, 1)
+        if len(test.null) >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
+            break
+    report("simulations", len(blocks), len(blocks))
+    return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test, further)
+
+
+def is_close(p: float, alpha: float, simulations: int) -> bool:
+    """Whether a p-value from so many simulations is too close to a level to say on which side it is."""
+    larger = round(p * (1 + simulations)) - 1
+    return bool(min(binom.cdf(larger, simulations, alpha), binom.sf(larger - 1, simulations, alpha)) > CLOSE)
+
+
+def _simulated(block: Block, trials: list[Probe], n: int, rng: np.random.Generator) -> Replicates:
+    return screening.replicated(block, trials, n, rng, residual_patterns.patterns(block.target.problem)[1])
+
+
+def _strike_gross_errors(
+    block: Block, trials: list[Probe], candidates: list[Candidate], i: int, rng: np.random.Generator
+) -> tuple[Block, list[dict[str, Any]]]:
+    struck: list[dict[str, Any]] = []
+    most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))
+    while len(struck) < most:
+        own = [c for c in candidates if i in c.blocks]
+        here = scan(expand(block.target, block.modes.z[:1], trials))
+        rival = max((float(here.effects[0, c.probe]) for c in own), default=0.0)
+        found = gross_errors.suspect(block, max(rival, float(here.flexible[0])))
+        if found is None:
+            break
+        name, hold, reading, value = found
+        members = [gross_errors.without(e, hold, reading) if e.name == name else e for e in block.experiments]
+        block = fitted(members, block.effects, block.law, block.history, rng, exponent=block.exponent)
+        struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
+    return block, struck

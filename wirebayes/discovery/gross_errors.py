@@ -1,0 +1,57 @@
+"""Gross errors: single readings that no effect explains, found before anything else rests on them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.discovery.linear_scan import Scan, expand, scan
+from wirebayes.discovery.refit import occam
+from wirebayes.inference.laplace_fit import Block
+from wirebayes.io.experiment import Experiment
+
+Array = NDArray[Any]
+MOST = 0.05  # share of readings that may be called gross errors
+
+
+def suspect(block: Block, rival: float) -> tuple[str, int, int, float] | None:
+    """The reading most likely to be a gross error: experiment, hold number, its place in the hold, log Bayes factor.
+
+    `rival` is the log Bayes factor of the best effect; a gross error must beat it and chance by a clear margin.
+    """
+    cells = [(at, j, r) for at, s in enumerate(block.target.problem.samples) for j, r in np.argwhere(s.protocol.mask)]
+
+    def columns(problem: Any, at: int, tension: Array, slopes: Array) -> Array:
+        out = np.zeros((*tension.shape, len(cells)))
+        for i, (sample, j, r) in enumerate(cells):
+            if sample == at:
+                out[j, r, :, i] = 1.0
+        return out
+
+    found: Scan = scan(expand(block.target, block.modes.z[:1], [], columns=columns))
+    best = int(np.argmax(found.effects[0]))
+    value = float(found.effects[0, best]) + occam(False) - np.log(len(cells))
+    if value < max(3.0, rival + 2.0):
+        return None
+    at, j, r = cells[best]
+    sample = block.target.problem.samples[at]
+    return sample.name, int(sample.protocol.number[j]), int(r), value
+
+
+def without(experiment: Experiment, hold: int, reading: int) -> Experiment:
+    """The experiment with one reading struck out; the hold keeps its duration."""
+    holds = []
+    for h in experiment.holds:
+        if h.number == hold:
+            keep = np.arange(len(h.time_s)) != reading
+            temperature = None if h.temperature_C is None else h.temperature_C[keep]
+            h = replace(h, time_s=h.time_s[keep], tension_N=h.tension_N[keep], temperature_C=temperature)
+        holds.append(h)
+    return replace(experiment, holds=tuple(holds))
+
+
+def readings_of(experiments: Sequence[Experiment]) -> int:
+    """Number of readings."""
+    return sum(len(h.time_s) for e in experiments for h in e.holds)

@@ -1,0 +1,494 @@
+"""A fitted plain model made linear: residuals, what the parameters can absorb, and what each effect would add.
+
+Everything later rests on inner products in the metric ``V0(ρ) = I + ρ K Kᵀ`` of readings divided by their standard
+deviation: K is the derivative by the setting errors, ρ their unknown size against the sensor's error. The overall
+scale of the noise is integrated out, ρ is summed over a grid, so no test trusts the noise of a model that may be wrong.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.discovery import smooth_reference
+from wirebayes.inference.transform import Target
+from wirebayes.linear_algebra import eigh, solve
+from wirebayes.model import noise
+from wirebayes.model.problem import Problem
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.staircase import Model, linearise, simulate
+
+Array = NDArray[Any]
+RATIOS = np.logspace(-2.0, 6.0, 13)
+SIZES = np.array([4.0, 8.0, 16.0, 32.0])
+_NOISE = ("sensor_sd", "setting_sd")
+
+
+@dataclass(frozen=True)
+class Probe:
+    """An effect at a finite amplitude: what it would add to the readings is its signature.
+
+    Attributes
+    ----------
+    effect : Effect
+    own : dict
+        Its amplitudes by column name, shape constants included.
+    step : float
+        The amplitude's distance from neutral, by which the signature is divided.
+    one_sided : bool
+        True where only amplitudes above neutral have a meaning.
+    """
+
+    effect: Effect
+    own: dict[str, float]
+    step: float
+    one_sided: bool
+
+
+def probes(effect: Effect) -> list[Probe]:
+    """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it is one-sided."""
+    main, *shapes = zip(effect.columns(), effect.amplitudes, strict=True)
+    column, amplitude = main
+    low, high = amplitude.prior.support()
+    scale = float(amplitude.prior.std())
+    one_sided = bool(low >= amplitude.neutral)
+    steps = [0.1 * scale] if not one_sided else [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
+    steps = [s for s in steps if amplitude.neutral + s <= high] or [0.5 * (high - amplitude.neutral)]
+    forms: list[dict[str, float]] = [{}]
+    for name, shape in shapes:
+        forms = [f | {name: float(v)} for f in forms for v in shape.prior.ppf([0.1, 0.5, 0.9])]
+    return [Probe(effect, form | {column: amplitude.neutral + s}, s, one_sided) for form in forms for s in steps]
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """A block of samples made linear at n parameter sets, rows scaled by each sample's reading error.
+
+    Attributes
+    ----------
+    residual : (n, N)
+    parameters : (n, N, p)
+        Derivatives by the sampled coordinates that move the mean.
+    left, singular : (n, N, H), (n, H)
+        Left singular vectors and values of K.
+    ratio : (n,)
+        The fitted ρ.
+    prior_gradient, prior_precision : (n, p), (n, p, p)
+    floor : (n,)
+        Rounding's share of the scaled variance: noise cannot be smaller.
+    """
+
+    residual: Array
+    parameters: Array
+    left: Array
+    singular: Array
+    ratio: Array
+    prior_gradient: Array
+    prior_precision: Array
+    floor: Array
+
+    @property
+    def degrees(self) -> int:
+        """Readings less parameters."""
+        return int(self.parameters.shape[1] - self.parameters.shape[2])
+
+    @property
+    def least(self) -> Array:
+        """(n,) below which no sum of squares is believed."""
+        return np.asarray(self.degrees * np.maximum(self.floor, _LEAST_NOISE))
+
+    @property
+    def prior_square(self) -> Array:
+        """(n,) squared distance of the point from the prior's own best, as a parabola sees it."""
+        along = np.linalg.solve(self.prior_precision, self.prior_gradient[..., None])[..., 0]
+        return np.asarray((self.prior_gradient * along).sum(axis=1))
+
+
+@dataclass(frozen=True)
+class Expansion(Tangent):
+    """A tangent with what each effect and the flexible reference would add.
+
+    Attributes
+    ----------
+    signatures : (n, N, m)
+        What each probe adds, per unit amplitude.
+    one_sided : (m,) bool
+    flexible : (n, N, q)
+    """
+
+    signatures: Array
+    one_sided: Array
+    flexible: Array
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Log Bayes factors against the plain model, and the geometry behind them.
+
+    Attributes
+    ----------
+    effects : (n, m)
+        Of each probe, its amplitude at its best.
+    flexible : (n,)
+        Of the flexible reference, its size summed over `SIZES`.
+    amplitude : (n, m)
+        Best amplitude (distance from neutral).
+    norm : (n, m)
+        Length of the projected signature per unit amplitude, at the most probable noise: δ per amplitude.
+    pieces : Pieces
+    """
+
+    effects: Array
+    flexible: Array
+    amplitude: Array
+    norm: Array
+    pieces: "Pieces"
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``.
+
+    Attributes
+    ----------
+    shared, rss : (k, n)
+    along, square : (k, n, m)
+        Inner product of projected signature and residual, and the signature with itself.
+    degrees : int
+    least : (n,)
+    one_sided : (m,) bool
+    """
+
+    shared: Array
+    rss: Array
+    along: Array
+    square: Array
+    degrees: int
+    least: Array
+    one_sided: Array
+
+    def of(self, probe: int, rows: int) -> "Pieces":
+        """One probe's pieces at the first rows."""
+        one = slice(probe, probe + 1)
+        return Pieces(self.shared[:, :rows], self.rss[:, :rows], self.along[:, :rows, one], self.square[:, :rows, one],
+                      self.degrees, self.least[:rows], self.one_sided[one])  # fmt: skip
+
+    def log_bayes(self, added: float) -> Array:
+        """(n,) of the only probe, had its amplitude `added` been in the data besides."""
+        c = np.where(np.isfinite(self.square[..., 0]), self.square[..., 0], 0.0)
+        rss = self.rss + 2.0 * added * self.along[..., 0] + added**2 * c
+        b = self.along[..., 0] + added * c
+        b = np.where(self.one_sided[0], np.maximum(b, 0.0), b)
+        left = rss - b**2 / np.where(c > 0, c, np.inf)
+        half = -0.5 * self.degrees
+        with_it = self.shared + half * np.log(np.maximum(left, self.least))
+        without = self.shared + half * np.log(np.maximum(rss, self.least))
+        return np.asarray(logsumexp(with_it, axis=0) - logsumexp(without, axis=0))
+
+
+def joined(scans: Sequence[Scan]) -> Scan:
+    """Scans of consecutive rows as one."""
+    first = scans[0].pieces
+    pieces = Pieces(
+        shared=np.concatenate([s.pieces.shared for s in scans], axis=1),
+        rss=np.concatenate([s.pieces.rss for s in scans], axis=1),
+        along=np.concatenate([s.pieces.along for s in scans], axis=1),
+        square=np.concatenate([s.pieces.square for s in scans], axis=1),
+        degrees=first.degrees,
+        least=np.concatenate([s.pieces.least for s in scans]),
+        one_sided=first.one_sided,
+    )
+    return Scan(
+        effects=np.concatenate([s.effects for s in scans]),
+        flexible=np.concatenate([s.flexible for s in scans]),
+        amplitude=np.concatenate([s.amplitude for s in scans]),
+        norm=np.concatenate([s.norm for s in scans]),
+        pieces=pieces,
+    )
+
+
+def forms(target: Target, z: Array, trials: Sequence[Probe]) -> list[Array]:
+    """Per sample the (H, R, m) signatures of the probes per unit amplitude, N, at the parameters ``z`` (1, d)."""
+    problem, theta = target.problem, target.coordinates.to_natural(z)
+    out = []
+    for at, sample in enumerate(problem.samples):
+        own = problem.parameters(theta, sample)
+        each = [signature(problem, own, sample.model, at, probe)[..., 0] / probe.step for probe in trials]
+        out.append(np.stack(each, axis=-1) if each else np.zeros((*sample.protocol.time_s.shape, 0)))
+    return out
+
+
+def expand(
+    target: Target,
+    z: Array,
+    trials: Sequence[Probe],
+    readings: Sequence[Array] | None = None,
+    columns: Callable[[Problem, int, Array, Array], Array] | None = None,
+    shapes: Sequence[Array] | None = None,
+) -> Expansion:
+    """Linearise a block at the rows of `z` (n, d), for its readings or for replicates (H, R, n) row by row.
+
+    An effect's form hardly differs between refits: `shapes`, from `forms`, serve all rows. `columns` adds further
+    signatures behind the probes': given the problem, the sample's number, the tension
+    (H, R, n) and its derivatives (H, R, n, p), it returns (H, R, n, more), N.
+    """
+    problem = target.problem
+    points = list(_points(target, z, readings, moving_columns(problem)))
+    added, functions = [], []
+    for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
+        mask = sample.protocol.mask
+        shape = (shapes or forms(target, z[:1], trials))[at][mask]
+        each = [shape[None] / point.sd[:, None, None]]
+        if columns is not None:
+            more = columns(problem, at, point.tension, point.slopes)
+            each.append(np.stack([point.rows(more[..., i], mask) for i in range(more.shape[-1])], axis=-1))
+        added.append(np.concatenate(each, axis=-1))
+        functions.append(smooth_reference.basis(sample.protocol, 1.0)[mask][None] / point.sd[:, None, None])
+    signatures = np.concatenate(added, axis=1)
+    one_sided = [i < len(trials) and trials[i].one_sided for i in range(signatures.shape[-1])]
+    plain = _tangent(target, z, points, moving_columns(problem))
+    return Expansion(
+        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool), flexible=_block_diagonal(functions)
+    )
+
+
+def moving_columns(problem: Problem) -> list[int]:
+    """The columns of parameters that move the mean of the readings."""
+    return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
+
+
+def tangent(target: Target, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
+    """Linearise a block by some of its columns, at the rows of `z` (n, d); readings as in `expand`."""
+    return _tangent(target, z, list(_points(target, z, readings, moving)), moving)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """One sample at n parameter sets: tension (H, R, n), derivatives (H, R, n, p), reading error (n,), and rows."""
+
+    tension: Array
+    slopes: Array
+    sd: Array
+    residual: Array
+    parameters: Array
+    by_setting: Array
+    floor: Array
+
+    def rows(self, values: Array, mask: Array) -> Array:
+        """(H, R, n) to (n, N) in units of the reading error."""
+        return np.asarray((values[mask] / self.sd).T)
+
+
+def _points(target: Target, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Iterator[_Point]:
+    problem, n = target.problem, len(z)
+    both = target.coordinates.to_natural(np.concatenate([z, *_shifted(z, moving, _STEP)]))
+    theta = both[:n]
+    for at, sample in enumerate(problem.samples):
+        mask = sample.protocol.mask
+        own = problem.parameters(theta, sample)
+        sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
+        line = linearise(sample.protocol, own, sample.model)
+        y = sample.readings if readings is None else readings[at]
+        moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
+        moved = moved.reshape(*moved.shape[:2], len(moving) + 1, n)
+        slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
+        scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
+        jac = np.moveaxis(noise.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
+        floor = np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2
+        yield _Point(line.tension, slopes, sd, ((y - line.tension)[mask] / sd).T, scaled, jac, floor)
+
+
+def _tangent(target: Target, z: Array, points: Sequence[_Point], moving: list[int]) -> Tangent:
+    k = _block_diagonal([p.by_setting for p in points])
+    beyond = ~(np.abs(k) < _LARGEST).all(axis=(1, 2))  # what the model cannot compute has no tangent
+    k[beyond] = 1.0
+    # K's size is what ρ measures: give it a typical column of length one. It has none where the wire is slack
+    # throughout: then no setting error moves any reading.
+    ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
+    left, singular, _ = np.linalg.svd(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None], full_matrices=False)
+    gradient, precision = _prior(target, z, moving)
+    residual = np.concatenate([p.residual for p in points], axis=1)
+    residual[beyond] = np.nan
+    parameters = np.concatenate([p.parameters for p in points], axis=1)
+    floor = np.min([p.floor for p in points], axis=0)
+    return Tangent(residual, parameters, left, singular, ratio, gradient, precision, floor)
+
+
+def signature(problem: Problem, own: dict[str, Array], model: Model, at: int, probe: Probe) -> Array:
+    """(H, R, n) what a probe adds to the readings of sample `at`."""
+    sample = problem.samples[at]
+    effect = probe.effect
+    if getattr(effect, "test", "") not in ("", sample.name):
+        return np.zeros((*sample.protocol.time_s.shape, len(own["k1"])))
+    full = own | {name: np.full(len(own["k1"]), value) for name, value in probe.own.items()}
+    more = Model(model.law, model.history, (*model.effects, effect), model.tension_ref_N, model.length_ref_mm)
+    with np.errstate(all="ignore"):
+        added = simulate(sample.protocol, full, more) - simulate(sample.protocol, own, model)
+    return np.where(np.isfinite(added), added, 0.0)
+
+
+def scan(x: Expansion) -> Scan:
+    """Log Bayes factors of every probe and of the flexible reference; zero for a row that has no tangent."""
+    x = _without_tangent(x)
+    p, m = x.parameters.shape[2], x.signatures.shape[2]
+    degrees, least = x.degrees, x.least
+    columns = np.concatenate([x.parameters, x.signatures, x.flexible, x.residual[..., None]], axis=2)
+    levels = np.swapaxes(x.left, 1, 2) @ columns
+    plain_product = np.swapaxes(x.parameters, 1, 2) @ columns
+    functions = slice(p + m, p + m + x.flexible.shape[2])
+    square = (columns[..., p : p + m] ** 2).sum(axis=1)
+    mr0 = np.einsum("nam,na->nm", x.signatures, x.residual)
+    rr0 = (x.residual**2).sum(axis=1)
+    ff0 = np.swapaxes(x.flexible, 1, 2) @ x.flexible
+    fr0 = np.einsum("naf,na->nf", x.flexible, x.residual)
+    plain, effects, loose, amplitude, norm = [], [], [], [], []
+    kept: dict[str, list[Array]] = {"shared": [], "rss": [], "along": [], "square": []}
+    for ratio in RATIOS:
+        weighted = damp(x.singular, ratio)[..., None] * levels
+        gram = plain_product - np.swapaxes(levels[..., :p], 1, 2) @ weighted
+        pp = gram[..., :p] + x.prior_precision
+        pr = gram[..., -1] + x.prior_gradient
+        pm, pf = gram[..., p : p + m], gram[..., functions]
+        mm = square - (levels[..., p : p + m] * weighted[..., p : p + m]).sum(axis=1)
+        mr = mr0 - (levels[..., p : p + m] * weighted[..., -1:]).sum(axis=1)
+        rr = rr0 - (levels[..., -1] * weighted[..., -1]).sum(axis=1)
+        solved = solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
+        # There may be a ratio at which the parameters cannot be told apart: it is left out.
+        regular = np.asarray(np.isfinite(solved).all(axis=(1, 2)))
+        solved = np.where(regular[:, None, None], solved, 0.0)
+        sr, sm, sf = solved[..., 0], solved[..., 1 : m + 1], solved[..., m + 1 :]
+        rss = rr - (pr * sr).sum(axis=1) + x.prior_square
+        b = mr - np.einsum("npm,np->nm", pm, sr)
+        c = mm - (pm * sm).sum(axis=1)
+        c = np.where(c > ABSORBED * square, c, np.inf)
+        shared = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
+        shared = np.where(regular, shared, -np.inf)
+        for key, piece in (("shared", shared), ("rss", rss), ("along", b), ("square", c)):
+            kept[key].append(piece)
+        b = np.where(x.one_sided, np.maximum(b, 0.0), b)
+        plain.append(shared - 0.5 * degrees * np.log(np.maximum(rss, least)))
+        effects.append(shared[:, None] - 0.5 * degrees * np.log(np.maximum(rss[:, None] - b**2 / c, least[:, None])))
+        amplitude.append(b / c)
+        norm.append(
+            np.sqrt(np.where(np.isfinite(c), c, 0.0) * degrees / np.maximum(rss[:, None] - b**2 / c, least[:, None]))
+        )
+        ff = ff0 - np.swapaxes(levels[..., functions], 1, 2) @ weighted[..., functions] - np.swapaxes(pf, 1, 2) @ sf
+        fr = fr0 - np.einsum("nhf,nh->nf", levels[..., functions], weighted[..., -1]) - np.einsum("npf,np->nf", pf, sr)
+        values, vectors = eigh(ff)
+        values = np.maximum(values, 0.0)
+        along = np.einsum("nfg,nf->ng", vectors, fr) ** 2
+        variance = np.maximum(rss, least) / degrees
+        for size in SIZES:
+            s2 = (size**2 * variance / np.maximum(values.sum(axis=1), 1e-300))[:, None] / variance[:, None]
+            # The process is measured in units of the noise that is left beside it.
+            left = np.maximum(rss - (along * s2 / (1.0 + s2 * values)).sum(axis=1), least)
+            loose.append(shared - 0.5 * np.log1p(s2 * values).sum(axis=1) - 0.5 * degrees * np.log(left))
+    reference = logsumexp(plain, axis=0)
+    best = np.argmax(effects, axis=0)
+    return Scan(
+        logsumexp(effects, axis=0) - reference[:, None],
+        logsumexp(loose, axis=0) - np.log(len(SIZES)) - reference,
+        np.take_along_axis(np.array(amplitude), best[None], axis=0)[0],
+        np.take_along_axis(np.array(norm), best[None], axis=0)[0],
+        Pieces(
+            np.array(kept["shared"]),
+            np.array(kept["rss"]),
+            np.array(kept["along"]),
+            np.array(kept["square"]),
+            degrees,
+            least,
+            x.one_sided,
+        ),  # fmt: skip
+    )
+
+
+def _without_tangent(x: Expansion) -> Expansion:
+    """Rows that have no tangent, where the model overflows or jumps, as rows in which nothing is seen."""
+    parts = {name: getattr(x, name) for name in ("parameters", "signatures", "flexible")} | {
+        "residual": x.residual[..., None]
+    }
+    with np.errstate(invalid="ignore"):
+        seen = np.all([(np.abs(a) < _LARGEST).all(axis=(1, 2)) for a in parts.values()], axis=0)
+    if seen.all():
+        return x
+    parts = {name: np.where(seen[:, None, None], a, 0.0) for name, a in parts.items()}
+    return replace(x, **parts | {"residual": parts["residual"][..., 0]})
+
+
+def projected(x: Expansion, ratio: float) -> Array:
+    """(N, m) signatures of the first row, whitened at a noise ratio, free of what the parameters absorb."""
+
+    def whiten(columns: Array) -> Array:
+        shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
+        return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
+
+    basis, _ = np.linalg.qr(whiten(x.parameters[0]))
+    signatures = whiten(x.signatures[0])
+    return np.asarray(signatures - basis @ (basis.T @ signatures))
+
+
+def damp(singular: Array, ratio: Array | float) -> Array:
+    """How much of what moves whole holds the noise takes, at a ratio ρ, along each singular vector of K."""
+    with np.errstate(over="ignore"):
+        return np.asarray(ratio * singular**2 / (1.0 + ratio * singular**2))
+
+
+def residuals(target: Target, z: Array, readings: Sequence[Array] | None = None) -> Array:
+    """(n, N) readings less tensions at the rows of `z`, in units of the reading error."""
+    theta = target.coordinates.to_natural(z)
+    parts = []
+    for at, sample in enumerate(target.problem.samples):
+        own = target.problem.parameters(theta, sample)
+        sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
+        y = sample.readings if readings is None else readings[at]
+        with np.errstate(all="ignore"):
+            left = y - simulate(sample.protocol, own, sample.model)
+        parts.append((left[sample.protocol.mask] / sd).T)
+    return np.concatenate(parts, axis=1)
+
+
+def prior_density(target: Target, z: Array) -> Array:
+    """(n,) log density of the prior in the sampled coordinates."""
+    theta = target.coordinates.to_natural(z)
+    return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta))
+
+
+def _prior(target: Target, z: Array, moving: list[int]) -> tuple[Array, Array]:
+    """Gradient and (diagonal, positive) precision of the prior in the sampled coordinates that move the mean."""
+    h = 1e-3
+    n, p = len(z), len(moving)
+    values = prior_density(target, np.concatenate([z, *_shifted(z, moving, h), *_shifted(z, moving, -h)]))
+    centre, plus, minus = values[:n, None], *values[n:].reshape(2, p, n).swapaxes(1, 2)
+    # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
+    inside = np.isfinite(plus) & np.isfinite(minus) & np.isfinite(centre)
+    with np.errstate(invalid="ignore"):
+        gradient = np.where(inside, (plus - minus) / (2 * h), 0.0)
+        diagonal = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
+    precision = np.zeros((n, p, p))
+    precision[:, np.arange(p), np.arange(p)] = diagonal
+    return gradient, precision
+
+
+def _shifted(z: Array, columns: list[int], step: float) -> list[Array]:
+    """The rows of `z` with a step along each of the columns in turn."""
+    return [z + step * np.eye(z.shape[1])[i] for i in columns]
+
+
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Batched (n, rows, columns) blocks along a diagonal."""
+    n = max(b.shape[0] for b in blocks)
+    out = np.zeros((n, sum(b.shape[1] for b in blocks), sum(b.shape[2] for b in blocks)))
+    row = column = 0
+    for b in blocks:
+        out[:, row : row + b.shape[1], column : column + b.shape[2]] = b
+        row, column = row + b.shape[1], column + b.shape[2]
+    return out
+
+
+_STEP = 1e-5
+_LARGEST = 1e100  # of any derivative: the square of a larger one overflows
+_LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
+ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

@@ -1,0 +1,161 @@
+"""Does the fitted model describe its own readings? The check at the end of every fit.
+
+It is the global test of `wirebayes.discovery.global_test`, with the fitted effects inside: p comes from data sets
+simulated at the fit and refitted, so the readings are not used twice, and for one experiment it is the p that
+`discover` reports.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.discovery.global_test import Report, examine
+from wirebayes.discovery.settings import ALPHA, SIMULATIONS
+from wirebayes.effects import catalogue, named
+from wirebayes.errors import InputError
+from wirebayes.inference.fit import seed_of
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.io.run_folder import write_json
+from wirebayes.results.jobs import Job
+from wirebayes.workers import Each, workers
+
+_SHOWN = 3  # most surprising effects that are listed
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """What the check found.
+
+    Attributes
+    ----------
+    p : float or None
+        Probability of data at least as surprising, were the model right; None where it was not checked.
+    alpha : float
+        Level that `p` is compared with.
+    simulations : int
+        Refitted data sets behind `p`.
+    surprising : tuple of str
+        Effects that the readings ask for most, most surprising first; where the check failed.
+    gross_errors : tuple of dict
+        Single readings that were set aside in the check: experiment, hold, reading, log Bayes factor.
+    reason : str
+        Why it was not checked.
+    with_effects : bool
+        Whether the fitted model has effects.
+    """
+
+    p: float | None
+    alpha: float
+    simulations: int = 0
+    surprising: tuple[str, ...] = ()
+    gross_errors: tuple[dict[str, Any], ...] = ()
+    reason: str = ""
+    with_effects: bool = False
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the model may stand; None where it was not checked."""
+        return None if self.p is None else self.p > self.alpha
+
+    @property
+    def sentence(self) -> str:
+        """The result in words, with what to do."""
+        if self.p is None:
+            return f"The model was not checked against the readings: {self.reason}."
+        gross = "".join(
+            f" Reading {g['reading'] + 1} of hold {g['hold']} of {g['experiment']} looks like a gross error. "
+            "This check set it aside, the fit did not: correct or remove it and fit again."
+            for g in self.gross_errors
+        )
+        if self.passed:
+            return (
+                f"The model describes the readings: p = {self.p:.2g} in a test against {self.simulations} refitted "
+                f"simulations (level {self.alpha:.2g}).{gross}"
+            )
+        model = "The model with these effects" if self.with_effects else "The plain model"
+        other = "other effects of the catalogue" if self.with_effects else "what is missing"
+        return (
+            f"{model} does not describe the readings (p = {self.p:.2g}, level {self.alpha:.2g}): its parameters, "
+            "intervals and predictions can be wrong by more than they say. Run wirebayes discover to look for "
+            f"{other}; the readings deviate most in the direction of {', '.join(self.surprising)}.{gross}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "passed": self.passed,
+            "p": self.p,
+            "alpha": self.alpha,
+            "simulations": self.simulations,
+            "most_surprising": list(self.surprising),
+            "gross_errors": list(self.gross_errors),
+            "sentence": self.sentence,
+        }
+
+
+def level(tests: int) -> float:
+    """Level of each of several tests so that all pass with probability 1 - `ALPHA` if nothing is missing (Šidák)."""
+    return float(1.0 - (1.0 - ALPHA) ** (1.0 / tests))
+
+
+def check_model(
+    job: Job, seed: int = 0, *, alpha: float = ALPHA, simulations: int | None = None, each: Each = map
+) -> ModelCheck:
+    """Check a model against the readings it was fitted to.
+
+    Parameters
+    ----------
+    job : Job
+        The fit. Hold by hold is not checked: that likelihood does not say how a test comes about, so no test can be
+        simulated from it.
+    seed : int
+    alpha : float
+        See `level`.
+    simulations : int
+        Refitted data sets behind p; more where p is too close to `alpha` to tell.
+    each : function, optional
+        The built-in `map`, or one over processes.
+    """
+    kinds = catalogue(job.own_effects)
+    effects = [named(key, kinds) for key in job.effects]
+    unchecked = partial(ModelCheck, None, alpha, with_effects=bool(effects))
+    if job.likelihood == "hold":
+        return unchecked(reason="the hold-by-hold likelihood says nothing of how one hold follows from another")
+    if any(e.name not in kinds for e in effects):
+        return unchecked(reason="a smooth discrepancy stands in for whatever is missing")
+    rng = np.random.default_rng(seed_of(seed, "discover"))
+    first = rng.spawn(1)[0]
+    block = fitted(job.experiments, effects, job.law, job.history, first, exponent=job.length_exponent)
+    try:
+        gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, each=each)
+    except InputError:
+        return unchecked(reason="no further effect could show in these holds")
+    p, surprises = gate.test.p, gate.test.surprises
+    order = sorted(surprises, key=lambda name: -surprises[name])
+    names = tuple("a smooth discrepancy" if name == "unknown" else name for name in order[:_SHOWN])
+    failed = p <= alpha
+    return ModelCheck(p, alpha, len(gate.test.null), names if failed else (), tuple(gate.struck), "", bool(effects))
+
+
+def write_checks(jobs: Sequence[Job], directory: Path, seed: int, report: Report) -> None:
+    """Check all fits of a command and put the result first in their ``summary.json``, as ``model_check``.
+
+    The level is that which the command as a whole keeps. What was checked before an interruption is not checked again.
+    """
+    alpha = level(len(jobs))
+    paths = {job.folder: directory / job.folder / "summary.json" for job in jobs}
+    summaries = {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items()}
+    todo = [job for job in jobs if "model_check" not in summaries[job.folder]]
+    work = partial(check_model, seed=seed, alpha=alpha)
+    own_effects = jobs[0].own_effects
+    with workers(own_effects=own_effects) as each:
+        # One fit shares its simulations among the cores, several are each done on one.
+        checks = [work(todo[0], each=each)] if len(todo) == 1 else each(work, todo)
+        for done, (job, check) in enumerate(zip(todo, checks, strict=True), 1):
+            write_json(paths[job.folder], {"model_check": check.to_dict()} | summaries[job.folder])
+            report("checks", done, len(todo))

@@ -1,0 +1,229 @@
+"""What could have been seen: detectable amplitudes, look-alikes, what this protocol hides, and what to measure next."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
+from wirebayes.discovery.refit import LARGEST, occam
+from wirebayes.inference.laplace_fit import Block
+from wirebayes.inference.transform import Target
+from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.protocol import Protocol
+
+Array = NDArray[Any]
+ALIKE = 0.95
+_POWER_ROWS = 300  # simulations behind an 80 % amplitude
+_WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
+
+
+def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
+    """Amplitude of a probe that passes the global test in 80 % of simulations; None beyond δ of `LARGEST`."""
+    norm = float(np.median(null.norm[:, i]))
+    if norm <= 0:
+        return None
+    prior = occam(probe.one_sided)
+    low, high = 0.0, LARGEST / norm
+    pieces = null.pieces.of(i, _POWER_ROWS)
+
+    def seen(amplitude: float) -> bool:
+        return bool(np.mean(pieces.log_bayes(amplitude) + prior > threshold) >= 0.8)
+
+    if not seen(high):
+        return None
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if seen(middle) else (middle, high)
+    return high
+
+
+def similarity(
+    expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]
+) -> dict[tuple[str, str], float]:
+    """Largest |cos| between the projected signatures of any two effects, over their forms, at a noise ratio a block.
+
+    An effect with one amplitude a block may put any size on each, so it is as alike as the best sizes make it.
+    """
+    parts = [projected(x, r) for x, r in zip(expansions, ratios, strict=True)]
+    lengths = np.array([(p**2).sum(axis=0) for p in parts])
+    products = np.array([p.T @ p for p in parts])
+    names = [t.effect.name for t in trials]
+    material = np.array([t.effect.scope == "material" for t in trials]) & (len(expansions) > 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        together = products.sum(axis=0) ** 2 / (lengths.sum(axis=0)[:, None] * lengths.sum(axis=0)[None])
+        loose = (products**2 / lengths[:, None, :]).sum(axis=0) / lengths.sum(axis=0)[:, None]
+    square = np.nan_to_num(np.where(material[None, :], loose, together))
+    square = np.maximum(square, square.T)
+    out: dict[tuple[str, str], float] = {}
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            out[a, b] = max(out.get((a, b), 0.0), float(np.sqrt(min(square[i, j], 1.0))))
+    return out
+
+
+def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> list[str]:
+    """The members and every effect whose signature is as good as one of theirs."""
+    names = dict.fromkeys([*members, *(b for (a, b), cos in alike.items() if a in members and cos > ALIKE)])
+    return list(names)
+
+
+class _SensorGain(Effect):
+    name, place, scope = "gain of the force sensor", "reading", "instrument"
+    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The force sensor's gain is off."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value * (1.0 + own["a"])
+
+
+class _ForceOffset(Effect):
+    name, place, scope = "constant force offset", "reading", "instrument"
+    amplitudes = (Amplitude("a", "N", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The force sensor's zero is off."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value + own["a"]
+
+
+class _DisplacementScale(Effect):
+    name, place, scope = "scale of the displacement", "position", "instrument"
+    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The displacement's scale is off."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value + own["a"] * hold.displacement_mm
+
+
+class _Compliance(Effect):
+    name, place, scope = "compliance of the fixture", "strain", "instrument"
+    amplitudes = (Amplitude("c", "mm/N", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The bench gives way."
+
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
+        return value / (1.0 + own["c"] * hold.theta["k1"] / hold.length_mm)
+
+
+_ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _DisplacementScale, _Compliance)
+
+
+def not_identifiable(block: Block, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
+    """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show."""
+    absorbable = [kind for kind in _ABSORBABLE if not (kind is _Compliance and "fixture_compliance" in possible)]
+    trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in absorbable]
+    x = expand(block.target, block.modes.z[:1], trials)
+    wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
+    left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
+    out = [
+        f"{t.effect.name}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the model's own parameters"
+        for t, whole, rest in zip(trials, wholes, left, strict=True)
+        if rest < 0.1 * whole
+    ]
+    return out + [
+        f"{kind.name}: this protocol cannot show it ({kind.shows})" for kind in kinds if kind.name not in possible
+    ]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """A measurement one could make next, in words and as holds."""
+
+    words: str
+    protocol: Protocol
+
+
+def _plans(p: Protocol, alone: bool) -> list[_Plan]:
+    """What could be done with a sample instead; `alone` if there is no other, whose displacements would differ."""
+    recorded = p.recorded
+    x = p.displacement_mm[recorded]
+    down = x[-2::-1] if len(x) > 1 else x
+    log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
+    times = _longest_series(p)
+    span = f"{x.min():g} to {x.max():g} mm" if alone else "each sample's displacements"
+    dense = "600 s with 25 readings spaced evenly in the logarithm of time"
+    there_and_back = np.concatenate([x, down])
+    halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
+    last = f" from {x.max():g} to {x.min():g} mm" if alone else ", of every sample"
+    back = f"the same displacements back{last}, each held {times[-1]:g} s"
+    return [
+        _Plan(f"unload the wire after the last hold: {back}", _holds(there_and_back, times, p.length_mm)),
+        _Plan(f"hold each of the displacements {span} for {dense}", _holds(x, log_times, p.length_mm)),
+        _Plan(f"load and unload over {span}, each hold {dense}", _holds(there_and_back, log_times, p.length_mm)),
+        _Plan(f"take twice as many, half as large steps over {span}", _holds(halved, times, p.length_mm)),
+    ]
+
+
+def _longest_series(p: Protocol) -> Array:
+    """Reading times of the hold with most readings."""
+    counts = p.mask.sum(axis=1)
+    return p.time_s[int(np.argmax(counts))][: int(counts.max())]
+
+
+def _holds(displacement: Array, times: Array, length_mm: float) -> Protocol:
+    """Holds at these displacements, each read at these times."""
+    h = len(displacement)
+    time, duration = np.tile(times, (h, 1)), np.full(h, times[-1])
+    return Protocol(length_mm, displacement, time, np.ones(time.shape, bool), duration, np.arange(1, h + 1))
+
+
+def _another_length(problem: Problem) -> tuple[str, Problem]:
+    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
+    longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
+    p, length = longest.protocol, 2.0 * longest.protocol.length_mm
+    protocol = _holds(2.0 * p.displacement_mm[p.recorded], _longest_series(p), length)
+    model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
+    more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
+    exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
+    prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
+    which = "a second" if len({s.protocol.length_mm for s in problem.samples}) == 1 else "another"
+    words = f"repeat the test at {which} length, {length:g} mm, with steps scaled alike"
+    return words, replace(problem, samples=(*problem.samples, more), prior=prior)
+
+
+def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
+    """The plan that tells two candidates apart best, or shows one effect best, by projected signatures."""
+    problem = block.target.problem
+    trials = list(pair) if pair else [weakest] if weakest else []
+    if not trials:
+        return "No candidate remains; repeating the same holds would narrow the parameters."
+    planned = [_another_length(problem)]
+    for plans in zip(*(_plans(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
+        protocols = [plan.protocol for plan in plans]
+        empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
+        planned.append((plans[0].words, with_protocols(problem, protocols, empty)))
+    here = _separation(block.target, block, trials)
+    scored = [(_separation(replace_problem(block.target, other), block, trials), words) for words, other in planned]
+    best, words = max(scored)
+    ratio = best / here if here > 0 else np.inf
+    names = " from ".join(t.effect.name for t in trials)
+    if ratio < _WORTH:
+        aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"
+        tried = "unloading, longer holds, finer steps, another length"
+        return f"None of the tests considered ({tried}) would {aim} independently."
+    if pair:
+        known = np.isfinite(ratio) and ratio < 1e3
+        gain = f" {ratio:.1f} times as much as now" if known else "; at present they do not"
+        return f"To distinguish {names}: {words}. Their signatures would then differ{gain}."
+    return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
+
+
+def replace_problem(target: Target, problem: Any) -> Target:
+    """A target on other holds whose coordinates mean the same."""
+    out = Target(problem)
+    out.coordinates.ridges = target.coordinates.ridges
+    return out
+
+
+def _separation(target: Target, block: Block, trials: Sequence[Probe]) -> float:
+    """Length of the first signature left when parameters, and the second where there is one, have taken their part."""
+    x = expand(target, block.modes.z[:1], trials)
+    p = projected(x, float(x.ratio[0]))
+    first = p[:, 0]
+    if p.shape[1] > 1 and (p[:, 1] ** 2).sum() > 0:
+        second = p[:, 1] / np.sqrt((p[:, 1] ** 2).sum())
+        first = first - second * (second @ first)
+    return float(np.sqrt(first @ first))

@@ -1,0 +1,212 @@
+"""Candidates for the missing effect, judged linearly over all blocks of a file, and the global test on them.
+
+An effect of the material has an amplitude a material, an effect of the instrument or the environment one a file, an
+event one at its hold of its experiment: the scope decides which blocks a candidate acts on, and what they share.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, probes, scan
+from wirebayes.discovery.refit import occam
+from wirebayes.inference.laplace_fit import Block
+from wirebayes.inference.modes import climb, rowwise
+from wirebayes.model.replicate import readings as replicate
+from wirebayes.wire.effect import Effect, EventEffect
+
+Array = NDArray[Any]
+_ROWS = 250  # replicates linearised at once
+_FLEXIBLE = "unknown"
+FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
+_AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One probe on the blocks where its scope puts it.
+
+    Attributes
+    ----------
+    probe : int
+        Its number among the probes.
+    name : str
+    blocks : tuple of int
+    shared : bool
+        One amplitude for all its blocks, rather than one each.
+    """
+
+    probe: int
+    name: str
+    blocks: tuple[int, ...]
+    shared: bool
+
+
+def candidate_probes(blocks: Sequence[Block], kinds: Mapping[str, type[Effect]]) -> tuple[list[Probe], list[Candidate]]:
+    """Every form of every effect that these blocks could show."""
+    several = sum(len(b.experiments) for b in blocks) > 1
+    trials: list[Probe] = []
+    candidates: list[Candidate] = []
+    for kind in kinds.values():
+        where: dict[str, tuple[Effect, list[int]]] = {}
+        for at, block in enumerate(blocks):
+            accepted = {e.name for e in block.effects}
+            if kind.name in accepted and not issubclass(kind, EventEffect):
+                continue
+            for effect in _variants(kind, block, several):
+                where.setdefault(effect.key, (effect, []))[1].append(at)
+        for effect, on in where.values():
+            for probe in probes(effect):
+                number = len(trials)
+                trials.append(probe)
+                if effect.scope in FILE_WIDE and len(on) > 1:
+                    candidates.append(Candidate(number, effect.name, tuple(on), True))
+                    continue
+                candidates += [Candidate(number, effect.name, (b,), True) for b in on]
+                if len(on) > 1:
+                    candidates.append(Candidate(number, effect.name, tuple(on), False))
+    return trials, candidates
+
+
+def _variants(kind: type[Effect], block: Block, several: bool) -> list[Effect]:
+    if not issubclass(kind, EventEffect):
+        return kind.variants([e.protocol() for e in block.experiments])
+    taken = {e.key for e in block.effects}
+    if kind.name in {e.name for e in block.effects}:
+        return []
+    found = [(e.name, v) for e in block.experiments for v in kind.variants([e.protocol()])]
+    out = [replace(v, test=name) if several else v for name, v in found]  # type: ignore[type-var]
+    return [v for v in out if v.key not in taken]
+
+
+def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
+    """(n,) log Bayes factor with the same prior on every amplitude, best amplitude, and amplitude per δ."""
+    i = candidate.probe
+    one_sided = bool(scans[candidate.blocks[0]].pieces.one_sided[i])
+    lr = np.array([scans[b].effects[:, i] for b in candidate.blocks])
+    a = np.array([scans[b].amplitude[:, i] for b in candidate.blocks])
+    norm = np.array([scans[b].norm[:, i] for b in candidate.blocks])
+    if one_sided:
+        a = np.maximum(a, 0.0)
+    if not candidate.shared:
+        return lr.sum(axis=0) + occam(one_sided) * len(candidate.blocks), a[0], 1.0 / np.maximum(norm[0], 1e-300)
+    value, mean = shared_amplitude(lr, a, norm)
+    return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
+
+
+def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
+    """Log likelihood ratio (...) of one amplitude for several blocks (b, ...), and that amplitude.
+
+    Each block's is a parabola through zero amplitude and through its own best.
+    """
+    with np.errstate(all="ignore"):
+        weight = np.where(np.abs(a) * norm > 0.5, 2.0 * lr / a**2, norm**2)
+        total = np.maximum(weight.sum(axis=0), 1e-300)
+        mean = (weight * a).sum(axis=0) / total
+        value = (lr - 0.5 * weight * (a - mean) ** 2).sum(axis=0)
+    return np.where(np.isfinite(value), value, -np.inf), mean
+
+
+def flexible_log_bayes(scans: Sequence[Scan]) -> Array:
+    """(b + 1, n) log Bayes factor of the flexible reference on each block alone, and on all."""
+    single = np.array([s.flexible for s in scans])
+    return np.vstack([single, single.sum(axis=0)])
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """Data sets simulated at a block's fit: their scan, plain fits (n, d), and readings, a sample (H, R, n)."""
+
+    scan: Scan
+    z: Array
+    readings: list[Array]
+
+
+def replicated(
+    block: Block, trials: Sequence[Probe], n: int, rng: np.random.Generator, columns: Any = None
+) -> Replicates:
+    """Scan `n` data sets simulated at the block's fit, each refitted first."""
+    z = np.repeat(block.modes.z[:1], n, axis=0)
+    theta = block.target.coordinates.to_natural(z)
+    problem = block.target.problem
+    y = [replicate(problem, theta, s, rng) for s in problem.samples]
+    found = climb(rowwise(block.target, y), z, iterations=25, tolerance=1e-2)
+    shapes = forms(block.target, block.modes.z[:1], trials)
+    parts = []
+    for begin in range(0, n, _ROWS):
+        rows = slice(begin, begin + _ROWS)
+        parts.append(scan(expand(block.target, found.z[rows], trials, [v[..., rows] for v in y], columns, shapes)))
+    return Replicates(joined(parts), found.z, y)
+
+
+def joined_replicates(parts: Sequence[Replicates]) -> Replicates:
+    """Several lots of replicates of one block as one."""
+    readings = [np.concatenate(y, axis=-1) for y in zip(*(p.readings for p in parts), strict=True)]
+    return Replicates(joined([p.scan for p in parts]), np.concatenate([p.z for p in parts]), readings)
+
+
+def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
+    """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks.
+
+    None is below `_AGAINST`: clear evidence against a name is no surprise, however rare its size.
+    """
+    out = {_FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), _AGAINST)}
+    for c in candidates:
+        out[c.name] = np.maximum(out.get(c.name, _AGAINST), log_bayes(c, scans)[0])
+    return out
+
+
+def surprise(value: float, chance: Array) -> float:
+    """Minus the log share of simulated values (n,) as large; beyond the largest it goes on by the distance.
+
+    A log Bayes factor is exceeded by chance about exponentially seldom, so a nat more is a nat more surprising.
+    """
+    larger = int((chance >= value).sum())
+    return float(np.log1p(len(chance)) - np.log1p(larger) + max(value - chance.max(), 0.0))
+
+
+def surprises(chance: Array) -> Array:
+    """(n,) the surprise of each simulated value among the others."""
+    larger = stats.rankdata(-chance, method="max")  # itself among them
+    first, second = np.sort(chance)[::-1][:2]
+    return np.asarray(np.log(len(chance)) - np.log(larger) + np.where(chance == first, first - second, 0.0))
+
+
+@dataclass(frozen=True)
+class GlobalTest:
+    """The most surprising name, or the flexible reference, beside the most surprising one of each simulation.
+
+    Attributes
+    ----------
+    chance : dict of name to (n,) array
+        Its largest log Bayes factor in the simulations.
+    surprises : dict of name to float
+        Of the data.
+    null : (n,) array
+        Largest surprise of each simulation.
+    """
+
+    chance: dict[str, Array]
+    surprises: dict[str, float]
+    null: Array
+
+    @property
+    def p(self) -> float:
+        """Share of refitted simulations at least as surprising."""
+        return float((1 + (self.null >= max(self.surprises.values())).sum()) / (1 + len(self.null)))
+
+    def threshold(self, name: str, alpha: float) -> float:
+        """The log Bayes factor at which a name would be as surprising as chance is with probability alpha."""
+        share = np.exp(-np.quantile(self.null, 1.0 - alpha))
+        return float(np.quantile(self.chance[name], 1.0 - min(share, 1.0)))
+
+
+def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Sequence[Scan]) -> GlobalTest:
+    """Compare the data's most surprising name with the simulations'."""
+    chance = by_name(candidates, null)
+    found = {name: surprise(float(value[0]), chance[name]) for name, value in by_name(candidates, data).items()}
+    return GlobalTest(chance, found, np.max([surprises(value) for value in chance.values()], axis=0))

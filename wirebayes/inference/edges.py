@@ -1,0 +1,68 @@
+"""Amplitudes that end at an edge, as scores that are standard normal under their prior."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
+
+from wirebayes.model.prior import fast_logpdf
+
+Array = NDArray[Any]
+_NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
+_log_normal = fast_logpdf(stats.norm())
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A map between values and scores, each (n,), and the log density of the values.
+
+    Attributes
+    ----------
+    score, value, log_prior : function of an array
+    """
+
+    score: Callable[[Array], Array]
+    value: Callable[[Array], Array]
+    log_prior: Callable[[Array], Array]
+
+    def log_slope(self, value: Array) -> Array:
+        """(n,) log |d value / d score|."""
+        return np.asarray(_log_normal(self.score(value)) - self.log_prior(value))
+
+
+def edge(distribution: Any) -> Edge | None:
+    """The map for a half-normal at zero or a uniform distribution; none for others."""
+    kind = distribution.dist.name
+    _, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
+    if kind == "halfnorm" and loc == 0.0:
+        return _half_normal(float(scale), fast_logpdf(distribution))
+    return _uniform(float(loc), float(scale), fast_logpdf(distribution)) if kind == "uniform" else None
+
+
+def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
+    """Each half from its own tail, where it keeps its digits."""
+    unit = sd * np.sqrt(2.0)
+
+    def score(value: Array) -> Array:
+        u = value / unit
+        return np.where(u < 0.5, ndtri(np.maximum(erf(u), _NEAREST)), -ndtri(erfc(np.maximum(u, 0.5))))
+
+    def value(score: Array) -> Array:
+        low, high = erfinv(ndtr(np.minimum(score, 0.0))), erfcinv(ndtr(-np.maximum(score, 0.0)))
+        return np.asarray(unit * np.where(score < 0.0, low, high))
+
+    return Edge(score, value, log_prior)
+
+
+def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> Edge:
+    def score(value: Array) -> Array:
+        return np.asarray(ndtri(np.clip((value - low) / width, _NEAREST, 1.0 - _NEAREST)))
+
+    def value(score: Array) -> Array:
+        return np.asarray(low + width * ndtr(score))
+
+    return Edge(score, value, log_prior)

@@ -1,0 +1,100 @@
+"""One fit: a problem sampled to the policy's satisfaction, thinned to what is worth storing."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.inference.sampler import ensemble
+from wirebayes.inference.sampler.ensemble import Chains
+from wirebayes.inference.transform import Target
+from wirebayes.model.marginal import completed, integrated
+from wirebayes.model.problem import Problem
+
+Array = NDArray[Any]
+STORED_DRAWS = 5000  # per ensemble: beyond that, quantiles no longer move
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A sampled posterior.
+
+    Attributes
+    ----------
+    problem : Problem
+    theta : (chains, draws, d) array
+        Natural parameters, one chain an ensemble, its walkers one after the other (each walker's draws in order).
+    log_density : (chains, draws) array
+    chains : Chains
+        What the sampler said of itself (its own draws, unthinned).
+    thin : int
+    """
+
+    problem: Problem
+    theta: Array
+    log_density: Array
+    chains: Chains
+    thin: int
+
+    @property
+    def flat(self) -> Array:
+        """(n, d) all stored draws."""
+        return self.theta.reshape(-1, self.theta.shape[-1])
+
+
+def fit(
+    problem: Problem,
+    seed: int = 0,
+    *,
+    policy: Policy = DEFAULT,
+    checkpoint: Path | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    near: Mapping[str, float] | None = None,
+    rough: Array | None = None,
+) -> Fit:
+    """Sample the posterior of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    seed : int
+    policy : Policy
+    checkpoint : Path, optional
+        See `wirebayes.inference.sampler.ensemble.sample`.
+    progress : function of a share between 0 and 1
+    near : mapping of name to value, optional
+        Parameters known to be good, where the search for modes looks too.
+    rough : (n, d) array, optional
+        Natural parameters drawn from nearly this posterior, which save burn-in a part of its work.
+
+    Returns
+    -------
+    Fit
+    """
+    target = Target(integrated(problem))
+    walked = target.problem.names
+    start = None
+    if near is not None and near.keys() >= set(walked):
+        start = target.coordinates.to_sampled(np.array([[near[name] for name in walked]]))
+    cloud = None
+    if rough is not None:
+        cloud = target.coordinates.to_sampled(rough[:, [problem.names.index(name) for name in walked]])
+    chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud)
+    m, steps, walkers, d = chains.z.shape
+    thin = max(1, steps * walkers // STORED_DRAWS)
+    z = np.moveaxis(chains.z[:, thin - 1 :: thin], 2, 1)
+    log_density = np.moveaxis(chains.log_density[:, thin - 1 :: thin], 2, 1).reshape(m, -1)
+    theta = target.coordinates.to_natural(z.reshape(-1, d))
+    _, theta, added = completed(target.problem, theta, np.random.default_rng(seed_of(seed, "completed")))
+    return Fit(problem, theta.reshape(m, -1, theta.shape[1]), log_density + added.reshape(m, -1), chains, thin)
+
+
+def seed_of(seed: int, *words: str) -> int:
+    """A seed of its own for each named piece of work, the same whatever else is done beside it."""
+    digest = hashlib.sha256("\x1f".join([str(seed), *words]).encode()).digest()
+    return int.from_bytes(digest[:8], "little")

@@ -1,0 +1,181 @@
+"""Samples of one material with the effects accepted so far: fitted, ready to be tested for one more effect."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.inference.modes import Optimum, climb, modes
+from wirebayes.inference.transform import Target
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.marginal import integrated
+from wirebayes.model.problem import Problem, build
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.protocol import Protocol
+
+Array = NDArray[Any]
+_FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
+_LOG_FLAT = float(stats.norm.logpdf(0.0))
+_ABSURD = 0.5  # setting error, in steps of the test: no bench is set like that
+_AS_HELD = 0.05  # standard deviation of the log of a setting error that is held
+
+
+@dataclass(frozen=True)
+class Block:
+    """What shares parameters, fitted.
+
+    Attributes
+    ----------
+    experiments : tuple of Experiment
+        All of one material.
+    effects : tuple of Effect
+        Accepted so far.
+    law, history
+        See `wirebayes.wire.laws`.
+    target : Target
+    modes : Optimum
+        Distinct modes, best first.
+    sober : (k, d) array
+        Where the best fit calls setting error what is larger than half a step of the test, the best one with setting
+        errors as they are expected: a large effect is easily taken in by a setting error without bounds. Else no row.
+    exponent : float or scipy frozen distribution
+        See `fitted`.
+    """
+
+    experiments: tuple[Experiment, ...]
+    effects: tuple[Effect, ...]
+    law: ElasticLaw
+    history: History
+    target: Target
+    modes: Optimum
+    sober: Array
+    exponent: Any = 1.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(e.name for e in self.experiments)
+
+    @property
+    def best(self) -> dict[str, float]:
+        """The best parameters, all of them."""
+        theta = self.target.coordinates.to_natural(self.modes.z[:1])[0]
+        return dict(zip(self.target.problem.names, theta.tolist(), strict=True))
+
+    def parameters(self, name: str) -> dict[str, float]:
+        """The best parameters, by the names they have where one of the experiments is fitted alone."""
+        theta = self.target.coordinates.to_natural(self.modes.z[:1])
+        sample = self.target.problem.samples[self.names.index(name)]
+        own = self.target.problem.parameters(theta, sample)
+        return {key: float(value[0]) for key, value in own.items()}
+
+    def along(self, effect: Effect, deviations: Sequence[float]) -> Array:
+        """An effect's amplitude so many standard deviations from its best, by the normal approximation as sampled."""
+        column = column_of(self.target.problem, effect)
+        z = np.repeat(self.modes.z[:1], len(deviations), axis=0)
+        z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
+        return self.target.coordinates.to_natural(z)[:, column]
+
+    def problem_with(self, effect: Effect) -> Problem:
+        """The same samples with one more effect, nothing integrated out."""
+        effects = (*self.effects, effect)
+        return build(self.experiments, effects, law=self.law, history=self.history, length_exponent=self.exponent)
+
+    @property
+    def log_evidence(self) -> float:
+        return float(self.modes.log_evidence.max())
+
+
+def fitted(
+    experiments: Sequence[Experiment],
+    effects: Sequence[Effect],
+    law: ElasticLaw,
+    history: History,
+    rng: np.random.Generator,
+    near: Array | None = None,
+    exponent: Any = 1.0,
+) -> Block:
+    """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given.
+
+    What the readings depend on linearly is integrated out (see `wirebayes.model.marginal`). The `exponent` is that of
+    the creep amount's growth with length, or its prior (see `wirebayes.model.problem.build`).
+    """
+    target = Target(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
+    extra = None if near is None else target.coordinates.to_sampled(near[None])
+    found = modes(target, rng, extra)
+    return Block(tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng), exponent)
+
+
+def _sober(target: Target, found: Optimum, rng: np.random.Generator) -> Array:
+    """(k, d) places of `Block.sober`."""
+    problem, best = target.problem, target.coordinates.to_natural(found.z[:1])
+    if all(
+        problem.parameters(best, s)["setting_sd"][0] <= _ABSURD * _typical_step(s.protocol) for s in problem.samples
+    ):
+        return np.empty((0, found.z.shape[1]))
+    every = problem.prior.distributions
+    held = {n: stats.lognorm(_AS_HELD, scale=d.median()) for n, d in every.items() if n.startswith("setting_sd")}
+    bound = Target(replace(problem, prior=replace(problem.prior, distributions=every | held)))
+    return target.coordinates.to_sampled(bound.coordinates.to_natural(modes(bound, rng).z[:1]))
+
+
+def _typical_step(protocol: Protocol) -> float:
+    """Median distance between displacements that follow each other, mm."""
+    steps = np.abs(np.diff(protocol.displacement_mm))
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
+
+
+class Pinned:
+    """The density of a block with one more effect, its amplitude pinned row by row; shape constants stay free.
+
+    Points lack the amplitude's column; what is left is climbed or integrated. The amplitude has a flat prior here:
+    the evidence puts its own on it, the same for every effect.
+    """
+
+    def __init__(self, block: Block, effect: Effect) -> None:
+        problem = block.problem_with(effect)
+        self.column = column_of(problem, effect)
+        free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
+        self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
+        self._plain = block
+
+    def starts(self, best: int = 2) -> Array:
+        """(k, d) where the block's own best modes and its sober fit lie, shape constants at their prior medians."""
+        names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
+        known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
+        natural = self._plain.target.coordinates.to_natural(
+            np.concatenate([self._plain.modes.z[:best], self._plain.sober])
+        )
+        theta = np.empty((len(natural), len(names)))
+        for i, name in enumerate(names):
+            theta[:, i] = (
+                natural[:, known[name]] if name in known else self.target.problem.prior.distributions[name].median()
+            )
+        return self._drop(self.target.coordinates.to_sampled(np.insert(theta, self.column, 0.0, axis=1)))
+
+    def climb(self, start: Array, amplitude: Array) -> Optimum:
+        """Climb every row with its own amplitude."""
+
+        def density(points: Array, rows: Array) -> Array:
+            return self.target(self._insert(points, amplitude[rows])) - _LOG_FLAT
+
+        return climb(density, start, iterations=40, tolerance=1e-2)
+
+    def natural(self, z: Array, amplitude: Array) -> Array:
+        """(n, d) parameters of all columns."""
+        return self.target.coordinates.to_natural(self._insert(z, amplitude))
+
+    def _insert(self, z: Array, amplitude: Array) -> Array:
+        return np.insert(z, self.column, amplitude / self.target.coordinates.scale[self.column], axis=1)
+
+    def _drop(self, z: Array) -> Array:
+        return np.delete(z, self.column, axis=1)
+
+
+def column_of(problem: Problem, effect: Effect) -> int:
+    """The column of an effect's amplitude."""
+    main = effect.columns()[0]
+    return next(i for i, name in enumerate(problem.names) if name.split("[")[0] == main)

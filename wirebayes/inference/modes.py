@@ -1,0 +1,321 @@
+"""Modes of the posterior: batched Newton steps from many starts, and the normal approximation at each.
+
+Every row is an optimisation of its own; rows may also have readings of their own (refits of simulated data).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.sampler.mixture import rows_by_weight, spread_rows
+from wirebayes.inference.transform import Target
+
+Array = NDArray[Any]
+Density = Callable[[Array, Array], Array]
+_LEAST_CURVATURE = 0.3
+_LOOKED = 400  # places that are asked whether a mode explains them
+_ON_THE_WAY = np.array([0.25, 0.5, 0.75])
+_EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
+_WARM_STEPS = 4  # the last ones of the cooling
+_LEAST_SAG = 1.0  # nats
+_LOOKS = 12  # at most, for modes that explain places left over
+_MANY = 2  # new modes in one look: there may be more
+_ONE_MODE = 4.0  # squared standard deviations
+_LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where the climbs ended.
+
+    Attributes
+    ----------
+    z : (n, d) array, sampled coordinates
+    log_density : (n,) array
+    curvature : (n, d, d) array
+        Minus the Hessian, made positive definite.
+    converged : (n,) bool array
+        The Newton decrement fell below the tolerance.
+    """
+
+    z: Array
+    log_density: Array
+    curvature: Array
+    converged: NDArray[np.bool_]
+
+    @property
+    def covariance(self) -> Array:
+        """(n, d, d) covariance of the normal approximation."""
+        eigen, vectors = np.linalg.eigh(self.curvature)
+        # A ridge thinner than this against its length has no Cholesky factor in double precision.
+        eigen = np.maximum(eigen, 1e-10 * eigen.max(axis=1, keepdims=True))
+        half = vectors / np.sqrt(eigen)[:, None, :]
+        return half @ np.swapaxes(half, 1, 2)
+
+    @property
+    def log_evidence(self) -> Array:
+        """(n,) Laplace approximation of the log evidence of each mode.
+
+        No direction counts as wider than the prior makes it (sampled coordinates are of order one under the prior).
+        """
+        d = self.z.shape[1]
+        eigen = np.maximum(np.linalg.eigvalsh(self.curvature), _LEAST_CURVATURE)
+        return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
+
+
+def climb(
+    density: Density,
+    start: Array,
+    *,
+    iterations: int = 60,
+    tolerance: float = 1e-5,
+    until: Callable[[Array], NDArray[np.bool_]] = lambda z: np.zeros(len(z), bool),
+) -> Optimum:
+    """Maximise a log density from every row of `start`.
+
+    Parameters
+    ----------
+    density : function of ((m, d) points, (m,) row numbers) to (m,) values
+        The row numbers say which start a point belongs to.
+    start : (n, d) array
+    iterations : int
+    tolerance : float
+        Stop a row when half its squared Newton decrement is below this.
+    until : function of (m, d) points to (m,) bool
+        Give up the rows, after a step, for which it says so; their log density becomes -inf.
+
+    Returns
+    -------
+    Optimum
+    """
+    z = start.copy()
+    n, d = z.shape
+    value = density(z, np.arange(n))
+    curvature = np.broadcast_to(np.eye(d), (n, d, d)).copy()
+    step_size = np.full((n, d), 1e-3)
+    done = ~np.isfinite(value)
+    converged = np.zeros(n, bool)
+    for _ in range(iterations):
+        rows = np.flatnonzero(~done)
+        if not len(rows):
+            break
+        gradient, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=1)
+        eigen, vectors = _positive(-hessian)
+        along = np.einsum("nij,ni->nj", vectors, gradient)
+        curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
+        decrement = 0.5 * (along**2 / eigen).sum(axis=1)
+        step_size[rows] = np.clip(0.1 / np.sqrt(np.maximum(np.einsum("nii->ni", curvature[rows]), 1.0)), 1e-6, 0.05)
+        finished = decrement < tolerance
+        converged[rows[finished]] = True
+        done[rows[finished]] = True
+        go = ~finished
+        rows, along, eigen, vectors = rows[go], along[go], eigen[go], vectors[go]
+        if not len(rows):
+            break
+        # The direction always climbs; try several lengths at once and keep the best, no line search in Python.
+        direction = np.einsum("nij,nj->ni", vectors, along / eigen)
+        direction *= np.minimum(1.0, 2.0 / np.abs(direction).max(axis=1, keepdims=True))
+        trial = z[rows, None] + _LENGTHS[:, None] * direction[:, None, :]
+        tried = density(trial.reshape(-1, d), np.repeat(rows, len(_LENGTHS))).reshape(len(rows), -1)
+        best = np.argmax(tried, axis=1)
+        gained = tried[np.arange(len(rows)), best]
+        better = gained > value[rows]
+        z[rows[better]] = trial[np.arange(len(rows)), best][better]
+        value[rows[better]] = gained[better]
+        done[rows[~better]] = True
+        left = rows[until(z[rows])]
+        done[left], value[left] = True, -np.inf
+    rows = np.flatnonzero(np.isfinite(value))
+    if len(rows):
+        _, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=2)
+        eigen, vectors = _positive(-hessian)
+        curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
+    return Optimum(z, value, curvature, converged)
+
+
+def _positive(matrices: Array) -> tuple[Array, Array]:
+    """Eigenvalues, made positive, and vectors of symmetric matrices (n, d, d)."""
+    eigen, vectors = np.linalg.eigh(matrices)
+    scale = np.maximum(np.abs(eigen).max(axis=1, keepdims=True), 1e-8)
+    return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
+
+
+def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array, sides: int) -> tuple[Array, Array]:
+    """Gradient and Hessian by central differences, all points of all rows in one batch.
+
+    Mixed derivatives take most of the points: with one side only, half as many, they tell the way well enough.
+    """
+    n, d = z.shape
+    upper = np.triu_indices(d, 1)
+    unit = np.eye(d)
+    mixed = unit[upper[0]] + unit[upper[1]]
+    moves = np.concatenate([unit, -unit, mixed, -mixed] if sides == 2 else [unit, -unit, mixed])
+    points = z[:, None, :] + moves[None] * h[:, None, :]
+    f = density(points.reshape(-1, d), np.repeat(rows, len(moves))).reshape(n, len(moves))
+    f = np.where(np.isfinite(f), f, value[:, None] - 1e3)
+    plus, minus = f[:, :d], f[:, d : 2 * d]
+    gradient = (plus - minus) / (2.0 * h)
+    hessian = np.zeros((n, d, d))
+    hessian[:, np.arange(d), np.arange(d)] = (plus + minus - 2.0 * value[:, None]) / h**2
+    i, j = upper
+    twice = f[:, 2 * d : 2 * d + len(i)] - plus[:, i] - plus[:, j] + value[:, None]
+    if sides == 2:
+        twice = 0.5 * (twice + f[:, 2 * d + len(i) :] - minus[:, i] - minus[:, j] + value[:, None])
+    hessian[:, i, j] = hessian[:, j, i] = twice / (h[:, i] * h[:, j])
+    return gradient, hessian
+
+
+def modes(target: Target, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
+    """The distinct modes of a posterior, best first (see `search`)."""
+    return search(target, rng, extra=extra).modes
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search found.
+
+    Attributes
+    ----------
+    modes : Optimum
+        The distinct modes, best first.
+    warm, cold : (n, d) arrays
+        Rough draws of the density to some power below one, and of the density itself.
+    height : (n,) array
+        Log densities of the cold ones.
+    """
+
+    modes: Optimum
+    warm: Array
+    cold: Array
+    height: Array
+
+
+def search(
+    target: Target, rng: np.random.Generator, *, draws: int = 800, starts: int = 8, extra: Array | None = None
+) -> Search:
+    """Look for the modes of a posterior: good ones among many prior draws, each climbed.
+
+    Prior draws are annealed to the posterior. Half of the starts, the highest place among them, are spread
+    over all places it passed: where it ends, a mode of less weight may have died out, but on the way it lived. The
+    others are chosen among passed places that belong to the hill of no mode found from these; such a climb is given up
+    where it comes so near to a known mode that it would count as that one. Where they find several modes, more are
+    looked for in the same way.
+
+    Parameters
+    ----------
+    target : Target
+    rng : numpy Generator
+    draws : int
+        Of the prior.
+    starts : int
+        Half of them climb first, and half at every further look.
+    extra : (m, d) array, optional
+        Further starts, in sampled coordinates.
+    """
+    z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
+    value = target(z)
+    passed, height = _cooled(target, z, value, rng)
+    warm, cold, cold_height = passed[-_WARM_STEPS * draws :], passed[-draws:], height[-draws:]
+    width = passed.std(axis=0)
+    spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
+    start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
+    found = _distinct([climb(lambda points, rows: target(points), start)])
+    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
+    passed, height = passed[looked], height[looked]
+    for _ in range(_LOOKS):
+        sag = _sag(target, passed, height, found)
+        strange = np.flatnonzero(sag > _LEAST_SAG)
+        if not len(strange):
+            break
+        share = sag[strange] / sag[strange].sum()
+        chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
+        known, before = partial(_near, modes=found.z, curvature=found.curvature), len(found.z)
+        found = _distinct([found, climb(lambda points, rows: target(points), passed[chosen], until=known)])
+        if len(found.z) < before + _MANY:
+            break
+    return Search(found, warm, cold, cold_height)
+
+
+def _sag(target: Target, z: Array, height: Array, found: Optimum) -> Array:
+    """(n,) how far the density between (n, d) places and a mode seen from there lies below the straight line.
+
+    Within one hill it lies above. The best mode is asked first, the others where no one before was seen.
+    """
+    least = np.full(len(z), 1e3)
+    for mode, top in zip(found.z, found.log_density, strict=True):
+        unseen = np.flatnonzero(least > _LEAST_SAG)
+        between = z[unseen, None] + _ON_THE_WAY[:, None] * (mode - z[unseen])[:, None]
+        line = height[unseen, None] + _ON_THE_WAY * (top - height[unseen])[:, None]
+        sag = (line - target(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1)
+        least[unseen] = np.minimum(least[unseen], sag)
+    return least
+
+
+def _distinct(found: Sequence[Optimum]) -> Optimum:
+    """The rows that no better one is near, none hopelessly below the best; best first."""
+    every = Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
+    order = np.argsort(-every.log_density)
+    keep: list[int] = []
+    for i in order:
+        if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - 30.0:
+            continue
+        if not _near(every.z[[i]], every.z[keep], every.curvature[keep])[0]:
+            keep.append(int(i))
+    return Optimum(every.z[keep], every.log_density[keep], every.curvature[keep], every.converged[keep])
+
+
+def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
+    """(n,) whether places (n, d) count as one with any of the modes (k, d)."""
+    apart = z[:, None] - modes
+    return np.asarray((np.einsum("nki,kij,nkj->nk", apart, curvature, apart) <= _ONE_MODE).any(axis=1))
+
+
+def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Places (n, d) and their log densities (n,), from the density to powers that grow from 0 to 1, all together.
+
+    Each step of the power leaves a fifth of the rows effective and moves them by differential evolution: near enough to
+    the modes to find them.
+    """
+    m, d = z.shape
+    value = np.where(np.isfinite(value), value, -1e300)
+    power, way, height = 0.0, [], []
+    while power < 1.0:
+        step = _next_step(value, 1.0 - power)
+        power += step
+        weight = np.exp(step * (value - value.max()))
+        kept = rows_by_weight(weight, m, rng)
+        z, value = z[kept], value[kept]
+        one, other = rng.integers(m, size=(2, m))
+        moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)
+        tried = target(moved)
+        taken = np.log(rng.uniform(size=m)) < power * (tried - value)
+        z = np.where(taken[:, None], moved, z)
+        value = np.where(taken, tried, value)
+        way.append(z)
+        height.append(value)
+    return np.concatenate(way), np.concatenate(height)
+
+
+def _next_step(value: Array, most: float) -> float:
+    """The largest step of the power that leaves enough rows effective."""
+
+    def effective(step: float) -> float:
+        weight = np.exp(step * (value - value.max()))
+        return float(weight.sum() ** 2 / (weight**2).sum())
+
+    if effective(most) >= _EFFECTIVE * len(value):
+        return most
+    low, high = -40.0, float(np.log(most))
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if effective(np.exp(middle)) > _EFFECTIVE * len(value) else (low, middle)
+    return float(np.exp(low))
+
+
+def rowwise(target: Target, readings: Sequence[Array]) -> Density:
+    """A density whose row r sees the r-th of the replicated readings, per sample (H, R, n)."""
+    return lambda points, rows: target(points, [y[..., rows] for y in readings])

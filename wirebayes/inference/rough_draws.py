@@ -1,0 +1,24 @@
+"""Posterior draws in a fraction of a second, for decisions made many times over: a short run of the same sampler.
+
+For numbers that are reported, sample with `wirebayes.inference.fit`, which asks for convergence.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.modes import Optimum
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler.ensemble import sample
+from wirebayes.inference.transform import Target
+
+Array = NDArray[Any]
+_SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, block=32, most_steps=32)
+
+
+def draws(target: Target, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:
+    """(n, d) natural parameters from the posterior whose modes are `found`."""
+    chains = sample(target, int(rng.integers(2**63)), _SHORT, found=found)
+    z = chains.z.reshape(-1, chains.z.shape[-1])
+    return target.coordinates.to_natural(z[rng.choice(len(z), n, replace=False)])

@@ -1,0 +1,121 @@
+"""emcee moves: pools of draws of a frozen proposal, and differential evolution in coordinates that it straightens."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from emcee import State
+from emcee.moves import RedBlueMove
+from emcee.moves.move import Move
+from numpy.typing import NDArray
+
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.inference.sampler.transport_map import Straight
+
+Array = NDArray[Any]
+
+
+class PoolMove(Move):  # type: ignore[misc]
+    """Steps through pools of draws of a frozen proposal q, a step of another move before each.
+
+    A walker at x has a pool of its own: x and K independent draws of q, each weighted by p/q. Its next K places are
+    taken from the pool by weight, systematically: K equal steps around a circle from a random origin, on which
+    every member of the pool has an arc as long as its share of the weights. Given the pool, x is any of its members
+    with these very shares, and so is each place, independent of which x is, because the origin is: with x from p,
+    every place is from p, and the last one starts the next pool. q's tails (Student-t) are heavier than the target's,
+    so that p/q is bounded and the chain uniformly ergodic. To adapt q during kept draws would void the argument: fit
+    it to the burn-in, then freeze it.
+
+    Metropolis-Hastings compares a walker with one draw at a time and forgets the draw it refuses. Here all draws
+    compete at once: nearly as many effective draws come as from importance sampling, on the paper's wires 1.3 to 1.5
+    times as many. What is lost is x's share of its own pool, a memory as weak as the pool is large and as long.
+
+    Parameters
+    ----------
+    proposal : Mixture or Proposal
+    between : emcee Move
+    steps : int
+        As many as will be asked for; they are cut into pools of the same size.
+    most : int
+        The most steps of a pool, the one of the other move included.
+
+    References
+    ----------
+    H. Tjelmeland, Using all Metropolis-Hastings proposals to estimate mean values, NTNU preprint 4/2004.
+    C. Andrieu, A. Lee and M. Vihola, Uniform ergodicity of the iterated conditional SMC and geometric ergodicity of
+    particle Gibbs samplers, Bernoulli 24(2), 2018 (iterated sampling importance resampling).
+    """
+
+    def __init__(self, proposal: Mixture | Proposal, between: Move, steps: int, most: int) -> None:
+        self.proposal, self.between, self.steps, self.most = proposal, between, steps, most
+        self.coming: list[tuple[Array, Array, NDArray[np.bool_]]] = []
+
+    def propose(self, model: Any, state: State) -> tuple[State, NDArray[np.bool_]]:
+        """The next place of every walker, and which ones are new."""
+        if self.coming:
+            x, value, new = self.coming.pop()
+            return State(x, log_prob=value, random_state=state.random_state), new
+        size = -(-self.steps // -(-self.steps // self.most))
+        self.steps -= size
+        state, accepted = self.between.propose(model, state)
+        if size > 1:
+            self.coming = self._pooled(model, state, size - 1)[::-1]
+        return state, accepted
+
+    def _pooled(self, model: Any, state: State, k: int) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+        """The next k places of all walkers: (n, d), their log densities (n,), and whether they changed (n,)."""
+        (n, d), random = state.coords.shape, model.random
+        y = self.proposal.rvs(n * k, random)
+        value = np.column_stack([state.log_prob, model.compute_log_prob_fn(y)[0].reshape(n, k)])
+        pool = np.concatenate([state.coords[:, None], y.reshape(n, k, d)], axis=1)
+        weight = value - self._log_proposal(pool)
+        weight = np.exp(weight - weight.max(axis=1, keepdims=True))
+        until = np.cumsum(weight, axis=1)
+        at = (random.uniform(size=(n, 1)) + np.arange(k) / k) % 1.0 * until[:, -1:]
+        taken = np.array([np.searchsorted(ends, places) for ends, places in zip(until, at, strict=True)])
+        changed = np.diff(taken, axis=1, prepend=0) != 0
+        row = np.arange(n)
+        return [(pool[row, i], value[row, i], new) for i, new in zip(taken.T, changed.T, strict=True)]
+
+    def _log_proposal(self, pool: Array) -> Array:
+        return self.proposal.log_density(pool.reshape(-1, pool.shape[-1])).reshape(pool.shape[:2])
+
+
+class EvolutionMove(RedBlueMove):  # type: ignore[misc]
+    """Differential evolution within each of several ensembles side by side, in straightened coordinates u.
+
+    There differences fit everywhere, along bends and down funnels. Symmetric in u, where the density is p |dx/du|; the
+    map is frozen like the proposal, so each half's chain given the other half leaves the target invariant. A walker
+    sees differences of its own ensemble alone: ensembles stay independent of each other.
+
+    Parameters
+    ----------
+    ensembles : int
+        Of the same even number of walkers, one after the other.
+    straight : Straight, optional
+        Coordinates as they are when left out; then a fifth of the steps is as long as differences are, from mode to
+        mode.
+    """
+
+    def __init__(self, ensembles: int, straight: Straight | None = None) -> None:
+        self.ensembles = ensembles
+        self.straight = straight
+        super().__init__(randomize_split=False)  # neighbours fall into different halves: half of every ensemble each
+
+    def get_proposal(self, x: Array, others: Sequence[Array], random: Any) -> tuple[Array, Array]:
+        """Places (n, d) proposed for walkers at (n, d), from differences of the other half, and log factors (n,)."""
+        (n, d), each = x.shape, len(others[0]) // self.ensembles
+        (u, slope), (pool, _) = self._forward(x), self._forward(others[0])
+        one = random.randint(each, size=n)
+        other = (one + random.randint(1, each, size=n)) % each
+        own = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)
+        scale = 2.38 / np.sqrt(2.0 * d)
+        # short steps for the walker whom long ones do not serve
+        lengths = (scale, 0.5 * scale) if self.straight else (scale, scale, scale, scale, 1.0)
+        u = u + random.choice(lengths, size=(n, 1)) * (pool[own + one] - pool[own + other])
+        y = self.straight.inverse(u) if self.straight else u
+        return y, slope - self._forward(y)[1]
+
+    def _forward(self, x: Array) -> tuple[Array, Array]:
+        return self.straight.forward(x) if self.straight else (x, np.zeros(len(x)))

@@ -1,0 +1,106 @@
+"""What the learned move draws from: mixtures in straightened coordinates, one as things are, and the start's.
+
+The close part resembles the posterior. Two wide ones, fitted to the posterior to a power, keep the ratio of posterior
+over proposal in bounds in the tails: along bends the straightened one, where the straightening goes astray the plain
+one. The start's keeps small modes in reach.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.sampler import mixture, transport_map
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.transport_map import Straight
+
+Array = NDArray[Any]
+SHARES = (0.72, 0.12, 0.12, 0.04)  # of the close part, the wide one, the plain one and the start's
+EXPLORING = (0.55, 0.2, 0.2, 0.05)  # while it learns: draws of the wide parts teach what lies far out
+ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time
+ROUGH_SHARES = (0.3, 0.1, 0.1, 0.5)  # while nothing but the start is sure
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A weighted sum of densities that can be drawn from.
+
+    Attributes
+    ----------
+    shares : tuple of float
+        Of the close part, the wide one, the plain one and the start's.
+    straight : Straight
+    close, wide, plain, start : Mixture
+        The first two of straightened points.
+    """
+
+    shares: tuple[float, float, float, float]
+    straight: Straight
+    close: Mixture
+    wide: Mixture
+    plain: Mixture
+    start: Mixture
+
+    def log_density(self, x: Array) -> Array:
+        """(n,) log density of points (n, d)."""
+        u, jacobian = self.straight.forward(x)
+        straightened = [part.log_density(u) + jacobian for part in (self.close, self.wide)]
+        parts = [*straightened, self.plain.log_density(x), self.start.log_density(x)]
+        return mixture.log_sum(np.array(parts) + np.log(self.shares)[:, None])
+
+    def rvs(self, n: int, rng: Any) -> Array:
+        """(n, d) draws; `rng` is a numpy RandomState or Generator."""
+        counts = rng.multinomial(n, self.shares)
+        straightened = np.concatenate([self.close.rvs(counts[0], rng), self.wide.rvs(counts[1], rng)])
+        as_they_are = [self.plain.rvs(counts[2], rng), self.start.rvs(counts[3], rng)]
+        return np.concatenate([self.straight.inverse(straightened), *as_they_are])[rng.permutation(n)]
+
+
+def fit(
+    hot: Array,
+    cold: Array,
+    start: Mixture,
+    order: NDArray[np.int64],
+    rng: np.random.Generator,
+    shares: tuple[float, float, float, float],
+    *,
+    most: int,
+    points: int = ENOUGH,
+    before: Proposal | None = None,
+) -> Proposal:
+    """The proposal learned from the burn-in.
+
+    Parameters
+    ----------
+    hot, cold : (n, d) arrays
+        Points of the posterior to a power below one, which reach its tails, and of the posterior itself.
+    start : Mixture
+        What was known before any walk.
+    order : (d,) array of int
+        In which coordinates are straightened (see `wirebayes.inference.sampler.transport_map`).
+    rng : numpy Generator
+    shares : tuple of float
+        Of the four parts.
+    most : int
+        The most components of the close mixture; the wide ones, which need not resemble anything, have half as many.
+    points : int
+        About so many are looked at.
+    before : Proposal, optional
+        Of nearly these points: where the mixtures are sought from.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the points do not span their space.
+    """
+    hot, cold = hot[:: 1 + len(hot) // points], cold[:: 1 + len(cold) // points]
+    straight = transport_map.fit(cold, order)
+    (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
+    close = mixture.fit(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None)
+    wide = mixture.fit(far[::2], rng, most=most // 2, before=before.wide if before else None)
+    plain = mixture.fit(hot[::2], rng, most=most // 2, before=before.plain if before else None)
+    return Proposal(shares, straight, close, wide, plain, start)
+
+
+_LIGHT = 40.0  # degrees of freedom where the wide mixtures look after the tails

@@ -1,0 +1,126 @@
+"""Walkers: their state between two stretches of work, which a file can hold, and the stretches themselves."""
+
+import pickle
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import emcee
+import numpy as np
+from emcee.moves.move import Move
+from numpy.typing import NDArray
+
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
+from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.inference.transform import Target
+
+Array = NDArray[Any]
+
+
+@dataclass
+class State:
+    """Everything a resumed run needs, in one pickled file of our own making.
+
+    Attributes
+    ----------
+    positions, values : arrays
+        Sampled coordinates (n, d) and log densities (n,) of all walkers, one ensemble after the other.
+    random
+        State of their random generator.
+    proposal, start : Proposal or Mixture
+        What the learned move draws from, and what was known before any walk.
+    acceptance : float
+        Of the proposal, as its last draws promise.
+    walks : int
+        So often walkers had to look further.
+    walk, seen
+        Places that the last walk came by, and what the proposal was last fitted to.
+    again : bool
+        The proposal was learned a second time, from draws that were to be kept.
+    kept_z, kept_log_density : list of arrays
+        Blocks (steps, n, d) and (steps, n).
+    overlooked : float
+        What `wirebayes.inference.sampler.burn_in.overlooked` said at the last look, where all else was enough.
+    """
+
+    positions: Array
+    values: Array
+    random: Any
+    proposal: Mixture | Proposal
+    start: Mixture
+    generator: np.random.Generator
+    modes: int
+    evaluations: int
+    round: int = 0
+    frozen: bool = False
+    learned: bool = True
+    again: int = 0
+    witness: Any = None
+    acceptance: float = 0.0
+    walks: int = 0
+    walk: Any = None
+    seen: Any = None
+    kept_z: list[Array] = field(default_factory=list)
+    kept_log_density: list[Array] = field(default_factory=list)
+    kept_evaluations: int = 0
+    accepted: int = 0
+    proposed: int = 0
+    autocorrelation: Any = None
+    ess: Any = None
+    r_hat: Any = None
+    overlooked: float = 0.0
+    finished: bool = False
+    converged: bool = False
+    why: str = ""
+
+    @staticmethod
+    def load(path: Path | None) -> "State | None":
+        if path is None or not path.exists():
+            return None
+        with path.open("rb") as stream:
+            state: State = pickle.load(stream)
+        return state
+
+    def save(self, path: Path | None) -> None:
+        if path is not None:
+            part = path.with_name(path.name + ".part")
+            part.write_bytes(pickle.dumps(self))
+            part.replace(path)
+
+
+def advance(target: Target, state: State, steps: int, ensembles: int = 1, power: float = 1.0) -> tuple[Any, int]:
+    """Run the walkers on, on the density to a power; their places and random state are left in `state`.
+
+    All ensembles walk side by side: a batch costs little more than one of its parts.
+
+    Returns
+    -------
+    sampler : emcee.EnsembleSampler
+    evaluations : int
+    """
+
+    def density(z: Array) -> Array:
+        return power * target(z)
+
+    move = _move(state, ensembles, steps)
+    sampler = emcee.EnsembleSampler(*state.positions.shape, density, moves=move, vectorize=True)
+    sampler.log_prob_fn = density  # without emcee's wrapper, which prints all points when an exception passes through
+    before = target.evaluations
+    start = emcee.State(state.positions, log_prob=power * state.values, random_state=state.random)
+    end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+    state.positions, state.values, state.random = end.coords, end.log_prob / power, sampler.random_state
+    used = target.evaluations - before
+    state.evaluations += used
+    return sampler, used
+
+
+def _move(state: State, ensembles: int, steps: int) -> Move:
+    if not state.learned:
+        return EvolutionMove(ensembles)
+    straight = state.proposal.straight if isinstance(state.proposal, Proposal) else None
+    return PoolMove(state.proposal, EvolutionMove(ensembles, straight), steps, POOL if state.frozen else _EXPLORING)
+
+
+POOL = 64  # steps of which one does not trust the proposal; more gain little
+_EXPLORING = 3  # the same in burn-in, which looks for what the proposal leaves out

@@ -1,0 +1,225 @@
+"""The coordinates that are sampled: what the data see, so that the curved ridge in (B, k2, N) lies nearly straight.
+
+Positive parameters become logarithms; amplitudes that end at an edge (half-normal and uniform priors) become what is
+standard normal under their prior, so that no draw falls over the edge and none is held up there; others count in
+standard deviations of their prior. Then, one after the other,
+
+- log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
+- log B becomes the log tension lost in a hold, root mean square over the holds of the test, if the first readings are
+  taken for the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
+  creep is linear in B, so G needs no B and one pass along the holds.
+
+The map is triangular and these two steps have unit Jacobian. Specimens' values that are partially pooled come last
+(`wirebayes.inference.specimens`).
+
+What bend and what funnel remain, a proposal learns (`wirebayes.inference.sampler.transport_map`), for which the columns
+have an order: errors before what they blur, the shape of the creep before its amount and the stiffness.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.edges import edge
+from wirebayes.inference.specimens import specimens
+from wirebayes.model.problem import MATERIAL, Problem, Sample
+
+Array = NDArray[Any]
+_FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
+_LAST = ("k1", "B")
+_STEEPEST = 1.6  # a larger U of a pool is of no ridge that data see; to follow it would only bend the prior's tail
+_NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
+
+
+@dataclass(frozen=True)
+class _Ridge:
+    """Columns of one material's parameters (or fixed values), which of them are shifted, and the map's constants."""
+
+    where: dict[str, int]
+    fixed: dict[str, float]
+    shifted: frozenset[str]
+    steepest: float
+    log_tension: Array
+    times_s: Array
+    which_time: NDArray[np.int64]
+    kept: float
+    hold_s: float
+    log_length: float
+
+    def log_creep(self, U: Array, k2: Array, N: Array) -> Array:
+        """log G: root mean square of the elongation gained in a hold, for B = 1."""
+        U = np.minimum(U, self.steepest)
+        reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
+        mean = float(self.log_tension.mean())
+        drive = np.exp(U * (self.log_tension - mean)[:, None])
+        carried, square = 0.0 * reached[0], 0.0 * drive[0]
+        for j, time in enumerate(self.which_time):
+            gained = (drive[j] - self.kept * carried) * reached[time]
+            carried = carried + gained
+            square = square + gained * gained
+        # the floor keeps the logarithm finite
+        return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
+
+
+class Coordinates:
+    """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``."""
+
+    def __init__(self, problem: Problem) -> None:
+        names = problem.names
+        self.problem = problem
+        self.log_columns = np.array([name in problem.prior.logarithmic for name in names])
+        free = [(i, d) for i, d in enumerate(problem.prior.distributions.values()) if not self.log_columns[i]]
+        self.edges = {i: found for i, d in free if (found := edge(d)) is not None}
+        self.scale = np.ones(len(names))
+        for i, distribution in free:
+            if i not in self.edges:
+                self.scale[i] = _spread(distribution)
+        self.specimens = specimens(problem)
+        first = () if self.specimens is None else self.specimens.spreads
+        steepest = np.inf if self.specimens is None else _STEEPEST
+        unpooled = set(names) if self.specimens is None else set()
+        self.order = np.array(sorted(range(len(names)), key=lambda i: (i not in first, _rank(names[i]))))
+        self.ridges = []
+        shifted: set[str] = set()  # a column that several samples share follows the first of them
+        for sample in problem.samples:
+            mark = _mark(problem, sample.material)
+            columns = {
+                name: own if (own := f"{name}[{sample.name}]") in unpooled else f"{name}{mark}" for name in MATERIAL
+            }
+            fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
+            where = {
+                name: names.index(c) for name, c in columns.items() if c in names and self.log_columns[names.index(c)]
+            }
+            if len(where) + len(fixed) < len(MATERIAL):
+                continue  # a user's prior that allows negative values: leave this material's columns as they are
+            moved = frozenset({"k2", "B"} & {name for name in where if columns[name] not in shifted})
+            shifted |= {columns[name] for name in moved}
+            if moved:
+                self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood))
+
+    def to_sampled(self, theta: Array) -> Array:
+        """Sampled coordinates of natural parameters."""
+        z = theta / self.scale
+        z[:, self.log_columns] = np.log(theta[:, self.log_columns])
+        for i, at in self.edges.items():
+            z[:, i] = at.score(theta[:, i])
+        for ridge in self.ridges:
+            creep, hazard = self._shifts(theta, ridge)
+            if "k2" in ridge.shifted:
+                z[:, ridge.where["k2"]] += hazard
+            if "B" in ridge.shifted:
+                z[:, ridge.where["B"]] += creep
+        if self.specimens is not None:
+            z[:, self.specimens.own] = self.specimens.to_sampled(theta)
+        return z
+
+    def to_natural(self, z: Array) -> Array:
+        """Natural parameters of sampled coordinates."""
+        theta = z * self.scale
+        for i, at in self.edges.items():
+            theta[:, i] = at.value(z[:, i])
+        with np.errstate(over="ignore"):
+            theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
+            for ridge in self.ridges:
+                if "k2" in ridge.shifted:
+                    theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
+                if "B" in ridge.shifted:
+                    theta[:, ridge.where["B"]] = np.exp(z[:, ridge.where["B"]] - self._shifts(theta, ridge)[0])
+            if self.specimens is not None:
+                theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
+        return theta
+
+    def log_jacobian(self, theta: Array) -> Array:
+        """(n,) log |d natural / d sampled|."""
+        total = np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum()
+        for i, at in self.edges.items():
+            total = total + at.log_slope(theta[:, i])
+        if self.specimens is not None:
+            total = total + self.specimens.log_jacobian(theta)
+        return np.asarray(total)
+
+    def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:
+        return theta[:, ridge.where[name]] if name in ridge.where else ridge.fixed[name]
+
+    def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
+        return np.asarray(self._get(theta, ridge, "N") * np.log(0.5 * ridge.hold_s))
+
+    def _shifts(self, theta: Array, ridge: _Ridge) -> tuple[Array, Array]:
+        k1, U, k2, N = (self._get(theta, ridge, name) for name in ("k1", "U", "k2", "N"))
+        with np.errstate(all="ignore"):
+            creep = ridge.log_creep(U, k2, N) + np.log(k1) - ridge.log_length
+        return creep, self._hazard(theta, ridge)
+
+
+def _rank(name: str) -> int:
+    kind = name.split("[")[0]
+    return _FIRST.index(kind) - len(_FIRST) if kind in _FIRST else int(kind in _LAST)
+
+
+def _ridge(
+    where: dict[str, int],
+    fixed: dict[str, float],
+    shifted: frozenset[str],
+    steepest: float,
+    sample: Sample,
+    likelihood: str,
+) -> _Ridge:
+    recorded = np.flatnonzero(sample.protocol.recorded)
+    first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
+    # a slack wire drives no creep; a small share of the largest tension stands in for it
+    tension = np.maximum(first, 0.02 * first.max()) if first.max() > 0 else np.ones_like(first)
+    hold_s = sample.typical_hold_s
+    duration = sample.protocol.duration_s
+    times, which = np.unique(np.where(duration > 0, duration, hold_s), return_inverse=True)
+    kept = 1.0 if sample.model.history == "saturating" and likelihood == "chain" else 0.0
+    length = sample.model.length_ref_mm or sample.protocol.length_mm
+    return _Ridge(where, fixed, shifted, steepest, np.log(tension), times, which, kept, hold_s, float(np.log(length)))
+
+
+def _spread(distribution: Any) -> float:
+    sd = float(distribution.std())
+    return sd if np.isfinite(sd) and sd > 0 else 1.0
+
+
+class Target:
+    """The log posterior density in the sampled coordinates, batched, counting its evaluations."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.coordinates = problem, Coordinates(problem)
+        self.log_prior = problem.prior.log_density()
+        self.evaluations = 0
+        self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Target, (self.problem,)  # what else there is has closures, which no other process can be sent
+
+    def __call__(self, z: Array, readings: Any = None) -> Array:
+        """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""
+        self.evaluations += len(z)
+        if len(z) <= self._rows:
+            return self._values(z, readings)
+        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
+        return np.concatenate(
+            [self._values(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
+        )
+
+    def _values(self, z: Array, readings: Any) -> Array:
+        theta = self.coordinates.to_natural(z)
+        with np.errstate(all="ignore"):
+            value = self.log_prior(theta) + self.coordinates.log_jacobian(theta)
+        inside = np.isfinite(value)
+        if not inside.any():
+            return np.full(len(z), -np.inf)
+        if inside.all():
+            return value + self.problem.log_likelihood(theta, readings)
+        picked = None if readings is None else [y[..., inside] for y in readings]
+        value = np.where(inside, value, -np.inf)
+        value[inside] += self.problem.log_likelihood(theta[inside], picked)
+        return value
+
+
+def _mark(problem: Problem, material: str) -> str:
+    marked = f"k1[{material}]"
+    return f"[{material}]" if marked in problem.names or marked in problem.prior.fixed else ""

@@ -1,0 +1,228 @@
+"""Readings that a wire on a bench hardly gives: checks before a fit, each a sentence with what to change.
+
+What is certainly wrong is refused where the file is read (`wirebayes.io.readings`); what may be honest is warned of
+here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import times_run_on
+from wirebayes.wire.protocol import Protocol
+
+Floats = NDArray[np.float64]
+
+RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
+NEGATIVE = 0.05  # share of the largest tension; sensors drift by less
+FLAT = 3.0  # noise levels by which the holds' means must differ to say anything of stiffness
+LEAST_STRAIN = 5e-5  # 10 N/mm² in steel: benches that step so little cannot set their steps
+LARGEST_STRAIN = 0.5  # lines and ropes break below; rubber is no wire of this model
+ISOLATED = 10.0  # times as far from its neighbours as nine in ten readings
+GROSS = 0.2  # of the range of all other tensions; smaller ones are the model check's affair
+RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that rise, rise in noise levels: not by chance
+OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
+
+
+@dataclass(frozen=True)
+class Readings:
+    """One test as the checks see it.
+
+    Attributes
+    ----------
+    protocol : Protocol
+    tension_N : (H, R) array
+        Padded as the protocol is.
+    resolution_N : float
+        0 where it is not stated.
+    """
+
+    protocol: Protocol
+    tension_N: Floats
+    resolution_N: float
+
+    @property
+    def each(self) -> list[Floats]:
+        """The readings of each recorded hold."""
+        return [row[mask] for row, mask in zip(self.tension_N, self.protocol.mask, strict=True) if mask.any()]
+
+    @property
+    def displacement_mm(self) -> Floats:
+        """Of each recorded hold."""
+        return self.protocol.displacement_mm[self.protocol.recorded]
+
+    @property
+    def number(self) -> NDArray[np.int64]:
+        """Of each recorded hold."""
+        return self.protocol.number[self.protocol.recorded]
+
+    @property
+    def means_N(self) -> Floats:
+        """Of each recorded hold."""
+        return np.array([row.mean() for row in self.each])
+
+    @property
+    def noise_N(self) -> float:
+        """Standard deviation of a reading beside the course of its hold; rounding at least."""
+        bends = [np.diff(row, 2) / np.sqrt(6.0) for row in self.each if len(row) > 2]
+        spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
+        return max(spread, self.resolution_N / np.sqrt(12.0))
+
+
+def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list[str]:
+    """What is odd about the readings of one test.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    tension_N : (H, R) array
+    resolution_N : float
+
+    Returns
+    -------
+    list of str
+        Sentences: what, where, what to change; empty for readings as a bench gives them.
+    """
+    readings = Readings(protocol, tension_N, resolution_N)
+    said = (check(readings) for check in CHECKS)
+    return [sentence for sentence in said if sentence]
+
+
+def of_experiments(experiments: list[Experiment]) -> list[str]:
+    """The warnings of several tests, each with its name before it."""
+    return [f"{e.name}: {s}" for e in experiments for s in warnings(e.protocol(), e.tension(), e.resolution_N)]
+
+
+def run_on_times(readings: Readings) -> str:
+    """Time of the test in place of time in the hold, where there are too few readings to be certain."""
+    p = readings.protocol
+    if times_run_on([row[mask] for row, mask in zip(p.time_s, p.mask, strict=True)]) >= RUN_ON:
+        return ""
+    return (
+        "the reading times of every hold begin after those of the hold before: time_s counts from the beginning of "
+        "each hold, so subtract the moment each hold began if these are times of the whole test"
+    )
+
+
+def negative_tension(readings: Readings) -> str:
+    """Tensions below zero by more than a sensor's noise and offset."""
+    lowest = np.array([row.min() for row in readings.each])
+    worst = int(lowest.argmin())
+    largest = max(float(np.abs(row).max()) for row in readings.each)
+    spread = FLAT * max(readings.noise_N, float(np.ptp(readings.each[worst])))  # too few readings may hide the noise
+    if -lowest[worst] <= max(NEGATIVE * largest, spread):
+        return ""
+    return (
+        f"tension falls to {lowest[worst]:.4g} N in hold {readings.number[worst]}, while a wire only pulls and a slack "
+        "one reads 0 N: check the sign of tension_N and where it was zeroed"
+    )
+
+
+def response(readings: Readings) -> str:
+    """Tension that does not follow the displacement, or follows it the wrong way."""
+    means, place = readings.means_N, readings.displacement_mm
+    if np.ptp(place) == 0:
+        return "all holds have the same displacement_mm: without a step the stiffness cannot be known"
+    if max(row.max() for row in readings.each) <= FLAT * readings.noise_N:
+        return (
+            f"no reading stands out from the scatter within the holds ({readings.noise_N:.2g} N): the wire was slack "
+            "throughout, or rows of other tests are mixed in"
+        )
+    if np.ptp(means) <= FLAT * readings.noise_N:
+        return (
+            f"tension stays at {means.mean():.4g} N while the displacement changes by {np.ptp(place):g} mm: "
+            "check that tension_N is this wire's, and the wire's clamps"
+        )
+    jumps = np.array([b[0] - a[-1] for a, b in zip(readings.each, readings.each[1:], strict=False)])
+    moves = np.diff(place)
+    if (jumps * moves).sum() < 0 and len(means) > 2 and np.corrcoef(place, means)[0, 1] < -0.9:
+        return "tension falls as the displacement rises: check the sign of displacement_mm and of tension_N"
+    return ""
+
+
+def strain_scale(readings: Readings) -> str:
+    """Displacements so small or large beside the length that one of the two is in another unit."""
+    strain = np.ptp(readings.displacement_mm) / readings.protocol.length_mm
+    if strain == 0.0 or LEAST_STRAIN <= strain <= LARGEST_STRAIN:
+        return ""
+    much = "only " if strain < LEAST_STRAIN else ""
+    return (
+        f"the displacements differ by {much}{strain:.2g} of the wire's length of {readings.protocol.length_mm:g} mm: "
+        "check that displacement_mm and length_mm are both in mm"
+    )
+
+
+def outlier(readings: Readings) -> str:
+    """One reading far from its neighbours, in a test whose other readings are close to theirs.
+
+    Creep runs one way within a hold, so a reading counts by what it stands above both neighbours, or below both. A
+    hold's last one counts beyond the range of all others once more; creep may be over after the first.
+    """
+    apart, where = [], []
+    for j, row in enumerate(readings.each):
+        if len(row) < 3:
+            continue
+        before, after = row[1:-1] - row[:-2], row[1:-1] - row[2:]
+        peaks = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+        rest = np.concatenate([row[:-1], *(r for k, r in enumerate(readings.each) if k != j)])
+        beyond = max(row[-1] - rest.max(), rest.min() - row[-1]) - np.ptp(rest)
+        apart.append(np.concatenate([[0.0], peaks, [max(0.0, beyond)]]))
+        where += [(j, i) for i in range(len(row))]
+    if not apart:
+        return ""
+    distance = np.concatenate(apart)
+    worst = int(distance.argmax())
+    hold, at = where[worst]
+    others = np.concatenate([np.delete(row, at) if j == hold else row for j, row in enumerate(readings.each)])
+    usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise_N)
+    if distance[worst] <= max(ISOLATED * usual, GROSS * np.ptp(others)):
+        return ""
+    time = readings.protocol.time_s[readings.protocol.recorded][hold, at]
+    return (
+        f"the reading of {readings.each[hold][at]:.5g} N in hold {readings.number[hold]} at {time:g} s is "
+        f"{distance[worst]:.3g} N from its neighbours: check it, correct a misprint or leave its row out"
+    )
+
+
+def rising(readings: Readings) -> str:
+    """Tension that rises within holds on loading, where creep lets it fall."""
+    place, each, noise = readings.displacement_mm, readings.each, readings.noise_N
+    # a hold that begins below the end of the one before has creep to give back
+    loading = [
+        row
+        for j, row in enumerate(each)
+        if len(row) > 1
+        and row[0] > FLAT * noise
+        and (j == 0 or (place[j] > place[:j].max() and row[0] > each[j - 1][-1]))
+    ]
+    if len(loading) < RISING_HOLDS:
+        return ""
+    rise = np.array([row[-1] - row[0] for row in loading])
+    if (rise > 0).mean() < RISING_SHARE or np.median(rise) <= RISE * noise:
+        return ""
+    return (
+        f"tension rises within {int((rise > 0).sum())} of {len(rise)} holds on loading, by {np.median(rise):.3g} N in "
+        "the middle, while a held wire relaxes: check that time_s runs forward, and the sensor and the room for drift"
+    )
+
+
+def off_grid(readings: Readings) -> str:
+    """Readings finer than the resolution they are said to have."""
+    changes = np.concatenate([np.abs(np.diff(row)) for row in readings.each])
+    if not readings.resolution_N or len(changes) < 3:
+        return ""
+    finer = (changes > 0.01 * readings.resolution_N) & (changes < 0.5 * readings.resolution_N)
+    if finer.mean() <= OFF_GRID and not 0.0 < np.ptp(np.concatenate(readings.each)) <= readings.resolution_N:
+        return ""
+    return (
+        f"readings change by less than resolution_N = {readings.resolution_N:g}: check resolution_N, and that both it "
+        "and tension_N are in N"
+    )
+
+
+CHECKS: tuple[Callable[[Readings], str], ...] = (
+    run_on_times, negative_tension, response, strain_scale, outlier, rising, off_grid,
+)  # fmt: skip

@@ -1,0 +1,322 @@
+"""What was measured: tests of one wire each, read from TOML beside CSV and checked to the last field."""
+
+import hashlib
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.readings import LARGEST, STRETCH, Hold, frozen, read_readings, read_text, shown
+from wirebayes.io.toml_keys import Keys, read_toml
+from wirebayes.units import nearest
+from wirebayes.wire.protocol import Protocol
+
+__all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
+
+_KEYS = ("name", "material", "length_mm", "resolution_N", "readings", "unrecorded_holds", "prior")
+_HOLD_KEYS = ("before_hold", "displacement_mm", "duration_s")
+_NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
+_TAKEN = re.compile(r"\.{1,2}|.*\.(json|html|partial)", re.IGNORECASE)  # a folder beside the results' own files
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One test of one wire sample.
+
+    Attributes
+    ----------
+    name, material : str
+    length_mm : float
+        Zero-tension length before the test.
+    resolution_N : float
+        Step to which tensions were rounded; 0.0 when not stated.
+    holds : tuple of Hold
+        In order, the unrecorded ones at their place.
+    source : Path
+        The TOML file it was read from.
+    priors : dict
+        ``[prior]`` tables by parameter name, as written: the file's, then the experiment's own over them.
+    prior_lines : dict
+        The line in `source` on which each of them stands.
+    """
+
+    name: str
+    material: str
+    length_mm: float
+    resolution_N: float
+    holds: tuple[Hold, ...]
+    source: Path
+    priors: dict[str, dict[str, Any]] = field(default_factory=dict)
+    prior_lines: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def recorded_holds(self) -> tuple[Hold, ...]:
+        """The holds that have readings."""
+        return tuple(hold for hold in self.holds if hold.recorded)
+
+    @property
+    def material_folder(self) -> str:
+        """The material as a folder name: spaces become hyphens."""
+        return self.material.replace(" ", "-")
+
+    def protocol(self) -> Protocol:
+        """What was done, padded to (H, R) arrays."""
+        first = next((hold.temperature_C[0] for hold in self.holds if hold.temperature_C is not None), None)
+        return protocol_of(self.holds, self.length_mm, first)
+
+    def tension(self) -> NDArray[np.float64]:
+        """Measured tensions, (H, R) in N, padded with 0 as `protocol` is."""
+        return _padded([hold.tension_N for hold in self.holds])
+
+    def train(self, holds: int) -> "Experiment":
+        """The first `holds` recorded holds, and the unrecorded ones before the last of them.
+
+        Raises
+        ------
+        InputError
+            When there are not that many.
+        """
+        places = [place for place, hold in enumerate(self.holds) if hold.recorded]
+        if not 1 <= holds <= len(places):
+            raise InputError(
+                f"{self.source}, experiment {self.name}: found {holds} training holds asked for, "
+                f"expected 1 to {len(places)}, the recorded ones"
+            )
+        return replace(self, holds=self.holds[: places[holds - 1] + 1])
+
+    def without_unrecorded(self) -> "Experiment":
+        """The same test as if the unrecorded holds had never been."""
+        return replace(self, holds=_in_sequence(self.recorded_holds))
+
+    def first(self, holds: int) -> "Experiment":
+        """`train`, for what a user asks to be fitted.
+
+        Raises
+        ------
+        InputError
+            When there are not that many holds, or too few readings in them for a fit.
+        """
+        trained = self.train(holds)
+        if not enough(trained.recorded_holds):
+            raise InputError(
+                f"{self.source}, experiment {self.name}: found {counted(trained.recorded_holds)} in the first {holds} "
+                f"of {len(self.recorded_holds)} recorded holds, expected {ENOUGH}"
+            )
+        return trained
+
+    @property
+    def data_hash(self) -> str:
+        """SHA-256 of everything measured (not of the priors, nor of how the files spell it)."""
+        content = [self.name, self.material, self.length_mm, self.resolution_N]
+        holds = [
+            [hold.number, hold.displacement_mm, hold.duration_s, hold.time_s.tolist(), hold.tension_N.tolist()]
+            + ([] if hold.temperature_C is None else [hold.temperature_C.tolist()])
+            for hold in self.holds
+        ]
+        return hashlib.sha256(json.dumps([content, holds]).encode()).hexdigest()
+
+
+SHORTEST = 1e-3  # mm, below any specimen; strains of far shorter ones overflow
+LEAST_HOLDS, LEAST_READINGS = 2, 5  # stiffness needs a step; level, slope and creep over time need readings
+ENOUGH = f"at least {LEAST_HOLDS} recorded holds and {LEAST_READINGS} readings in all"
+
+
+def enough(holds: Sequence[Hold]) -> bool:
+    """True where there are readings enough for a fit."""
+    recorded = [hold.time_s.size for hold in holds if hold.recorded]
+    return len(recorded) >= LEAST_HOLDS and sum(recorded) >= LEAST_READINGS
+
+
+def counted(holds: Sequence[Hold]) -> str:
+    """How many holds and readings there are, in words."""
+    recorded = [hold.time_s.size for hold in holds if hold.recorded]
+    many = [f"{n} {word}{'s' * (n != 1)}" for n, word in ((len(recorded), "hold"), (sum(recorded), "reading"))]
+    return " with ".join(many)
+
+
+def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | None = None) -> Protocol:
+    """Pad holds to rectangular arrays.
+
+    Parameters
+    ----------
+    holds : tuple of Hold
+    length_mm : float
+    reference_C : float, optional
+        Temperature from which warming counts; without it there is no warming.
+
+    Returns
+    -------
+    Protocol
+        With H holds and R columns, R the largest number of readings in a hold.
+    """
+    warming = None
+    if reference_C is not None:
+        empty = frozen([])
+        warming = _padded([empty if hold.temperature_C is None else hold.temperature_C - reference_C for hold in holds])
+    return Protocol(
+        length_mm=length_mm,
+        displacement_mm=np.array([hold.displacement_mm for hold in holds]),
+        time_s=_padded([hold.time_s for hold in holds]),
+        mask=_padded([np.ones(hold.time_s.size) for hold in holds]) > 0,
+        duration_s=np.array([hold.duration_s for hold in holds]),
+        number=np.array([-1 if hold.number is None else hold.number for hold in holds], dtype=np.int64),
+        warming_K=warming,
+        reference_C=None if reference_C is None else float(reference_C),
+    )
+
+
+def _padded(rows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    array = np.zeros((len(rows), max((row.size for row in rows), default=0)))
+    for target, row in zip(array, rows, strict=True):
+        target[: row.size] = row
+    return array
+
+
+def _in_sequence(holds: tuple[Hold, ...]) -> tuple[Hold, ...]:
+    starts = np.concatenate([[0.0], np.cumsum([hold.duration_s for hold in holds])])
+    return tuple(replace(hold, start_s=float(start)) for hold, start in zip(holds, starts, strict=False))
+
+
+def select(experiments: list[Experiment], name: str | None) -> list[Experiment]:
+    """All experiments, or the named one.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    if name is None:
+        return experiments
+    names = [experiment.name for experiment in experiments]
+    if name not in names:
+        raise InputError(
+            f"{experiments[0].source}: found no experiment {shown(name)}{nearest(name, names)}, "
+            f"expected one of {', '.join(names)}"
+        )
+    return [experiments[names.index(name)]]
+
+
+def read_experiments(path: str | Path) -> list[Experiment]:
+    """Read an experiment file and the CSV files beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file in the format of the reference page "experiment file".
+
+    Returns
+    -------
+    list of Experiment
+        In order of the file.
+
+    Raises
+    ------
+    InputError
+        On anything wrong, with the file, the line and column or the key, what was found and what was expected.
+    """
+    source = Path(path)
+    text = read_text(source, "TOML with at least one [[experiment]]")
+    document = read_toml(source, text)
+    top = Keys(source, text, None, document)
+    top.only(("experiment", "prior"))
+    tables = document.get("experiment")
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
+        found = "nothing" if tables is None else "a single table" if isinstance(tables, dict) else shown(tables)
+        raise top.complain("experiment", found, "at least one [[experiment]]")
+    shared = top.priors()
+    lines = {name: top.line(f"prior.{name}") for name in shared}
+    experiments: list[Experiment] = []
+    for index, table in enumerate(tables):
+        name = table.get("name")
+        keys = Keys(source, text, index, table, name if isinstance(name, str) else "")
+        experiment = _read_one(keys, shared, lines)
+        if any(experiment.name == other.name for other in experiments):
+            raise keys.complain("name", shown(experiment.name) + " a second time", "a name used once in the file")
+        experiments.append(experiment)
+    return experiments
+
+
+def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[str, int]) -> Experiment:
+    keys.only(_KEYS)
+    expected = "a name of letters, digits, '.', '_' and '-' for a folder of results"
+    name = keys.string("name", expected)
+    if not _NAME.fullmatch(name) or _TAKEN.fullmatch(name):
+        raise keys.complain("name", shown(name), expected)
+    expected = "a name of at most 100 characters without '/', '\\' or control characters"
+    material = keys.string("material", expected)
+    if (
+        len(material) > 100
+        or _TAKEN.fullmatch(material.strip())
+        or any(c in "/\\" or not c.isprintable() for c in material)
+    ):
+        raise keys.complain("material", shown(material), expected)
+    largest = LARGEST["displacement_mm"]
+    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {largest:.0e} mm"
+    length = keys.number("length_mm", expected, least=SHORTEST, most=largest)
+    resolution = 0.0
+    if "resolution_N" in keys.table:
+        most = LARGEST["tension_N"]
+        expected = f"a step above 0 N, at most {most:.0e} N, or no such key"
+        resolution = keys.number("resolution_N", expected, above=0.0, most=most)
+    readings = _readings_path(keys)
+    recorded = read_readings(readings, length)
+    if not enough(recorded):
+        raise keys.complain("readings", f"{counted(recorded)} in {readings.name}", ENOUGH)
+    holds = _with_unrecorded(keys, recorded, length)
+    own = keys.priors()
+    lines = shared_lines | {parameter: keys.line(f"prior.{parameter}") for parameter in own}
+    return Experiment(name, material, length, resolution, holds, keys.source, shared | own, lines)
+
+
+def _readings_path(keys: Keys) -> Path:
+    expected = "a CSV file inside this file's folder, relative to it"
+    readings = keys.string("readings", expected)
+    folder = keys.source.parent
+    try:
+        inside = not Path(readings).is_absolute() and (folder / readings).resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, a NUL in the name
+        inside = False
+    if not inside:
+        raise keys.complain("readings", shown(readings), expected)
+    if not (folder / readings).is_file():
+        raise keys.complain("readings", f"{shown(readings)}, which is no file there", expected)
+    return folder / readings
+
+
+def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float) -> tuple[Hold, ...]:
+    """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
+    entries = keys.value("unrecorded_holds", "") if "unrecorded_holds" in keys.table else []
+    expected = "a list of { before_hold, displacement_mm, duration_s }"
+    if not isinstance(entries, list):
+        raise keys.complain("unrecorded_holds", shown(entries), expected)
+    numbers = [hold.number for hold in holds if hold.number is not None]
+    placed: list[tuple[int, Hold]] = []
+    for index, entry in enumerate(entries):
+        if not isinstance(entry, dict):
+            raise keys.complain(f"unrecorded_holds[{index}]", shown(entry), expected)
+        inner = Keys(keys.source, keys.text, keys.index, entry, keys.name, f"unrecorded_holds[{index}].")
+        inner.only(_HOLD_KEYS)
+        reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table['readings']}"
+        before = inner.value("before_hold", reach)
+        if isinstance(before, bool) or not isinstance(before, int) or not 0 <= before <= numbers[-1]:
+            raise inner.complain("before_hold", shown(before), reach)
+        expected = f"a displacement above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
+        displacement = inner.number("displacement_mm", expected, above=-length_mm, most=STRETCH * length_mm)
+        longest = LARGEST["time_s"]
+        duration = inner.number(
+            "duration_s", f"a duration of 0 s or more, at most {longest:.0e} s", least=0.0, most=longest
+        )
+        if index and entry == entries[index - 1]:
+            raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
+        place = next(place for place, number in enumerate(numbers) if number >= before)
+        placed.append((place, Hold(None, displacement, duration, frozen([]), frozen([]))))
+    ordered = []
+    for place, hold in enumerate(holds):
+        ordered += [unrecorded for at, unrecorded in placed if at == place] + [hold]
+    return _in_sequence(tuple(ordered))

@@ -1,0 +1,148 @@
+"""Amplitudes that readings depend on linearly, integrated out of a posterior and drawn back into it.
+
+Given everything else, such amplitudes are normal if their priors are. So what is walked is the posterior of everything
+else, with them integrated out, and every draw of it is completed by a draw of them: together, a draw of the whole.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.model import noise
+from wirebayes.model.problem import Problem
+from wirebayes.wire.staircase import simulate
+
+Array = NDArray[Any]
+_ROWS = 2048  # draws completed at once
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Integrated(Problem):
+    """A problem with its linear amplitudes integrated out.
+
+    Attributes
+    ----------
+    whole : Problem
+        The one with all parameters.
+    columns : tuple of str
+        What was integrated out and shows in the readings; the rest of it follows its prior.
+    shapes : tuple of (H, R, k) arrays
+        What one of each adds to the readings of each sample, N.
+    mean, sd : (k,) arrays
+        Of their priors.
+    """
+
+    whole: Problem = None  # type: ignore[assignment]
+    columns: tuple[str, ...] = ()
+    shapes: tuple[Array, ...] = ()
+    mean: Array = None  # type: ignore[assignment]
+    sd: Array = None  # type: ignore[assignment]
+
+    def log_likelihood(self, theta: Array, readings: Any = None) -> Array:
+        """(n,) log-likelihood of the other parameters; -inf where the model cannot be computed."""
+        with np.errstate(all="ignore"):
+            total, square, value, _, along = self._seen(theta, readings)
+            explained = (along**2 / value).sum(axis=1)
+            # At absurd parameters rounding may make more of the readings than there is to explain.
+            regular = (value[:, 0] > 1.0 - _ROUNDING) & (explained <= (1.0 + _ROUNDING) * square)
+            total = total + 0.5 * (explained - np.log(value).sum(axis=1) - ((self.mean / self.sd) ** 2).sum())
+        return np.where(regular & np.isfinite(total), total, -np.inf)
+
+    def drawn(self, theta: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
+        _, _, value, vectors, along = self._seen(theta, None)
+        normal = rng.normal(size=along.shape)
+        amplitudes = np.einsum("nij,nj->ni", vectors, along / value + normal / np.sqrt(value)) * self.sd
+        log_density = 0.5 * (np.log(value) - normal**2 - np.log(2.0 * np.pi)).sum(axis=1)
+        return amplitudes, log_density - np.log(self.sd).sum()
+
+    def _seen(self, theta: Array, readings: Any) -> tuple[Array, ...]:
+        """What the readings say of the amplitudes, in standard deviations of their priors.
+
+        The log-likelihood of none (n,); no less than what there is to explain (n,), prior included; and of the
+        posterior precision (n, k, k), which is no less than one, the eigenvalues (n, k) and vectors (n, k, k), and its
+        product with the posterior mean along them (n, k).
+        """
+        k = len(self.sd)
+        total: Any = 0.0
+        square: Any = ((self.mean / self.sd) ** 2).sum()
+        precision: Any = np.eye(k)
+        pull: Any = self.mean / self.sd
+        for i, sample in enumerate(self.samples):
+            y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
+            line, variance, setting_sd = self.linearised(theta, sample)
+            filtered = noise.chain(line, y, mask, variance, setting_sd)
+            gram, along = noise.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
+            height = filtered.log_likelihood.sum(axis=0)
+            total = total + height
+            square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
+            precision, pull = precision + gram, pull + along
+        finite = np.isfinite(precision).all(axis=(1, 2))
+        value, vectors = np.linalg.eigh(np.where(finite[:, None, None], precision, np.eye(k)))
+        return np.where(finite, total, -np.inf), square, value, vectors, np.einsum("nij,ni->nj", vectors, pull)
+
+
+def integrated(problem: Problem) -> Problem:
+    """The problem with the amplitudes integrated out that it depends on linearly; itself where there are none.
+
+    That are those of effects that only add to the reading, if no other effect comes after them and their priors are
+    normal.
+    """
+    last = {e.key: e for s in problem.samples for e in s.model.at("reading")[-1:] if e.adds}
+    gone = [c for e in last.values() for c in e.columns() if c in problem.names]
+    priors = [problem.prior.distributions[c] for c in gone]
+    if not gone or problem.likelihood != "chain" or any(p.dist.name != "norm" for p in priors):
+        return problem
+    shapes = [_shapes(problem, i, gone) for i in range(len(problem.samples))]
+    shows = np.any([(s != 0).any(axis=(0, 1)) for s in shapes], axis=0)
+    left = {name: d for name, d in problem.prior.distributions.items() if name not in gone}
+    samples = tuple(
+        replace(s, model=replace(s.model, effects=tuple(e for e in s.model.effects if e.key not in last)))
+        for s in problem.samples
+    )
+    return Integrated(
+        samples, replace(problem.prior, distributions=left), "chain", problem,
+        tuple(np.array(gone)[shows]), tuple(s[..., shows] for s in shapes),
+        np.array([p.mean() for p in priors])[shows], np.array([p.std() for p in priors])[shows],
+    )  # fmt: skip
+
+
+def completed(problem: Problem, theta: Array, rng: np.random.Generator) -> tuple[Problem, Array, Array]:
+    """Draws with everything that was integrated out.
+
+    Parameters
+    ----------
+    problem : Problem
+        As `integrated` returned it.
+    theta : (n, d) array
+        Draws of its posterior.
+    rng : numpy Generator
+
+    Returns
+    -------
+    The problem with all parameters, draws (n, D) of its posterior, and (n,) the log density of what was drawn here.
+    """
+    if not isinstance(problem, Integrated):
+        return problem, theta, np.zeros(len(theta))
+    whole = problem.whole.prior
+    parts = [problem.drawn(theta[i : i + _ROWS], rng) for i in range(0, len(theta), _ROWS)]
+    amplitudes, log_density = (np.concatenate(part) for part in zip(*parts, strict=True))
+    values = dict(zip((*problem.names, *problem.columns), np.hstack([theta, amplitudes]).T, strict=True))
+    for name in whole.names:
+        if name not in values:
+            values[name] = whole.distributions[name].rvs(len(theta), random_state=rng)
+            log_density = log_density + whole.distributions[name].logpdf(values[name])
+    return problem.whole, np.stack([values[name] for name in whole.names], axis=1), log_density
+
+
+def _shapes(problem: Problem, i: int, columns: list[str]) -> Array:
+    """(H, R, k) what one of each amplitude adds to the readings of a sample, at any place of the other parameters."""
+    sample = problem.samples[i]
+    theta = np.array([[d.median() for d in problem.prior.distributions.values()]]).repeat(1 + len(columns), axis=0)
+    where = [problem.names.index(c) for c in columns]
+    theta[:, where] = np.vstack([np.zeros(len(columns)), np.eye(len(columns))])
+    made = simulate(sample.protocol, problem.parameters(theta, sample), sample.model)
+    return made[..., 1:] - made[..., :1]

@@ -1,0 +1,257 @@
+"""From holds to a log posterior: which parameter belongs to which sample, and the batched density.
+
+Columns are named ``k1``, ``preload`` …, effect amplitudes ``effect.parameter``. Where several samples are fitted at
+once, a column of one sample is ``preload[sample]`` and one of a material ``k1[material]``; the most special name wins.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment
+from wirebayes.model import noise
+from wirebayes.model.prior import Prior, from_table, wire_defaults
+from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.staircase import Linearised, Model, linearise, tension_reference
+
+Array = NDArray[Any]
+Likelihood = Literal["chain", "hold"]
+
+MATERIAL = ("k1", "B", "U", "k2", "N")
+SAMPLE = ("preload", "sensor_sd", "setting_sd")
+LENGTH_EXPONENT = "creep_length_exponent"
+FINEST = 1e-5  # of the largest tension: no load cell resolves less, and data without any noise need a floor
+_POSITIVE = {"k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd"}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One experiment made ready for the likelihood.
+
+    Attributes
+    ----------
+    name, material : str
+    protocol : Protocol
+    readings : (H, R, 1) array, N
+    resolution_N : float
+    model : Model
+        With the effects that act on this sample.
+    """
+
+    name: str
+    material: str
+    protocol: Protocol
+    readings: Array
+    resolution_N: float
+    model: Model
+
+    @property
+    def typical_hold_s(self) -> float:
+        """Median duration of the recorded holds (a second where all readings are at time zero)."""
+        return float(np.median(self.protocol.duration_s[self.protocol.recorded])) or 1.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A posterior: samples, prior and likelihood.
+
+    Attributes
+    ----------
+    samples : tuple of Sample
+    prior : Prior
+        Its names are the columns of every ``(n, d)`` parameter array.
+    likelihood : {"chain", "hold"}
+    """
+
+    samples: tuple[Sample, ...]
+    prior: Prior
+    likelihood: Likelihood = "chain"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.prior.names
+
+    def parameters(self, theta: Array, sample: Sample) -> dict[str, Array]:
+        """The parameters of one sample, each (n,), from an (n, d) array of all columns."""
+        columns = dict(zip(self.names, np.ascontiguousarray(theta.T), strict=True))
+        n = len(theta)
+
+        def find(name: str) -> Array:
+            for candidate in (f"{name}[{sample.name}]", f"{name}[{sample.material}]", name):
+                if candidate in columns:
+                    return columns[candidate]
+                if candidate in self.prior.fixed:
+                    return np.full(n, self.prior.fixed[candidate])
+            raise KeyError(name)
+
+        wanted = MATERIAL + (SAMPLE if self.likelihood == "chain" else ("sensor_sd",))
+        out = {name: find(name) for name in wanted}
+        for effect in sample.model.effects:
+            out |= {column: find(column) for column in effect.columns()}
+        ratio = sample.protocol.length_mm / (sample.model.length_ref_mm or sample.protocol.length_mm)
+        return out if ratio == 1.0 else at_length(out, sample.model.effects, ratio, find(LENGTH_EXPONENT))
+
+    def hold_log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> list[Array]:
+        """Per sample the (H, n) log-likelihood of each hold, given those before (chain) or its first reading (hold).
+
+        `readings` replaces the measured ones, per sample (H, R, n), row by row of `theta` (simulated replicates).
+        """
+        out = []
+        for i, sample in enumerate(self.samples):
+            own = self.parameters(theta, sample)
+            y = sample.readings if readings is None else readings[i]
+            variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+            if self.likelihood == "hold":
+                out.append(
+                    noise.hold_by_hold(sample.protocol, own | {"preload": 0.0 * own["k1"]}, sample.model, y, variance)
+                )
+            else:
+                line = linearise(sample.protocol, own, sample.model)
+                out.append(noise.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
+        return out
+
+    def log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> Array:
+        """(n,) log-likelihood; -inf where the model cannot be computed."""
+        with np.errstate(all="ignore"):
+            total: Array = sum(holds.sum(axis=0) for holds in self.hold_log_likelihood(theta, readings))
+        return np.where(np.isfinite(total), total, -np.inf)
+
+    def leave_one_hold_out(self, theta: Array) -> list[Array]:
+        """Per sample the (H, n) log p(readings of a hold | all other readings, parameters)."""
+        if self.likelihood == "hold":
+            return self.hold_log_likelihood(theta)
+        out = []
+        for sample in self.samples:
+            own = self.parameters(theta, sample)
+            variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+            line = linearise(sample.protocol, own, sample.model)
+            out.append(
+                noise.leave_one_hold_out(line, sample.readings, sample.protocol.mask, variance, own["setting_sd"])
+            )
+        return out
+
+    def linearised(self, theta: Array, sample: Sample) -> tuple[Linearised, Array, Array]:
+        """A sample's staircase with reading variance and setting error, each (n,)."""
+        own = self.parameters(theta, sample)
+        return (
+            linearise(sample.protocol, own, sample.model),
+            noise.reading_variance(own["sensor_sd"], sample.resolution_N),
+            own["setting_sd"],
+        )
+
+
+def build(
+    experiments: Sequence[Experiment],
+    effects: Sequence[Effect] = (),
+    *,
+    law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    likelihood: Likelihood = "chain",
+    length_exponent: Any = 1.0,
+) -> Problem:
+    """The posterior of some experiments; those of one material share its parameters.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    effects : sequence of Effect
+        Each acts on every sample; its amplitudes are shared as its scope says (an event acts where its hold is).
+    law, history, likelihood
+        See `wirebayes.wire.laws` and `wirebayes.model.noise`.
+    length_exponent : float or scipy frozen distribution
+        p of B ∝ L0^p among samples of one material: a value, or a prior to learn it.
+
+    Raises
+    ------
+    InputError
+        If a prior in the file names no parameter, or is malformed.
+    """
+    materials: dict[str, list[Experiment]] = {}
+    for experiment in experiments:
+        materials.setdefault(experiment.material, []).append(experiment)
+    several_materials, several = len(materials) > 1, len(experiments) > 1
+    distributions: dict[str, Any] = {}
+    samples = []
+    for material, members in materials.items():
+        lengths = {e.length_mm for e in members}
+        # one length is its own mean to the last bit, which exp(log) is not
+        reference = float(np.exp(np.mean(np.log([e.length_mm for e in members])))) if len(lengths) > 1 else max(lengths)
+        defaults = wire_defaults(reference)
+        mark = f"[{material}]" if several_materials else ""
+        distributions |= {f"{name}{mark}": defaults[name] for name in MATERIAL}
+        tension = tension_reference(np.concatenate([h.tension_N for e in members for h in e.holds]))
+        if len(lengths) > 1:
+            distributions[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
+        for effect in effects:
+            suffix = mark if effect.scope == "material" else ""
+            distributions |= {f"{c}{suffix}": a.prior for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
+        for experiment in members:
+            largest = max((float(np.abs(h.tension_N).max()) for h in experiment.recorded_holds), default=0.0)
+            acting = tuple(e for e in effects if not isinstance(e, EventEffect) or e.test in ("", experiment.name))
+            model = Model(law, history, acting, tension, reference if len(members) > 1 else 0.0)
+            samples.append(
+                Sample(experiment.name, material, experiment.protocol(), experiment.tension()[..., None],
+                       max(experiment.resolution_N, FINEST * largest), model)
+            )  # fmt: skip
+    for experiment in experiments:
+        mark = f"[{experiment.name}]" if several else ""
+        defaults = wire_defaults(experiment.length_mm)
+        wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
+        distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
+    _apply_tables(distributions, experiments, several)
+    fixed = {name: float(d) for name, d in distributions.items() if isinstance(d, int | float)}
+    shapes = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_shape}
+    free = {name: d for name, d in distributions.items() if name not in fixed}
+    logarithmic = frozenset(n for n, d in free.items() if n.split("[")[0] in _POSITIVE | shapes and d.support()[0] >= 0)
+    return Problem(tuple(samples), Prior(free, fixed, logarithmic), likelihood)
+
+
+def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> None:
+    """Put the priors of the files in place of the defaults."""
+    everything = set(MATERIAL) | set(SAMPLE) | {LENGTH_EXPONENT}
+    for experiment in experiments:
+        for name, table in experiment.priors.items():
+            line = experiment.prior_lines.get(name)
+            key = f"{experiment.source}{f', line {line}' if line else ''}: prior.{name}"
+            wanted = from_table(key, table)
+            hits = [
+                c for c in (f"{name}[{experiment.name}]", f"{name}[{experiment.material}]", name) if c in distributions
+            ]
+            if hits:
+                distributions[hits[0]] = wanted
+            elif name not in everything and "." not in name:
+                raise InputError(
+                    f"{key}: no such parameter; known are {', '.join(sorted(everything))} and effect.parameter"
+                )
+
+
+def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:
+    """Parameters of a sample `ratio` times as long as the reference: whatever is an elongation of the wire has grown.
+
+    The creep amount grows as the ratio to the power `exponent`, an effect's elongation as the ratio itself.
+    """
+    grown = [c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_elongation]
+    return {**own, "B": own["B"] * ratio**exponent, **{name: own[name] * ratio for name in grown}}
+
+
+def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:
+    """The same problem with other readings, per sample (H, R, 1)."""
+    return replace(
+        problem, samples=tuple(replace(s, readings=y) for s, y in zip(problem.samples, readings, strict=True))
+    )
+
+
+def with_protocols(problem: Problem, protocols: Sequence[Protocol], readings: Sequence[Array]) -> Problem:
+    """The same parameters on other holds, per sample."""
+    return replace(
+        problem,
+        samples=tuple(
+            replace(s, protocol=p, readings=y) for s, p, y in zip(problem.samples, protocols, readings, strict=True)
+        ),
+    )

@@ -1,0 +1,39 @@
+"""Readings drawn from the model: replicates with setting, sensor and rounding error, entering exactly."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.model.noise import hold_courses
+from wirebayes.model.problem import Problem, Sample
+from wirebayes.wire.staircase import simulate
+
+Array = NDArray[Any]
+
+
+def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Generator) -> Array:
+    """(H, R, n) simulated readings of one sample, one replicate a row of `theta` (n, d).
+
+    Hold by hold, each replicate starts from the measured first reading, which stays as it is.
+    """
+    own = problem.parameters(theta, sample)
+    protocol, n = sample.protocol, len(theta)
+    holds, width = protocol.time_s.shape
+    noise = rng.normal(size=(holds, width, n)) * own["sensor_sd"]
+    if problem.likelihood == "hold":
+        # The first reading carries noise, so what it says of the length does too.
+        first = sample.readings[:, 0] - noise[:, 0]
+        out = np.zeros((holds, width, n))
+        for j, course in enumerate(hold_courses(protocol, own, sample.model, first)):
+            if course is not None:
+                out[j] = course[0] + noise[j]
+    else:
+        setting = rng.normal(size=(holds, n)) * own["setting_sd"]
+        out = simulate(protocol, own, sample.model, setting) + noise
+    return rounded(out, sample.resolution_N)
+
+
+def rounded(readings_N: Array, resolution_N: float) -> Array:
+    """Readings as the instrument writes them down."""
+    return readings_N if resolution_N == 0 else np.round(readings_N / resolution_N) * resolution_N

@@ -1,0 +1,255 @@
+"""Holds that were not trained on: predicted freely and given their first reading, and scored.
+
+Freely means from the displacements and the training readings alone; given its first reading is how the paper's figures
+were made. The same code serves a single hold left out in the middle and the last third of a test.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.inference.fit import Fit
+from wirebayes.io.experiment import Experiment
+from wirebayes.model import noise
+from wirebayes.prediction.leave_one_hold_out import thinned
+from wirebayes.prediction.predictive import Question, predict
+from wirebayes.wire.staircase import linearise
+
+Array = NDArray[Any]
+LEVELS = (0.5, 0.9, 0.99)
+QUANTILES = (0.005, 0.05, 0.25, 0.5, 0.75, 0.95, 0.995)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How predicted readings met the measured ones, a row a reading.
+
+    Attributes
+    ----------
+    hold, time_s, observed_N, mean_N, sd_N : (rows,) arrays
+    quantiles_N : (7, rows) array
+        At `QUANTILES`.
+    pit : (rows,) array
+        Share of the predictive distribution below the reading.
+    elpd : (holds,) array
+        log p(readings of each held-out hold | training readings), or of its later readings given the first.
+    elpd_together : float
+        log p(all held-out readings | training readings); NaN where it is not defined.
+    pit_band : (3, 101) array
+        Levels from 0 to 1, and the band that the share of `pit` below each level leaves with probability 5 %
+        anywhere; from joint draws, so that readings may depend on each other.
+    pit_p : float
+        Share of joint draws whose `pit` strays at least as far from that band's middle.
+    """
+
+    hold: NDArray[np.int64]
+    time_s: Array
+    observed_N: Array
+    mean_N: Array
+    sd_N: Array
+    quantiles_N: Array
+    pit: Array
+    elpd: Array
+    elpd_together: float
+    pit_band: Array
+    pit_p: float
+
+    @property
+    def rmse_N(self) -> float:
+        """Of the predictive mean."""
+        return float(np.sqrt(np.mean((self.observed_N - self.mean_N) ** 2)))
+
+    @property
+    def residual_sd(self) -> Array:
+        """(rows,) residual in units of the predictive sd."""
+        return np.asarray((self.observed_N - self.mean_N) / self.sd_N)
+
+    def coverage(self) -> dict[float, float]:
+        """Share of readings inside each central interval."""
+        ends = dict(zip(QUANTILES, self.quantiles_N, strict=True))
+        return {
+            level: float(
+                np.mean(
+                    (self.observed_N >= ends[round(0.5 - level / 2, 4)])
+                    & (self.observed_N <= ends[round(0.5 + level / 2, 4)])
+                )
+            )
+            for level in LEVELS
+        }
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The holds after the training ones, predicted.
+
+    Attributes
+    ----------
+    experiment : str
+    trained : int
+        Recorded holds trained on.
+    free : Scores or None
+        None for a likelihood hold by hold, which knows no level.
+    given : Scores
+        The later readings of each hold, given its first.
+    """
+
+    experiment: str
+    trained: int
+    free: Scores | None
+    given: Scores
+
+
+def held_out(fitted: Fit, experiment: Experiment, rng: np.random.Generator, sample: int = 0) -> HeldOut:
+    """Predict the holds of an experiment that a fit of its first holds has not seen.
+
+    Parameters
+    ----------
+    fitted : Fit
+        One of its samples is the experiment's first holds.
+    experiment : Experiment
+        The whole of it.
+    rng : numpy Generator
+    sample : int
+        Which sample.
+
+    Returns
+    -------
+    HeldOut
+    """
+    problem, here = fitted.problem, fitted.problem.samples[sample]
+    whole, trained = experiment.protocol(), len(here.protocol.number)
+    theta = thinned(fitted.flat)
+    asked = whole.recorded.copy()
+    asked[:trained] = False
+    if not asked.any():
+        raise ValueError(f"{experiment.name}: all {trained} holds were trained on")
+    tension = experiment.tension()
+    nothing = np.full(len(asked), np.nan)
+    past = int(here.protocol.recorded.sum())
+    free = None
+    if problem.likelihood == "chain":
+        drawn = predict(problem, theta, here, Question(whole, trained, asked, nothing), rng)
+        elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, asked)
+        free = _scores(drawn, whole.mask & asked[:, None], whole.number, whole.time_s, tension, elpd, together)
+        # Each hold given its own first reading alone, as the paper's figures were made.
+        for j in np.flatnonzero(asked):
+            only = np.arange(len(asked)) == j
+            question = Question(whole, trained, only, np.where(only, tension[:, 0], np.nan))
+            drawn[j] = predict(problem, theta, here, question, rng)[j]
+    else:
+        drawn = predict(problem, theta, here, Question(whole, trained, asked, tension[:, 0]), rng)
+        elpd_given = _hold_scores(fitted, experiment, sample, asked)
+    later = whole.mask & asked[:, None]
+    later[:, 0] = False
+    return HeldOut(
+        experiment.name, past, free, _scores(drawn, later, whole.number, whole.time_s, tension, elpd_given, np.nan)
+    )
+
+
+def _scores(
+    drawn: Array, rows: NDArray[np.bool_], number: Array, time_s: Array, tension: Array, elpd: Array, together: float
+) -> Scores:
+    draws, observed = drawn[rows], tension[rows]
+    band, p = pit_band(draws, observed)
+    return Scores(
+        hold=np.broadcast_to(number[:, None], rows.shape)[rows],
+        time_s=time_s[rows],
+        observed_N=observed,
+        mean_N=draws.mean(axis=1),
+        sd_N=draws.std(axis=1, ddof=1),
+        quantiles_N=np.quantile(draws, QUANTILES, axis=1),
+        pit=(draws < observed[:, None]).mean(axis=1),
+        elpd=elpd,
+        elpd_together=together,
+        pit_band=band,
+        pit_p=p,
+    )
+
+
+def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[Array, float]:
+    """Simultaneous band of the probability integral transform's distribution, and how unusual the observed one is.
+
+    Parameters
+    ----------
+    draws : (rows, n) array
+        Joint draws of all readings: each is compared with the others as the observed ones are.
+    observed : (rows,) array
+    probability : float
+
+    Returns
+    -------
+    band : (3, 101) array
+        Levels, lower and upper end.
+    p : float
+    """
+    rows, n = draws.shape
+    levels = np.linspace(0.0, 1.0, 101)
+    pit = (np.argsort(np.argsort(draws, axis=1), axis=1) + 0.5) / n
+    shares = np.stack([(pit <= level).mean(axis=0) for level in levels])
+    own = ((draws < observed[:, None]).mean(axis=1)[:, None] <= levels).mean(axis=0)
+    ordered = np.sort(shares, axis=1)
+    # the level at which a course is extreme, in the pointwise two-sided sense; its minimum over all levels
+    everything = np.column_stack([shares, own])
+    below = np.stack([np.searchsorted(o, e, side="right") for o, e in zip(ordered, everything, strict=True)])
+    above = n - np.stack([np.searchsorted(o, e, side="left") for o, e in zip(ordered, everything, strict=True)])
+    extreme = 2.0 * np.minimum(below, above).min(axis=0) / n
+    pointwise = np.quantile(extreme[:-1], 1.0 - probability)
+    ends = np.quantile(shares, [min(pointwise / 2.0, 0.5), max(1.0 - pointwise / 2.0, 0.5)], axis=1)
+    return np.vstack([levels, ends]), float(np.mean(extreme[:-1] <= extreme[-1]))
+
+
+def _chain_scores(
+    fitted: Fit, experiment: Experiment, sample: int, asked: NDArray[np.bool_]
+) -> tuple[Array, Array, float]:
+    """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
+    problem, here = fitted.problem, fitted.problem.samples[sample]
+    whole, tension = experiment.protocol(), experiment.tension()[..., None]
+    parts: dict[tuple[int, str], list[Array]] = {}
+    theta = thinned(fitted.flat)
+    for start in range(0, len(theta), _CHUNK):
+        own = problem.parameters(theta[start : start + _CHUNK], here)
+        line = linearise(whole, own, here.model)
+        variance = noise.reading_variance(own["sensor_sd"], here.resolution_N)
+        with np.errstate(all="ignore"):
+            for j in np.flatnonzero(asked):
+                for what in ("whole", "first"):
+                    mask = whole.mask & ~asked[:, None]
+                    mask[j] = whole.mask[j] if what == "whole" else np.arange(mask.shape[1]) == 0
+                    log_p = noise.chain(line, tension, mask, variance, own["setting_sd"]).log_likelihood[j]
+                    parts.setdefault((int(j), what), []).append(log_p)
+            every = noise.chain(line, tension, whole.mask, variance, own["setting_sd"]).log_likelihood
+            parts.setdefault((-1, "whole"), []).append(every[asked].sum(axis=0))
+    mean = {key: _log_mean(np.concatenate(values)) for key, values in parts.items()}
+    each = np.array([mean[int(j), "whole"] for j in np.flatnonzero(asked)])
+    first = np.array([mean[int(j), "first"] for j in np.flatnonzero(asked)])
+    return each, each - first, mean[-1, "whole"]
+
+
+def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, asked: NDArray[np.bool_]) -> Array:
+    problem, here = fitted.problem, fitted.problem.samples[sample]
+    own = problem.parameters(thinned(fitted.flat), here)
+    own = own | {"preload": 0.0 * own["k1"]}
+    variance = noise.reading_variance(own["sensor_sd"], here.resolution_N)
+    log_p = noise.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
+    return np.array([_log_mean(log_p[j]) for j in np.flatnonzero(asked)])
+
+
+def _log_mean(log_p: Array) -> float:
+    finite = np.where(np.isfinite(log_p), log_p, -np.inf)
+    return float(logsumexp(finite) - np.log(len(finite)))
+
+
+def train_counts(recorded: int) -> list[int]:
+    """How many holds to train on: 5 as the paper did, 8, and two thirds; only where two or more are left."""
+    return sorted({k for k in (5, 8, two_thirds(recorded)) if 2 <= k <= recorded - 2})
+
+
+def two_thirds(recorded: int) -> int:
+    """Two thirds of the holds, rounded to nearest."""
+    return int(round(2.0 * recorded / 3.0))
+
+
+_CHUNK = 1000

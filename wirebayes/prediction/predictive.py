@@ -1,0 +1,169 @@
+"""Predicted readings: parameter, setting, sensor and rounding error, given the training readings and what went before.
+
+For each posterior draw the setting errors of the training holds are drawn given the training readings (a normal
+distribution, to the linearisation of the likelihood); then the whole staircase, past and future, is walked with exact
+setting errors. So the creep carried on, and whatever effects carry beside it, is what the readings say it is.
+
+A first reading that is given later conditions the predicted readings jointly, parameters and setting errors at once:
+each draw is moved by the regression of all readings on the given ones, which is exact where they are jointly normal.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.linear_algebra import eigh, solve
+from wirebayes.model import noise
+from wirebayes.model.problem import Problem, Sample
+from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.staircase import Model, Theta, _Walk, linearise
+
+Array = NDArray[np.float64]
+_CHUNK = 500  # draws at a time: bounds the memory of the normal equations
+
+
+@dataclass(frozen=True)
+class Question:
+    """Which readings are asked for, after which history.
+
+    Attributes
+    ----------
+    protocol : Protocol
+        The training holds first, then the holds to come; or, for a fresh sample, the asked holds alone.
+    trained : int
+        How many leading holds belong to the training; 0 for a fresh sample.
+    asked : (H,) bool array
+        A trained hold that is asked for is answered as a replicate: new noise, new setting error.
+    first_N : (H,) array
+        A hold's first reading where the prediction shall be given it, else NaN.
+    """
+
+    protocol: Protocol
+    trained: int
+    asked: NDArray[np.bool_]
+    first_N: Array
+
+
+def predict(problem: Problem, theta: Array, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
+    """Draws of the asked readings.
+
+    Parameters
+    ----------
+    problem : Problem
+        Says how the columns of `theta` are named, and the likelihood.
+    theta : (n, d) array
+        Posterior draws.
+    sample : Sample
+        The one of the problem's samples that goes on; its readings are the history.
+    question : Question
+    rng : numpy Generator
+
+    Returns
+    -------
+    (H, R, n) array, N
+        Zero for holds that were not asked for. Rounding is continuous: uniform within half a step.
+    """
+    parts = [
+        _readings(problem, theta[start : start + _CHUNK], sample, question, rng)
+        for start in range(0, len(theta), _CHUNK)
+    ]
+    drawn = np.concatenate(parts, axis=-1)
+    return drawn if problem.likelihood == "hold" else _given_first(drawn, question)
+
+
+def _readings(problem: Problem, theta: Array, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
+    own, protocol = problem.parameters(theta, sample), question.protocol
+    shape = (*protocol.time_s.shape, len(theta))
+    error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution_N
+    if problem.likelihood == "hold":
+        return _hold_by_hold(own, sample.model, question, error)
+    course = chain_course(own, sample, question, rng)
+    return np.where(question.asked[:, None, None], course + error, 0.0)
+
+
+def chain_course(own: Theta, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
+    """(H, R, n) readings without sensor error, of trained holds as replicates.
+
+    An unknown discrepancy is an effect among the others here: its draws were made given the training readings.
+    """
+    protocol, trained = question.protocol, question.trained
+    n = len(own["k1"])
+    setting = rng.normal(size=(len(question.asked), n)) * own["setting_sd"]
+    again = setting.copy()
+    if trained:
+        setting[:trained] = settings_given_readings(own, sample, rng)
+    walk = _Walk(protocol, own, sample.model)
+    creep: Array = np.zeros(n)
+    beside: dict[str, Array] = {}
+    out = []
+    for j in range(len(question.asked)):
+        if j < trained and question.asked[j]:
+            past = list(walk.past)
+            out.append(walk.hold(j, walk.stretched(j) + again[j], creep, beside)[0])
+            walk.past = past
+            _, creep, beside = walk.hold(j, walk.stretched(j) + setting[j], creep, beside)
+        else:
+            tension, creep, beside = walk.hold(j, walk.stretched(j) + setting[j], creep, beside)
+            out.append(tension)
+    return np.array(out)
+
+
+def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator) -> Array:
+    """(H, n) a draw of the setting errors of a sample's holds, unrecorded ones included, given all its readings."""
+    line = linearise(sample.protocol, own, sample.model)
+    variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+    holds, _, n = line.tension.shape
+    carried = np.zeros((holds, n))
+    # Normal equations of eta in units of its own sd; hold by hold, so that the whole Jacobian is never in memory.
+    square, right = np.zeros((n, holds, holds)), np.zeros((n, holds))
+    for j, keep in enumerate(sample.protocol.mask):
+        by_eta = line.by_creep[j][:, None, :] * carried[None]
+        by_eta[:, j] = line.by_setting[j]
+        scaled = np.moveaxis(by_eta[keep] * (own["setting_sd"] / np.sqrt(variance)), -1, 0)
+        residual = ((sample.readings[j] - line.tension[j])[keep] / np.sqrt(variance)).T
+        square += np.swapaxes(scaled, 1, 2) @ scaled
+        right += np.einsum("nrh,nr->nh", scaled, residual)
+        carried = line.carry_by_creep[j] * carried
+        carried[j] = line.carry_by_setting[j]
+    eigen, vectors = eigh(square)
+    precision = 1.0 + np.maximum(eigen, 0.0)
+    along = np.einsum("nij,ni->nj", vectors, right) / precision + rng.normal(size=(n, holds)) / np.sqrt(precision)
+    drawn: Array = np.einsum("nij,nj->in", vectors, along) * own["setting_sd"]
+    return drawn
+
+
+def _hold_by_hold(own: Theta, model: Model, question: Question, error: Array) -> Array:
+    """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
+    given = question.first_N[:, None] - error[:, 0]
+    out = np.zeros_like(error)
+    for j, course in enumerate(noise.hold_courses(question.protocol, own, model, given)):
+        if course is not None and question.asked[j]:
+            tension, _, valid = course
+            out[j] = np.where(valid, tension, 0.0) + error[j]
+            out[j, 0] = question.first_N[j]
+    return out
+
+
+def _given_first(drawn: Array, question: Question) -> Array:
+    """Condition a hold's readings on the first readings given up to it; a replicate on its own alone."""
+    given = question.asked & np.isfinite(question.first_N)
+    for j in np.flatnonzero(question.asked)[::-1]:
+        known = np.array([j] if given[j] else [], int)
+        if j >= question.trained:
+            known = np.flatnonzero(given[question.trained : j + 1]) + question.trained
+        if len(known):
+            drawn[j] = _regressed(drawn[j], drawn[known, 0], question.first_N[known])
+        if given[j]:
+            drawn[j, 0] = question.first_N[j]  # not only to the last digit
+    return drawn
+
+
+def _regressed(drawn: Array, first: Array, observed_N: Array) -> Array:
+    """Joint draws (R, n) moved to where `first` (m, n) takes its observed values (m,)."""
+    centred = first - first.mean(axis=1, keepdims=True)
+    square, across = centred @ centred.T, centred @ (drawn - drawn.mean(axis=1, keepdims=True)).T
+    gain = solve(square, across).T
+    if not np.isfinite(gain).all() and np.isfinite(square).all():  # given readings that do not vary, or vary as one
+        gain = (np.linalg.pinv(square, hermitian=True) @ across).T
+    return drawn + gain @ (observed_N[:, None] - first)

@@ -1,0 +1,210 @@
+"""What a protocol file asks of a stored posterior: replicates, holds that continue the test, or a fresh sample."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import protocol_of
+from wirebayes.io.readings import Hold, read_protocol, read_text, shown
+from wirebayes.prediction.predictive import Question
+from wirebayes.results.store import Stored
+from wirebayes.wire.effect import EventEffect
+from wirebayes.wire.protocol import Protocol
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A checked protocol file.
+
+    Attributes
+    ----------
+    stored : Stored
+        The posterior; for a fresh sample without the one-off events, which happened to the tested one.
+    question : Question
+    holds : tuple of Hold
+        As the file has them; the asked holds of the question in the same order.
+    sentence : str
+        Which sample is predicted, given what.
+    """
+
+    stored: Stored
+    question: Question
+    holds: tuple[Hold, ...]
+    sentence: str
+
+
+def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Asked:
+    """Read a protocol file and check it against what was trained on.
+
+    Parameters
+    ----------
+    path : Path
+        Columns ``hold,displacement_mm,time_s``, with ``temperature_C`` where the training data had it, and optionally
+        ``tension_N``, filled only at a hold's first time.
+    stored : Stored
+    fresh : bool
+        The file is the whole history of another sample. Otherwise its holds are those of the tested sample: repeated
+        ones are replicated, later ones begin when the last trained hold ended.
+
+    Returns
+    -------
+    Asked
+
+    Raises
+    ------
+    InputError
+        With the file, line, column, what was found and what was expected.
+    """
+    trained = stored.sample.protocol
+    file = _File(path, read_protocol(path, trained.length_mm))
+    file.check_temperature(trained.reference_C is not None)
+    if stored.likelihood == "hold":
+        file.check_first_readings()
+    first = np.array([hold.tension_N[0] for hold in file.holds])
+    if fresh:
+        began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
+        alone = protocol_of(file.holds, trained.length_mm, began_at)
+        question = Question(alone, 0, np.ones(len(first), bool), first)
+        return Asked(_without_events(stored), question, file.holds, _FRESH)
+    row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
+    file.check_repeats(trained, row_of)
+    repeated = np.array([hold.number in row_of for hold in file.holds])
+    rows = np.array([row_of[int(h.number or 0)] for h, known in zip(file.holds, repeated, strict=True) if known], int)
+    asked = np.zeros(len(trained.number), bool)
+    asked[rows] = True
+    given = np.full(len(trained.number), np.nan)
+    given[rows] = first[repeated]
+    after = tuple(h for h, known in zip(file.holds, repeated, strict=True) if not known)
+    whole = _joined(trained, protocol_of(after, trained.length_mm, trained.reference_C)) if after else trained
+    everything = np.append(asked, np.ones(len(after), bool))
+    question = Question(whole, len(trained.number), everything, np.append(given, first[~repeated]))
+    sentence = _tested(tuple(trained.number[rows]), [int(h.number or 0) for h in after], max(row_of), stored.likelihood)
+    return Asked(stored, question, file.holds, sentence)
+
+
+_FRESH = "predicted as a fresh sample with no history: the protocol is all that ever happened to it"
+
+
+def _tested(replicates: Sequence[int], later: Sequence[int], last: int, likelihood: str) -> str:
+    """Which holds of the tested sample are predicted, given what, and which hold numbers its history leaves out."""
+    parts = []
+    if replicates:
+        parts.append(f"{_listed(_ranges(replicates))} of the training predicted as replicates")
+    if later:
+        given = "all training readings" if likelihood == "chain" else "the first reading of each"
+        parts.append(
+            f"{_listed(_ranges(later))} predicted as a continuation of the tested sample from the end of "
+            f"hold {last} on, given {given} (--fresh for a fresh sample)"
+        )
+        skipped = [(a + 1, b - 1) for a, b in zip([last, *later], later, strict=False) if b > a + 1]
+        if skipped:
+            parts.append(f"nothing is assumed to have happened in between: {_listed(skipped)} not in its history")
+    return "; ".join(parts)
+
+
+def _ranges(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """First and last of each run of neighbours among rising numbers."""
+    ends = [i for i, n in enumerate(numbers) if i + 1 == len(numbers) or numbers[i + 1] != n + 1]
+    starts = [0, *(i + 1 for i in ends[:-1])]
+    return [(int(numbers[i]), int(numbers[j])) for i, j in zip(starts, ends, strict=True)]
+
+
+def _listed(ranges: Sequence[tuple[int, int]]) -> str:
+    several = len(ranges) > 1 or ranges[0][0] != ranges[0][1]
+    return f"hold{'s' * several} " + ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in ranges)
+
+
+@dataclass(frozen=True)
+class _File:
+    """The holds of a protocol file, and where each reading stands in it."""
+
+    path: Path
+    holds: tuple[Hold, ...]
+
+    def complain(self, hold: int, reading: int, column: str, found: str, expected: str) -> InputError:
+        header = [field.strip() for field in read_text(self.path).splitlines()[0].split(",")]
+        line = 2 + sum(len(h.time_s) for h in self.holds[:hold]) + reading
+        place = f"line {line}, column {header.index(column) + 1} ({column})" if column in header else "line 1, header"
+        return InputError(f"{self.path}, {place}: found {found}, expected {expected}")
+
+    def check_temperature(self, logged: bool) -> None:
+        if logged and self.holds[0].temperature_C is None:
+            raise self.complain(
+                0, 0, "temperature_C", "no column temperature_C", "one, because the training data had temperatures"
+            )
+
+    def check_first_readings(self) -> None:
+        for i, hold in enumerate(self.holds):
+            if not hold.tension_N[0] > 0:
+                expected = "the hold's first reading, above 0 N, because the posterior is hold by hold"
+                found = "no tension_N" if np.isnan(hold.tension_N[0]) else shown(float(hold.tension_N[0]))
+                raise self.complain(i, 0, "tension_N", found, expected)
+
+    def check_repeats(self, trained: Protocol, row_of: dict[int, int]) -> None:
+        last = max(row_of)
+        for i, hold in enumerate(self.holds):
+            number = int(hold.number or 0)
+            if number not in row_of:
+                if number < last:
+                    known = ", ".join(str(n) for n in sorted(row_of))
+                    expected = f"one of the trained holds ({known}), or one after hold {last}, or --fresh"
+                    raise self.complain(i, 0, "hold", str(number), expected)
+                continue
+            row = row_of[number]
+            if hold.displacement_mm != trained.displacement_mm[row]:
+                expected = f"{trained.displacement_mm[row]:g}, as hold {number} was trained on"
+                raise self.complain(i, 0, "displacement_mm", f"{hold.displacement_mm:g}", expected)
+            times = trained.time_s[row][trained.mask[row]]
+            for k in range(max(len(times), len(hold.time_s))):
+                if k >= len(hold.time_s):
+                    found = f"{k} reading{'s' * (k != 1)} of hold {number}"
+                    raise self.complain(i, k - 1, "time_s", found, f"{len(times)}, as it was trained on")
+                if k >= len(times) or hold.time_s[k] != times[k]:
+                    listed = ", ".join(f"{t:g}" for t in times)
+                    expected = f"the times hold {number} was trained on: {listed}"
+                    raise self.complain(i, k, "time_s", f"{hold.time_s[k]:g}", expected)
+            if hold.temperature_C is not None and trained.warming_K is not None and trained.reference_C is not None:
+                logged = trained.reference_C + trained.warming_K[row][trained.mask[row]]
+                wrong = np.flatnonzero(np.abs(hold.temperature_C - logged) > _SAME_K)
+                if len(wrong):
+                    k = int(wrong[0])
+                    expected = f"{logged[k]:g}, as hold {number} was trained on"
+                    raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
+
+
+_SAME_K = 1e-6
+
+
+def _joined(before: Protocol, after: Protocol) -> Protocol:
+    """One protocol after another, padded to the same width."""
+    width = max(before.time_s.shape[1], after.time_s.shape[1])
+
+    def padded(array: NDArray[Any]) -> Array:
+        return np.pad(array.astype(float), [(0, 0), (0, width - array.shape[1])])
+
+    warming = None
+    if before.warming_K is not None and after.warming_K is not None:
+        warming = np.concatenate([padded(before.warming_K), padded(after.warming_K)])
+    return Protocol(
+        length_mm=before.length_mm,
+        displacement_mm=np.concatenate([before.displacement_mm, after.displacement_mm]),
+        time_s=np.concatenate([padded(before.time_s), padded(after.time_s)]),
+        mask=np.concatenate([padded(before.mask), padded(after.mask)]) > 0,
+        duration_s=np.concatenate([before.duration_s, after.duration_s]),
+        number=np.concatenate([before.number, after.number]),
+        warming_K=warming,
+        reference_C=before.reference_C,
+    )
+
+
+def _without_events(stored: Stored) -> Stored:
+    model = stored.sample.model
+    lasting = tuple(effect for effect in model.effects if not isinstance(effect, EventEffect))
+    return replace(stored, sample=replace(stored.sample, model=replace(model, effects=lasting)))

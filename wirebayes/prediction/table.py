@@ -1,0 +1,38 @@
+"""Predicted readings as a table: one row for each row of the protocol file."""
+
+from typing import Any
+
+import numpy as np
+
+from wirebayes.inference.fit import seed_of
+from wirebayes.prediction.predictive import predict
+from wirebayes.prediction.request import Asked
+
+HEADER = ("experiment", "hold", "displacement_mm", "time_s", "mean_N", "sd_N", "q05_N", "q50_N", "q95_N")
+DRAWS = 4000
+
+
+def table(asked: Asked, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
+    """Mean, sd and quantiles of the asked readings, in the file's order.
+
+    Parameters
+    ----------
+    asked : Asked
+    seed : int
+    draws : int
+        Posterior draws used, evenly spread over the stored ones.
+    """
+    stored, question = asked.stored, asked.question
+    theta = stored.theta
+    theta = theta[np.unique(np.linspace(0, len(theta) - 1, draws).round().astype(int))]
+    rng = np.random.default_rng(seed_of(seed, "predict", stored.sample.name))
+    drawn = predict(stored.problem, theta, stored.sample, question, rng)
+    rows: list[list[Any]] = []
+    for hold, at in zip(asked.holds, np.flatnonzero(question.asked), strict=True):
+        here = drawn[at, : len(hold.time_s)]
+        quantiles = np.quantile(here, [0.05, 0.5, 0.95], axis=1)
+        for k, time in enumerate(hold.time_s):
+            about = here[k] - here[k, 0]  # so that a given reading comes back to the last digit
+            figures = [here[k, 0] + about.mean(), about.std(ddof=1), *quantiles[:, k]]
+            rows.append([stored.sample.name, hold.number, hold.displacement_mm, float(time), *map(float, figures)])
+    return rows

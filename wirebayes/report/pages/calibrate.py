@@ -1,0 +1,93 @@
+"""The page of ``wirebayes calibrate``: lengths with intervals, those by Hooke's law alone, what cannot be observed."""
+
+from pathlib import Path
+from typing import Any
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, number, span
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """The content of ``calibrate.json``."""
+    found = read_json(folder / "calibrate.json")
+    creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
+    first: list[Block] = [Columns([_done(found), _known(found), _unknown(creep, hooke)])]
+    if not creep["converged"]:
+        first.insert(0, Text("Not converged: do not use any of these lengths.", strong=True))
+    sections = [
+        Section("Summary", first),
+        Section("Lengths", [_lengths(creep, hooke)]),
+        Section("What to do", _next(found)),
+    ]
+    lead = "Zero-tension lengths of a robot's wires from its own joint values and tensions."
+    return Page(f"Calibration of {found['robot']}", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _done(found: dict[str, Any]) -> Points:
+    prior = found["prior"]
+    return Points("What was done", [
+        f"{found['holds']} holds, {found['read']} of them read.",
+        f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line were "
+        f"assumed to differ by {100 * prior['specimen_spread']:g} %.",
+    ])  # fmt: skip
+
+
+def _known(found: dict[str, Any]) -> Points:
+    if found["pose_now"] is None:
+        return Points("What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]])
+    sd = [1e3 * v for v in found["with_creep_model"]["length_m"]["sd"]]
+    place = ", ".join(number(v) for v in found["pose_now"]["position_m"])
+    text = f"Every length is known to {span(min(sd), max(sd), 2)} mm (standard error)."
+    return Points("What is known", [text, f"The platform is at ({place}) m.", found["observability"]["sentence"]])
+
+
+def _unknown(creep: dict[str, Any], hooke: dict[str, Any]) -> Points:
+    said = []
+    for name, result in (("the creep model", creep), ("Hooke's law alone", hooke)):
+        if not result["converged"]:
+            said.append(f"With {name} the search did not converge: do not use its lengths.")
+        if result["misfit"] is None:
+            continue
+        fits = "explains" if result["misfit"] < 1.5 else "cannot explain"
+        said.append(
+            f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
+            f"{fits} the readings."
+        )
+    return Points("How far it can be trusted", said)
+
+
+def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
+    a, b = creep["length_m"], hooke["length_m"]
+    lines = [
+        [
+            str(i + 1),
+            _milli(mean),
+            f"{_milli(low)} … {_milli(high)}",
+            _milli(strain),
+            _milli(plain),
+            f"{_milli(plain_low)} … {_milli(plain_high)}",
+        ]
+        for i, (mean, low, high, strain, plain, plain_low, plain_high) in enumerate(
+            zip(a["mean"], a["q05"], a["q95"], creep["creep_strain"], b["mean"], b["q05"], b["q95"], strict=True)
+        )
+    ]
+    header = ["wire", "length now, mm", "90 %", "creep strain, mm per m", "Hooke's law alone, mm", "90 %"]
+    return Table(header, lines, "Zero-tension length of every wire when the last hold ended, creep included.")
+
+
+def _milli(value: float | None) -> str:
+    """Thousandths; a search that did not converge may leave none."""
+    return "–" if value is None else f"{1e3 * value:.2f}"
+
+
+def _next(found: dict[str, Any]) -> list[Block]:
+    joints = "No joint values are given: read more poses, or check the readings and their stated errors."
+    if found["joint_values_for_home_m"] is not None:
+        values = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])
+        joints = f"Joint values that bring the platform to its home pose now, m: {values}."
+    rows = [[f"{v:.3f}" for v in place] for place in found["next_positions_m"]]
+    caption = "Positions whose readings would shrink the lengths' uncertainty most, the most useful first."
+    return [
+        Text(joints),
+        Table(["x, m", "y, m", "z, m"], rows, caption),
+    ]

@@ -1,0 +1,44 @@
+"""The page of ``wirebayes compare``: models side by side on readings they have not seen."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import Block, Page, Pictures, Section, Table, Text, number, pictures_in
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """One section an experiment, from ``comparison.json`` and the pictures beside it."""
+    found = read_json(folder / "comparison.json")["experiments"]
+    sections = [_section(folder, name, table) for name, table in found.items()]
+    lead = "Each model predicts every hold from the others, and the last holds from the first; best first."
+    return Page("Models side by side", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
+    rows = table["models"]
+    good = [r for r in rows if r.get("failed") is None]
+    blocks: list[Block] = [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
+    if (folder / name).is_dir() and (pictures := pictures_in(folder / name)):
+        blocks.append(Pictures(pictures))
+    header = ["model", "weight", f"elpd − {table['base']}", "standard error", "held out: rms, N"]
+    header += ["given first reading, N", "meaning"]
+    lines = []
+    for r in good:
+        difference, held = r.get("difference") or {}, r.get("held_out") or {}
+        errors = (number((held.get(way) or {}).get("rmse_N"), 2) for way in ("free", "given_first"))
+        scores = (number(difference.get(key), 2) for key in ("elpd", "se"))
+        lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _brief(r.get("meaning") or "")])
+    blocks.append(
+        Table(header, lines, "Best first. The weight is the model's share in the mixture that predicts best.")
+    )
+    failed = [[r["name"], str(r["failed"])] for r in rows if r.get("failed") is not None]
+    if failed:
+        blocks.append(Table(["model", "why it was not scored"], failed))
+    return Section(name, blocks)
+
+
+def _brief(meaning: str) -> str:
+    """What follows the figures, which have columns of their own."""
+    return re.split("[:;] ", meaning, maxsplit=1)[-1]

@@ -1,0 +1,105 @@
+"""The page of ``wirebayes discover``: what is missing in the model, how sure that is, and what to measure next."""
+
+from pathlib import Path
+from typing import Any
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    embedded,
+    number,
+    pictures_in,
+    span,
+)
+from wirebayes.report.pages.paper_summary import listed
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """One section an experiment, from ``discovery.json`` and the pictures beside it."""
+    found = read_json(folder / "discovery.json")["experiments"]
+    overview = Table(
+        ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
+        [
+            [name, _spoken(v), listed([_words(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)]
+            for name, v in found.items()
+        ],
+    )
+    sections = [Section("Summary", [overview]), *(_section(folder, name, v) for name, v in found.items())]
+    lead = "Simulation against measurement: where they disagree, which effect is missing, and whether adding it helps."
+    return Page("What the model is missing", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
+    candidates = listed([_words(e) for e in v["set"]])
+    words = {
+        "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
+        "unknown": "Something is missing that no effect in the catalogue explains.",
+        "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}.",
+        "named": f"What is missing: {listed([_words(e) for e in v['effects']])}.",
+    }
+    blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
+    where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
+    gap = [_gap(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
+    hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
+    loose = [f"Not identifiable here: {listed([_words(what) for what, _ in hidden])}."] if hidden else []
+    if v.get("next_measurement"):
+        loose.append(f"Measure next: {v['next_measurement']}")
+    columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in gap if p])]
+    blocks.append(Columns([*columns, Points("What is not known", loose or ["Nothing to report."])]))
+    file = folder / f"{name}.png"
+    if file.is_file():
+        blocks.append(Pictures([Picture(embedded(file), f"Readings of {name} against the plain and the final model.")]))
+    if (folder / name).is_dir() and (others := pictures_in(folder / name)):
+        blocks.append(Pictures(others))
+    if v.get("probabilities"):
+        ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
+        lines = [[_words(effect), number(round(p, 4), 2)] for effect, p in ranked]
+        caption = "Probability of being the first missing effect, given that one is missing."
+        blocks.append(Table(["candidate", "probability"], lines, caption))
+    if v.get("power"):
+        lines = [[_words(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
+        caption = "The smallest amplitude of each effect that this test detects with 80 % power."
+        blocks.append(Table(["effect", "amplitude", "unit"], lines, caption))
+    if hidden:
+        caption = "Not identifiable here: the readings would be nearly the same with or without it."
+        blocks.append(Table(["what", "why"], [[_words(what), why] for what, why in hidden], caption))
+    return Section(name, blocks)
+
+
+def _spoken(v: dict[str, Any]) -> str:
+    return str(v["verdict"]).replace("-", " ")
+
+
+def _words(effect: str) -> str:
+    return "something unknown" if effect == "unknown" else effect.replace("_", " ")
+
+
+def _share(v: dict[str, Any]) -> str:
+    closed = (v.get("held_out") or {}).get("gap_closed")
+    return "–" if closed is None else f"{100 * closed:.0f} %"
+
+
+def _gap(v: dict[str, Any]) -> str:
+    held = v.get("held_out") or {}
+    if not held.get("plain") or not held.get("final"):
+        return ""
+    plain, final = (number(held[model]["rmse_N"], 2) for model in ("plain", "final"))
+    holds = listed([str(h) for h in held["holds"]])
+    text = f"On the unused holds {holds} the rms error goes from {plain} to {final} N"
+    if v.get("accepted") and held.get("flexible"):
+        text += f"; a smooth curve instead of a named effect reaches {number(held['flexible']['rmse_N'], 2)}"
+    return text + "."
+
+
+def _amplitude(effect: str, a: dict[str, Any]) -> str:
+    unit = "" if a.get("unit") in (None, "-", "1") else f" {a['unit']}"
+    at = "" if a.get("hold") is None else f", from hold {a['hold']} on"
+    return f"{_words(effect)}: {number(a['mean'])}{unit} ({span(a['q05'], a['q95'])}){at}."

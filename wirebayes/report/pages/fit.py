@@ -1,0 +1,189 @@
+"""The page of ``wirebayes fit``: each fit's readings, what they determine and what they do not."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.prediction.predictive import Question, predict
+from wirebayes.report import figures
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    drawn,
+    number,
+    span,
+    unit_text,
+)
+from wirebayes.report.pages.paper_summary import listed
+from wirebayes.results.contraction import LEAST_CONTRACTION, contraction
+from wirebayes.results.store import Stored, experiments_in, load, prior_draws, unit_of
+
+Array = NDArray[Any]
+_DRAWS = 1000
+_SPOKEN = {"creep_2min_mm": "2 min", "creep_1h_mm": "1 h", "creep_1day_mm": "1 day"}
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """One section for each experiment of each fit in the folder."""
+    sections = []
+    for file in sorted(folder.glob("*/summary.json")):
+        summary = read_json(file)
+        if configuration.get("own_effects"):
+            sections.append(_told(summary))
+            continue
+        names = experiments_in(file.parent / "posterior.nc")
+        for name in names:
+            sections.append(section(load(file.parent, name), prior_draws(file.parent, name), summary))
+    titles = listed([s.title for s in sections])
+    lead = f"Posterior of {titles}: what the readings say about each parameter, compared with the prior."
+    return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _told(summary: dict[str, Any]) -> Section:
+    """A fit with effects of the user's own, from its summary alone: a page runs nobody's code."""
+    lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
+    words = Text("Fitted with effects from a file of the user's own, so this section shows summary.json alone.")
+    table = Table(["parameter", "median", "90 % interval"], lines)
+    blocks = [*_cautions(summary), words, table, _derived(summary), Text(_sampled(summary))]
+    return Section(summary["experiment"], blocks)
+
+
+def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) -> Section:
+    """Readings, verdict, intervals and residuals of one experiment."""
+    sample, draws = stored.sample, stored.draws
+    sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
+    shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}
+    trusted = summary["converged"] and _check(summary)["passed"] is not False
+    blocks: list[Block] = _cautions(summary)
+    blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects, trusted)]))
+    alt = f"Measured minus predicted tension of {sample.name}, hold after hold, inside the 90 % band."
+    measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
+    pictures = [Picture(drawn(measured), f"Tension of {sample.name} against displacement.")]
+    pictures.append(Picture(drawn(_residuals(stored)), alt, "Readings against replicates of the same holds."))
+    blocks.append(Pictures(pictures))
+    blocks.append(_parameters(draws, shrunk, sample.model.effects))
+    named = figures.marginals(draws, prior, sample.model.effects)
+    told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
+    blocks.append(Pictures(told, small=True))
+    taught = [t["sentence"] for t in summary["identifiability"].values()]
+    blocks.append(Columns([Points("What the data determine", taught)]))
+    blocks.append(_derived(summary))
+    ahead = summary["extrapolation"]
+    alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
+    caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
+    caption = f"{caption} {ahead['warning']}".strip()
+    blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, caption)]))
+    blocks.append(Text(_sampled(summary)))
+    return Section(sample.name, blocks)
+
+
+def _check(summary: dict[str, Any]) -> dict[str, Any]:
+    """The result of the model check, or why there is none."""
+    absent = {"passed": None, "sentence": "The model was not checked against the readings: the check was left out."}
+    return dict(summary.get("model_check", absent))
+
+
+def _cautions(summary: dict[str, Any]) -> list[Block]:
+    """What a reader must know before anything else."""
+    check = _check(summary)
+    out: list[Block] = [Text(check["sentence"], strong=check["passed"] is not True or bool(check.get("gross_errors")))]
+    if not summary["converged"]:
+        out.insert(0, Text("Not converged: do not trust these intervals.", strong=True))
+    return [Text(f"Check the readings: {said}.", strong=True) for said in summary["warnings"]] + out
+
+
+def _sampled(summary: dict[str, Any]) -> str:
+    state = "Converged" if summary["converged"] else "Not converged"
+    return (
+        f"{state} {summary['convergence'].removeprefix('not converged ')}. Likelihood {summary['likelihood']}, history "
+        f"{summary['history']}, law {summary['elastic_law']}, effects {listed(summary['effects'])}; "
+        f"{number(summary['likelihood_evaluations'])} likelihood evaluations."
+    )
+
+
+def _measured(stored: Stored) -> Points:
+    protocol, tension = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
+    holds = int(protocol.recorded.sum())
+    unrecorded = len(protocol.recorded) - holds
+    points = [
+        f"{stored.sample.material}, {protocol.length_mm:g} mm.",
+        f"{holds} holds{f' and {unrecorded} not recorded' if unrecorded else ''}, {len(tension)} readings.",
+        f"Tensions from {tension.min():.2f} to {tension.max():.2f} N.",
+        f"The longest hold lasted {protocol.duration_s.max():g} s.",
+    ]
+    return Points("What was measured", points)
+
+
+def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...], trusted: bool) -> list[Points]:
+    """What the readings determine and what they do not; only the model's own words where it is not to be trusted."""
+    known: list[str] = []
+    loose: list[str] = []
+    for name, share in shrunk.items():
+        unit = unit_text(unit_of(name, effects))
+        told = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
+        (known if share >= LEAST_CONTRACTION else loose).append(told)
+    if not trusted:
+        return [Points("90 % intervals, if the model were right", known + loose)]
+    nothing = ["No parameter."]
+    return [
+        Points("What the readings determine (90 % intervals)", known or nothing),
+        Points("What the prior still decides", loose or nothing),
+    ]
+
+
+def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...]) -> Table:
+    lines = []
+    for name, values in draws.items():
+        low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+        share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
+        lines.append([name, unit_text(unit_of(name, effects)) or "–", number(middle), span(low, high), share])
+    caption = (
+        "The interval before the test is the prior's; a parameter is well known if it shrank by at least "
+        f"{100 * LEAST_CONTRACTION:.0f} %."
+    )
+    return Table(["parameter", "unit", "median", "90 % interval", "shrunk by"], lines, caption)
+
+
+def _derived(summary: dict[str, Any]) -> Table:
+    derived = summary["derived"]
+    names = {key: f"creep after {text}, mm" for key, text in _SPOKEN.items()}
+    names |= {"final_creep_mm": "final creep, mm", "median_creep_time_s": "half of it after, s"}
+    names |= {"stiffness_N": "stiffness there, N per unit strain"}
+    lines = []
+    for key, name in names.items():
+        band = derived[key]
+        endless = "grows without end" if key == "final_creep_mm" else "–"
+        lines.append([name, number(band["q50"]), span(band["q05"], band["q95"])] if band else [name, endless, "–"])
+    caption = (
+        f"A fresh sample under a constant {derived['tension_N']:g} N, with all fitted effects of the wire and without "
+        "those of the bench."
+    )
+    caption = f"{caption} {summary['extrapolation']['warning']}".strip()
+    return Table(["quantity", "median", "90 % interval"], lines, caption)
+
+
+def _residuals(stored: Stored) -> Any:
+    protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
+    alone = stored.likelihood == "hold"
+    first = readings[:, 0] if alone else np.full(len(readings), np.nan)
+    question = Question(protocol, 0 if alone else len(readings), protocol.recorded, first)
+    rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), _DRAWS)).astype(int)
+    replicates = predict(stored.problem, stored.theta[rows], stored.sample, question, np.random.default_rng(0))
+    wanted = protocol.mask.copy()
+    if alone:
+        wanted[:, 0] = False
+    band = np.quantile(replicates[wanted], [0.05, 0.5, 0.95], axis=1)
+    number_of = np.broadcast_to(protocol.number[:, None], wanted.shape)[wanted]
+    kind = stored.likelihood
+    title = f"{stored.sample.name}, {figures.WORDS[kind]}"
+    return figures.residuals(number_of, protocol.time_s[wanted], readings[wanted], band, title, figures.COLOURS[kind])

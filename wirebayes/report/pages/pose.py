@@ -1,0 +1,195 @@
+"""The page of ``wirebayes pose``: where the platform goes, how sure that is, and where the doubt comes from."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    embedded,
+    number,
+    span,
+)
+from wirebayes.report.pictures.robot import CONTROLLERS
+
+_CAPTIONS = {
+    "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
+    "drift": "How far the platform moves while the actuators stand still. Line: median, band: 90 % of the draws.",
+    "rotation": "How far it turns. A symmetric pose turns only because specimens of one line differ.",
+    "pose-error": "Distance from the pose, controllers with increasingly complete wire models, identical specimens.",
+    "error-budget": "How much each parameter's uncertainty contributes to the variance of the drift.",
+    "workspace": "A level platform at other positions, new wires. White with a cross: no tensions hold it.",
+}
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """The content of ``pose.json`` and the pictures beside it."""
+    pose = read_json(folder / "pose.json")
+    blocks: list[Block] = [Columns([_asked(pose), *_answers(pose)])]
+    if not pose.get("feasible", True):
+        said = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
+        blocks.insert(0, Text(said, strong=True))
+    blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
+    files = {name: folder / f"{name}.png" for name in _CAPTIONS}
+    pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p.is_file()]
+    sections = [Section("Summary", blocks), Section("Pictures", [Pictures(pictures)] if pictures else [])]
+    sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
+    sections += [Section("Between calibrations", _between(pose)), Section("Sources of uncertainty", _doubts(pose))]
+    sections += [Section("How many equilibria", _equilibria(pose))]
+    lead = "A platform on wires that creep: the commanded pose, and how the platform moves away from it."
+    return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
+
+
+def _losses(pose: dict[str, Any]) -> list[str]:
+    """What must be read first: falls, slack wires and poses that are not held, as the command said them."""
+    telling = ("falls", "slack", "cannot begin", "cannot pull", "its tension", "softest motion")
+    return [w[:1].upper() + w[1:] + "." for w in pose.get("warnings", []) if any(word in w for word in telling)]
+
+
+def _asked(pose: dict[str, Any]) -> Points:
+    place = ", ".join(number(float(x)) if x else "0" for x in pose["pose"]["position_m"])
+    wires = pose.get("wires", {})
+    points = [f"Platform of {pose['mass_kg']:g} kg at ({place}) m."]
+    if wires:
+        tested = f"{wires['tested_length_mm']:g} mm"
+        effects = wires["effects"]
+        model = f"the plain model with {', '.join(effects).replace('_', ' ')}" if effects else "the plain model"
+        points.append(f"Wires known from {wires['draws']} posterior draws of a sample of {tested}: {model}.")
+        if pose.get("inverse"):
+            low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
+            rule = pose["tension_distribution"]["choice"].replace("_", " ")
+            points.append(f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N.")
+    return Points("What was computed", points)
+
+
+def _answers(pose: dict[str, Any]) -> list[Points]:
+    known, loose = [], []
+    for entry in pose.get("drift", []):
+        last = entry["times_s"][-1]
+        if entry["distance_mm"]["q50"]:
+            low, middle, high = (entry["distance_mm"][q][-1] for q in ("q05", "q50", "q95"))
+            spread = f"{100 * entry['specimen_spread']:g} %"
+            moved = f"{number(middle)} mm ({span(low, high)})"
+            known.append(f"After {last:g} s the platform has moved {moved}; specimens of one line differ by {spread}.")
+    claim = pose.get("claim")
+    if claim:
+        limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
+        for entry in claim["holds"]:
+            spread, chance = f"{100 * entry['specimen_spread']:g} %", number(entry["probability"], 2)
+            known.append(f"It moves {limits} within {claim['time_s']:g} s: probability {chance} (spread {spread}).")
+    space = pose.get("workspace")
+    if space and claim:
+        moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
+        chance = number(space["probability"], 2)
+        known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
+    said = [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
+    loose += [sentence for sentence in said if sentence not in _losses(pose)]
+    loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
+    return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
+
+
+def _drift(pose: dict[str, Any]) -> list[Block]:
+    lines = []
+    for entry in pose.get("drift", []):
+        for i, time in enumerate(entry["times_s"]):
+            if entry["distance_mm"]["q50"] and time > 0:
+                cells = []
+                for key in ("distance_mm", "tilt_deg", "from_vertical_deg"):
+                    low, middle, high = (entry[key][q][i] for q in ("q05", "q50", "q95"))
+                    cells += [number(middle), span(low, high)]
+                lines.append([f"{100 * entry['specimen_spread']:g} %", f"{time:g}", *cells])
+    header = ["specimen spread", "after, s", "moved, mm", "90 %", "tilt, degrees", "90 %"]
+    header += ["from vertical, degrees", "90 %"]
+    told = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. "
+    return [Table(header, lines, told + "Draws whose platform falls are left out.")] if lines else []
+
+
+def _errors(pose: dict[str, Any]) -> list[Block]:
+    lines = []
+    for entry in pose.get("pose_error", []):
+        for i, time in enumerate(entry["times_s"]):
+            if not entry["distance_mm"]["q50"] or time not in (60, 600, entry["times_s"][-1]):
+                continue
+            low, middle, high = (entry["distance_mm"][q][i] for q in ("q05", "q50", "q95"))
+            who = [CONTROLLERS[entry["controller"]], f"{100 * entry['specimen_spread']:g} %"]
+            lines.append([*who, f"{time:g}", number(middle), span(low, high), _lasts(entry)])
+    header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %", "longest time within tolerance, s"]
+    return [Table(header, lines, _limits(pose["pose_error"][0]))] if lines else []
+
+
+def _between(pose: dict[str, Any]) -> list[Block]:
+    lines = []
+    for entry in pose.get("between_calibrations", []):
+        loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
+        spread = f"{100 * entry['specimen_spread']:g} %"
+        lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _lasts(entry)])
+    header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
+    told = "The pose is exact when a calibration ends. " + (_limits(pose["between_calibrations"][0]) if lines else "")
+    return [Table(header, lines, told)] if lines else []
+
+
+def _limits(entry: dict[str, Any]) -> str:
+    allowed = f"{entry['tolerance_mm']:g} mm and {entry['tolerance_deg']:.3g}°"
+    return f"Within tolerance: less than {allowed} with a probability of 95 % at all earlier times."
+
+
+def _lasts(entry: dict[str, Any]) -> str:
+    longest = number(float(entry["longest_time_within_s"]))
+    return f"more than {longest}" if entry["still_within_at_the_end"] else longest
+
+
+def _doubts(pose: dict[str, Any]) -> list[Block]:
+    shares = pose.get("variance_shares", {}).get("shared_draw")
+    if not shares:
+        return []
+    lines = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
+    caption = f"Each parameter's share of the variance of the drift after {pose['variance_shares']['time_s']:g} s."
+    return [Table(["parameter", "share"], lines, caption)]
+
+
+def _equilibria(pose: dict[str, Any]) -> list[Block]:
+    found = pose.get("equilibria")
+    if not found:
+        return []
+    count = found["stable_found"]
+    many = "one stable equilibrium" if count == 1 else f"{count} stable equilibria"
+    own = "the commanded pose is one of them" if count > 1 else "the commanded pose"
+    unstable = "the commanded pose is balanced but not stable, so none of them"
+    own = own if found["commanded_stable"] else unstable
+    text = f"From {found['starts']} starts the mean wire's lengths lead to {many}: {own}."
+    proof = pose["certificate"]
+    if proof.get("sentence"):
+        return [Text(f"{text} {proof['sentence']}")]
+    if not proof["proved"]:
+        return [Text(f"{text} Interval arithmetic could not prove that the one shown is the only one.")]
+    alone = f"{number(1e3 * proof['alone_within_m'])} mm"
+    proved = f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose."
+    band = proof.get("band")
+    if not band or not band["share"]:
+        return [Text(proved)]
+    part = "all" if band["share"] == 1 else f"the middle {100 * band['share']:g} %"
+    axes = zip("xyz", band["low_mm"], band["high_mm"], strict=True)
+    box = ", ".join(f"{axis} {_outward(low, high)} mm" for axis, low, high in axes)
+    sure = (
+        f"With stiffness and creep of each wire independently anywhere in {part} of their 90 % bands, and the mean "
+        f"wire's joint values commanded, the platform is certain to be in this box about the pose after "
+        f"{band['time_s']:g} s: {box}. This is proved for the whole way there, with wires up to a tenth of the creep "
+        "out of step."
+    )
+    return [Text(proved), Text(sure)]
+
+
+def _outward(low: float, high: float) -> str:
+    """A proved interval, rounded outward to a hundredth of its width (and no finer than it can be read)."""
+    digits = max(0, 2 - math.floor(math.log10(max(high - low, 1e-9))))
+    scale = 10.0**digits
+    return f"{math.floor(low * scale) / scale:.{digits}f} to {math.ceil(high * scale) / scale:.{digits}f}"

@@ -1,0 +1,141 @@
+"""Pictures of a discovery: readings against the plain and the final model, and what the plain one leaves over where."""
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from wirebayes.discovery.residual_patterns import COVARIATES
+from wirebayes.model import noise
+from wirebayes.results import store
+from wirebayes.wire.staircase import Linearised, linearise
+
+Array = NDArray[Any]
+_MEASURED, _BAND, _HELD = "#1b1b1b", "#4c78a8", "#f2e6d0"
+
+
+def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_effects: Path | None = None) -> None:
+    """Draw measured minus predicted tension for a folder's ``plain`` and ``final`` posteriors.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``plain`` and ``final``.
+    verdict : dict
+        The experiment's part of ``discovery.json``.
+    target : Path
+        The picture to write.
+    own_effects : Path, optional
+        The user's Python file of effects.
+    """
+    figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
+    added = " + ".join(verdict["accepted"]) or {"unknown": "something unknown"}.get(verdict["verdict"], "nothing")
+    titles = {"plain": "plain model", "final": f"with {added}"}
+    for axis, model in zip(axes, titles, strict=True):
+        _residuals(axis, store.load(folder / model, own_effects=own_effects), verdict["held_out"]["holds"])
+        axis.set_title(f"{folder.name}: {titles[model]}", loc="left", fontsize=10)
+        axis.set_ylabel("measured − predicted (N)")
+    axes[1].set_xlabel("hold number; within each hold, time runs to the right")
+    handles = axes[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
+    figure.savefig(target, dpi=130)
+    plt.close(figure)
+
+
+def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Path | None = None) -> None:
+    """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.png``.
+
+    None for a pattern over what does not vary within the experiment.
+    """
+    stored = store.load(folder / "plain", own_effects=own_effects)
+    sample, mask = stored.sample, stored.sample.protocol.mask
+    line, _ = _walked(stored)
+    residual = np.where(mask, sample.readings[..., 0] - line.tension.mean(axis=2), 0.0)
+    level = residual.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
+    for finding in verdict["where"]:
+        x = np.broadcast_to(COVARIATES[finding["covariate"]](sample), mask.shape)[mask]
+        if finding["p"] > _SHOWN or np.ptp(x) == 0.0:
+            continue
+        # a pattern within holds is hidden by their levels
+        within = finding["covariate"] == "time in hold"
+        left = (residual - level if within else residual)[mask]
+        figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
+        axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
+        groups = np.array_split(np.argsort(x, kind="stable"), min(len(np.unique(x)), _GROUPS))
+        middles = [(x[g].mean(), left[g].mean()) for g in groups]
+        axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
+        axis.axhline(0.0, color="0.5", lw=0.6)
+        axis.set_xlabel(_LABELS[finding["covariate"]])
+        axis.set_ylabel("measured − plain model (N)" + (",\nless its hold's mean" if within else ""))
+        axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 110)), loc="left", fontsize=10)
+        axis.legend(fontsize=8, frameon=False)
+        figure.savefig(folder / f"where-{finding['covariate'].replace(' ', '-')}.png", dpi=130)
+        plt.close(figure)
+
+
+def _walked(stored: store.Stored) -> tuple[Linearised, dict[str, Array]]:
+    """The staircase under some of the stored draws, and these."""
+    rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
+    own = {name: values[rows] for name, values in stored.draws.items()}
+    return linearise(stored.sample.protocol, own, stored.sample.model), own
+
+
+def _residuals(axis: Axes, stored: store.Stored, held: list[int]) -> None:
+    sample = stored.sample
+    line, own = _walked(stored)
+    variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+    width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
+    drawn = line.tension + np.random.default_rng(1).normal(size=line.tension.shape) * width
+    middle = line.tension.mean(axis=2)
+    low, high = np.quantile(drawn, [0.05, 0.95], axis=2)
+    shown = np.flatnonzero(sample.protocol.recorded)
+    for k, j in enumerate(shown):
+        keep = sample.protocol.mask[j]
+        time = sample.protocol.time_s[j][keep]
+        x = k + 0.1 + 0.8 * time / max(float(sample.protocol.duration_s[j]), 1e-9)
+        number = int(sample.protocol.number[j])
+        if number in held:
+            axis.axvspan(k, k + 1, color=_HELD, zorder=0, label="held out for the gap" if number == held[0] else None)
+        first = k == 0
+        axis.fill_between(
+            x,
+            (low[j] - middle[j])[keep],
+            (high[j] - middle[j])[keep],
+            color=_BAND,
+            alpha=0.3,
+            lw=0,
+            label="90 % band" if first else None,
+        )
+        axis.plot(
+            x,
+            (sample.readings[j, :, 0] - middle[j])[keep],
+            "o-",
+            color=_MEASURED,
+            ms=3,
+            lw=0.8,
+            label="measured" if first else None,
+        )
+    axis.axhline(0.0, color="0.5", lw=0.6)
+    axis.set_xticks(np.arange(len(shown)) + 0.5, [str(int(sample.protocol.number[j])) for j in shown])
+    axis.set_xlim(0, len(shown))
+
+
+_SHOWN = 0.05  # p of a pattern that is worth a picture
+_GROUPS = 12
+_LABELS = {
+    "hold": "hold number",
+    "displacement": "displacement (mm)",
+    "time in hold": "time in hold (s)",
+    "elapsed time": "elapsed time (s)",
+    "tension": "tension (N)",
+    "direction": "direction of the last step",
+    "temperature": "warming (K)",
+    "length": "length (mm)",
+}

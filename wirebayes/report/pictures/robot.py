@@ -1,0 +1,169 @@
+"""Pictures of a robot's pose: in 3-D with its drift exaggerated, errors against time, error budget."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
+from wirebayes.report.pictures.robot_space import workspace_map
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion.drift import Course
+from wirebayes.robot.pose.answer import Answer
+from wirebayes.robot.pose.request import Question
+
+Floats = NDArray[np.float64]
+CONTROLLERS = {
+    "hooke_only": "ignores creep",
+    "creep_aware": "compensates for creep",
+    "creep_aware_told_otherwise": "compensates for creep by the other fit",
+    "held_still": "does not move",
+}
+_COLOURS = (HOLD, CHAIN, "#5d8c4a")
+
+
+def save_pose(folder: Path, robot: Robot, asked: Question, found: Answer) -> None:
+    """Write the pictures that go with ``pose.json``; none when the pose cannot be held."""
+    if not found.courses or not found.courses[0.0].found.any():
+        return
+    content, pictures = found.content, {}
+    pictures["robot"] = scene(robot, asked.position_m, asked.rotation, found.courses[0.0])
+    pictures["drift"] = in_time(content["drift"], "distance_mm", "distance from the pose, mm", "Drift")
+    if robot.degrees == 6:
+        turned = "rotation, degrees", "Drift of the orientation"
+        pictures["rotation"] = in_time(content["drift"], "rotation_deg", *turned)
+    pictures["pose-error"] = error_in_time(content["pose_error"])
+    if "shared_draw" in content["variance_shares"]:
+        pictures["error-budget"] = error_budget(content["variance_shares"])
+    if found.workspace is not None:
+        pictures["workspace"] = workspace_map(found.workspace)
+    for name, figure in pictures.items():
+        figure.savefig(folder / f"{name}.png", dpi=160)
+
+
+def scene(
+    robot: Robot, position_m: Floats, rotation: Floats, course: Course, exaggeration: float | None = None
+) -> Figure:
+    """The robot in 3-D, at rest and drifted; the drift enlarged by a factor that the title states.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m, rotation : (3,), (3, 3) arrays
+    course : Course
+        Its mean over the draws at the last time is drawn.
+    exaggeration : float, optional
+        Default: a round factor that makes the drift a twentieth of the robot.
+    """
+    shift = course.position_m[course.found, -1].mean(0) - position_m
+    turn = course.rotation[course.found, -1].mean(0) - rotation
+    size = np.ptp(robot.exit_m, axis=0).max()
+    if exaggeration is None:
+        exaggeration = _round(0.05 * size / max(np.linalg.norm(shift), 1e-12))
+    figure = Figure(figsize=(6.0, 5.2))
+    axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
+    here = position_m + robot.platform_m @ rotation.T
+    there = position_m + exaggeration * shift + robot.platform_m @ (rotation + exaggeration * turn).T
+    for a, p, q in zip(robot.exit_m, here, there, strict=True):
+        axes.plot(*np.stack([a, p], 1), color=QUIET, lw=1.0)
+        axes.plot(*np.stack([a, q], 1), color=HOLD, lw=0.7, ls=":")
+    for points, colour, name in ((here, CHAIN, "commanded"), (there, HOLD, "drifted")):
+        for i, j in _edges(robot.platform_m):
+            axes.plot(*points[[i, j]].T, color=colour, lw=1.6)
+        axes.plot(*points.T, color=colour, lw=0, marker="o", ms=3.5, label=name)
+    axes.scatter(*robot.exit_m.T, color=INK, s=14, label="exit points")
+    axes.set_xlabel("x, m", labelpad=6)
+    axes.set_ylabel("y, m", labelpad=6)
+    axes.set_zlabel("z, m", labelpad=5)
+    axes.tick_params(labelsize=8)
+    axes.locator_params(nbins=5)
+    for axis in np.flatnonzero(np.ptp(np.concatenate([robot.exit_m, here, there]), axis=0) < 1e-6 * size):
+        getattr(axes, f"set_{'xyz'[axis]}ticks")([float(position_m[axis])])  # flat: one tick is all there is room for
+    axes.set_aspect("equal")
+    axes.set_box_aspect(axes._box_aspect, zoom=0.94)
+    head = f"{robot.name}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"
+    figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
+    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False, fontsize=8.5)
+    return figure
+
+
+def _edges(points: Floats) -> Iterator[tuple[int, int]]:
+    """Pairs of platform points that an edge joins: the hull's edges, without those inside a flat face."""
+    spread = points - points.mean(0)
+    rank = int((np.linalg.svd(spread, compute_uv=False) > 1e-3 * max(np.abs(spread).max(), 1e-12)).sum())
+    try:
+        if rank < 3:
+            across = spread @ np.linalg.svd(spread)[2][:2].T
+            hull = ConvexHull(across)
+            yield from ((int(i), int(j)) for i, j in hull.simplices)
+            return
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):  # all points in one place or on a line
+        return
+    normals: dict[tuple[int, int], list[Floats]] = {}
+    for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
+        for k in range(3):
+            i, j = sorted((int(simplex[k]), int(simplex[k - 1])))
+            normals.setdefault((i, j), []).append(equation[:3])
+    yield from (pair for pair, (a, b) in normals.items() if a @ b < 0.99)
+
+
+def _round(value: float) -> float:
+    decade = 10.0 ** np.floor(np.log10(max(value, 1.0)))
+    return float(max(1.0, decade * max(f for f in (1, 2, 5) if f * decade <= max(value, 1.0))))
+
+
+def in_time(drifts: Sequence[dict[str, Any]], key: str, label: str, title: str) -> Figure:
+    """One quantity against time with 90 % bands, one colour a specimen spread."""
+    figure, axes = panel("time, s", label, title)
+    for entry, colour in zip(drifts, (CHAIN, HOLD), strict=True):
+        spread = entry["specimen_spread"]
+        name = f"specimens differ by {100 * spread:g} %" if spread else "identical specimens"
+        _banded(axes, entry, key, colour, name)
+    _since(axes)
+    legend_below(figure, axes)
+    return figure
+
+
+def error_in_time(errors: Sequence[dict[str, Any]]) -> Figure:
+    """Pose error of the controllers against time, specimens alike; the tolerance dashed."""
+    figure, axes = panel("time, s", "pose error, mm", "Pose error by controller")
+    alike = [e for e in errors if e["specimen_spread"] == 0]
+    for entry, colour in zip(alike, _COLOURS, strict=False):
+        _banded(axes, entry, "distance_mm", colour, CONTROLLERS[entry["controller"]])
+    axes.axhline(alike[0]["tolerance_mm"], color=INK, lw=0.9, ls="--", label="tolerance")
+    _since(axes)
+    legend_below(figure, axes)
+    return figure
+
+
+def _since(axes: Any) -> None:
+    axes.set_xscale("symlog", linthresh=10)
+    axes.set_xlim(left=0)
+    axes.set_ylim(bottom=0)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def _banded(axes: Any, entry: dict[str, Any], key: str, colour: str, label: str) -> None:
+    band = entry[key]
+    if band["mean"] is None:
+        return
+    axes.plot(entry["times_s"], band["q50"], color=colour, label=label)
+    axes.fill_between(entry["times_s"], band["q05"], band["q95"], color=colour, alpha=0.22, lw=0)
+
+
+def error_budget(result: dict[str, Any]) -> Figure:
+    """Shares of the drift's variance by parameter."""
+    label = f"share of the variance of the drift after {result['time_s']:g} s, %"
+    figure, axes = panel(label, "", "Sources of uncertainty", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))
+    names = list(result["shared_draw"])[::-1]
+    bars = axes.barh(names, [100 * result["shared_draw"][name] for name in names], color=CHAIN)
+    axes.bar_label(bars, fmt="%.0f", padding=3, fontsize=8.5)
+    axes.margins(x=0.12)
+    axes.tick_params(axis="y", length=0)
+    return figure

@@ -1,0 +1,75 @@
+"""Maps of a robot's workspace: a minute's drift and how probable the paper's claim is, slice by slice."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from wirebayes.report.figures import INK, QUIET
+from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S, WorkspaceDrift
+
+Floats = NDArray[np.float64]
+
+
+def workspace_map(result: WorkspaceDrift, title: str = "") -> Figure:
+    """Median drift and tilt over the workspace, a row each, a column a slice; where no wires hold it, a cross.
+
+    Slices are level; those of a robot in a vertical plane lie in it.
+
+    Parameters
+    ----------
+    result : WorkspaceDrift
+        On a regular grid.
+    title : str
+    """
+    across_axis, along_axis, slice_axis = _axes(result.position_m)
+    slices = np.unique(result.position_m[:, slice_axis])
+    rows = [
+        (1e3 * result.median_distance_m, f"drift, mm\n(claim: {1e3 * DISTANCE_M:g})"),
+        (np.degrees(result.median_tilt_rad), f"tilt, degrees\n(claim: {np.degrees(TILT_RAD):.3g})"),
+    ]
+    if not np.nanmax(rows[1][0], initial=0.0):
+        rows = rows[:1]  # parallel lines: nothing tilts
+    figure = Figure(figsize=(max(2.1 * len(slices), 3.4) + 1.6, 0.7 + 2.0 * len(rows)), layout="constrained")
+    panels: Any = figure.subplots(len(rows), len(slices), sharex=True, sharey=True, squeeze=False)
+    figure.suptitle(title or f"Median drift within {TIME_S:g} s", fontsize=10.5, x=0.02, ha="left", color=INK)
+    across, along = (np.unique(result.position_m[:, k]) for k in (across_axis, along_axis))
+    for line, (value, label) in zip(panels, rows, strict=True):
+        image: Any = None
+        low, high = (f(value[np.isfinite(value)], initial=np.inf * s) for f, s in ((np.min, 1), (np.max, -1)))
+        for axes, level in zip(line, slices, strict=True):
+            here = result.position_m[:, slice_axis] == level
+            field = np.full((len(along), len(across)), np.nan)
+            x, y = result.position_m[here][:, [across_axis, along_axis]].T
+            field[np.searchsorted(along, y), np.searchsorted(across, x)] = value[here]
+            lost = np.nonzero(np.isnan(field))
+            axes.plot(across[lost[1]], along[lost[0]], "x", color=QUIET, ms=5)
+            if np.isfinite(low):
+                image = axes.pcolormesh(_edges(across), _edges(along), field, vmin=low, vmax=high, rasterized=True)
+            axes.set_aspect("equal")
+            axes.tick_params(labelsize=8)
+        line[0].set_ylabel(f"{'xyz'[along_axis]}, m")
+        if image is not None:
+            figure.colorbar(image, ax=line, label=label)
+    for axes, level in zip(panels[0], slices, strict=True):
+        axes.set_title(f"{'xyz'[slice_axis]} = {level:.3g} m", fontsize=9.5)
+    for axes in panels[-1]:
+        axes.set_xlabel(f"{'xyz'[across_axis]}, m")
+    return figure
+
+
+def _axes(position_m: Floats) -> tuple[int, int, int]:
+    """Axes across, along and through the slices: of a flat workspace the two it extends in, else x and y."""
+    flat = np.flatnonzero(np.ptp(position_m, axis=0) == 0)
+    through = 2 if not flat.size or 2 in flat else int(flat[0])
+    across, along = (k for k in range(3) if k != through)
+    return across, along, through
+
+
+def _edges(centres: Floats) -> Floats:
+    """Edges of cells about their centres; a single cell gets a width of its own."""
+    if len(centres) == 1:
+        return centres[0] + np.array([-0.05, 0.05])
+    middle = 0.5 * (centres[1:] + centres[:-1])
+    return np.concatenate([[1.5 * centres[0] - 0.5 * centres[1]], middle, [1.5 * centres[-1] - 0.5 * centres[-2]]])

@@ -1,0 +1,259 @@
+"""How much the data taught, said aloud: prior against posterior, sensitivity to the prior, and the ridges.
+
+Power scaling raises the prior (or the likelihood) to a power a little above and below one and asks how far the
+posterior moves (Kallioinen et al., Detecting and diagnosing prior and likelihood sensitivity with power-scaling): a
+distance of `SENSITIVE` for each doubling of the power matters. Positive parameters count by their logarithms, so that
+a prior made weaker keeps its median.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from arviz_stats.base import array_stats
+from numpy.typing import NDArray
+
+from wirebayes.inference.fit import Fit
+from wirebayes.model.prior import fast_logpdf
+from wirebayes.wire.fresh import FreshSample
+
+Array = NDArray[Any]
+SENSITIVE = 0.05
+RIDGE = 0.9  # correlation above which two parameters are known in combination only
+_POWERS = (1.0 / 1.1, 1.1)
+_DRAWS = 4000
+_statistics: Any = array_stats
+
+
+@dataclass(frozen=True)
+class Taught:
+    """What the data taught about one parameter.
+
+    Attributes
+    ----------
+    name : str
+    contraction : float
+        1 - posterior variance / prior variance (of the logarithm, for a positive parameter): 1 all, 0 nothing.
+    prior_range, posterior_range : float
+        Width of the central 90 %: a factor for a positive parameter, else a difference.
+    is_factor : bool
+    prior_sensitivity : float
+        Of its posterior to its own prior.
+    likelihood_sensitivity : float
+    ridges : dict of str to float
+        Parameters it moves together with, and the correlation.
+    """
+
+    name: str
+    contraction: float
+    prior_range: float
+    posterior_range: float
+    is_factor: bool
+    prior_sensitivity: float
+    likelihood_sensitivity: float
+    ridges: dict[str, float]
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        sign = "×" if self.is_factor else ""
+        ranges = f"its 90 % range is {sign}{self.posterior_range:.3g}, the prior's {sign}{self.prior_range:.3g}"
+        if self.contraction < 0.3:
+            verdict = "the data say next to nothing about it, the interval is the prior's"
+        elif self.prior_sensitivity > SENSITIVE or self.contraction < 0.9:
+            verdict = f"data and prior both determine it (sensitivity to the prior {self.prior_sensitivity:.2f})"
+        else:
+            verdict = "the data determine it"
+        with_whom = " and ".join(f"{other} (r = {r:+.2f})" for other, r in self.ridges.items())
+        along = f"; it is correlated with {with_whom}, and their combination is known better" if with_whom else ""
+        return f"{self.name}: {verdict}; {ranges}{along}."
+
+
+def identifiability(fitted: Fit) -> list[Taught]:
+    """What the data taught, parameter by parameter.
+
+    Parameters
+    ----------
+    fitted : Fit
+
+    Returns
+    -------
+    list of Taught
+        In the order of the problem's parameters.
+    """
+    problem = fitted.problem
+    prior, names = problem.prior, problem.names
+    flat = fitted.flat
+    theta = flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)]
+    positive = np.array([name in prior.logarithmic for name in names])
+    z = np.where(positive, np.log(np.where(positive, theta, 1.0)), theta)
+    own_prior = log_priors(fitted, theta)
+    likelihood = problem.log_likelihood(theta)
+    correlation = np.atleast_2d(np.corrcoef(z.T))
+    out = []
+    for i, name in enumerate(names):
+        distribution = prior.distributions[name]
+        before = distribution.ppf([0.05, 0.95])
+        sample = distribution.rvs(size=20000, random_state=np.random.default_rng(0))
+        spread = np.std(np.log(sample) if positive[i] else sample)
+        after = np.quantile(theta[:, i], [0.05, 0.95])
+        along = [j for j in range(len(names)) if j != i and abs(correlation[i, j]) > RIDGE]
+        out.append(
+            Taught(
+                name=name,
+                contraction=float(1.0 - z[:, i].var(ddof=1) / spread**2),
+                prior_range=float(before[1] / before[0] if positive[i] else before[1] - before[0]),
+                posterior_range=float(after[1] / after[0] if positive[i] else after[1] - after[0]),
+                is_factor=bool(positive[i]),
+                prior_sensitivity=sensitivity(z[:, i], own_prior[:, i]),
+                likelihood_sensitivity=sensitivity(z[:, i], likelihood),
+                ridges={names[j]: float(correlation[i, j]) for j in along},
+            )
+        )
+    return out
+
+
+def told(taught: Sequence[Taught]) -> dict[str, Any]:
+    """The same as plain values, for JSON."""
+    return {
+        t.name: {
+            "contraction": t.contraction, "prior_range_90": t.prior_range, "posterior_range_90": t.posterior_range,
+            "range_is_factor": t.is_factor, "prior_sensitivity": t.prior_sensitivity,
+            "likelihood_sensitivity": t.likelihood_sensitivity, "ridges": t.ridges, "sentence": t.sentence,
+        }
+        for t in taught
+    }  # fmt: skip
+
+
+def sensitivity(values: Array, log_component: Array) -> float:
+    """Distance the distribution of (n,) `values` moves for each doubling of a component's power."""
+    if np.ptp(log_component) == 0:
+        return 0.0
+    weights = [np.exp(_statistics.power_scale_lw(log_component, alpha=alpha))[None] for alpha in _POWERS]
+    return float(_statistics.power_scale_sense(values[None], *weights, *_POWERS))
+
+
+def log_priors(fitted: Fit, theta: Array) -> Array:
+    """(n, d) log prior density of each parameter, of the logarithm of positive ones."""
+    prior = fitted.problem.prior
+    columns = []
+    for i, (name, distribution) in enumerate(prior.distributions.items()):
+        value = fast_logpdf(distribution)(theta[:, i])
+        columns.append(value + np.log(theta[:, i]) if name in prior.logarithmic else value)
+    return np.stack(columns, axis=1)
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """Creep elongation of a fresh sample under a constant tension, against time.
+
+    Attributes
+    ----------
+    time_s : (t,) array
+    tension_N : float
+    posterior_mm, weaker_prior_mm, prior_mm : (3, t) arrays
+        5 %, 50 % and 95 %: as fitted; with the prior's logarithm halved; without any data.
+    pareto_k : float
+        Of the weights that make the prior weaker; above 0.7 that band is a guess.
+    longest_hold_s : float
+        The longest that a position was held in the test.
+    """
+
+    time_s: Array
+    tension_N: float
+    posterior_mm: Array
+    weaker_prior_mm: Array
+    prior_mm: Array
+    pareto_k: float
+    longest_hold_s: float
+
+    @property
+    def warning(self) -> str:
+        """How far the longest time lies beyond the longest hold; empty where it does not."""
+        factor = float(self.time_s[-1] / self.longest_hold_s) if self.longest_hold_s else np.inf
+        if factor <= 1.0:
+            return ""
+        return (
+            f"{self.time_s[-1] / 3600.0:g} h is {factor:.3g} times the longest hold ({self.longest_hold_s:g} s): this "
+            "far out the answer rests on the model's form alone, and no reading checks it."
+        )
+
+    @property
+    def prior_share(self) -> Array:
+        """(t,) how much the 90 % band widens (in logarithms) when the prior is made weaker: 0 is not at all."""
+
+        def width(band: Array) -> Array:
+            with np.errstate(divide="ignore", invalid="ignore"):  # draws without creep have no logarithm
+                return np.asarray(np.log(band[2] / band[0]))
+
+        with np.errstate(invalid="ignore"):
+            return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
+
+    def told(self) -> dict[str, Any]:
+        """The same as plain values, for JSON, with a sentence for the longest time."""
+        bands = {
+            name: dict(zip(("q05", "q50", "q95"), getattr(self, name), strict=True))
+            for name in ("posterior_mm", "weaker_prior_mm", "prior_mm")
+        }
+        share, hours = float(self.prior_share[-1]), self.time_s[-1] / 3600.0
+        if not np.isfinite(share):
+            verdict = "more than a twentieth of the draws do not creep at this tension"
+        elif self.pareto_k > TRUSTED_K:
+            verdict = "these draws cannot show how much it depends on the prior"
+        elif share > 0.1:
+            verdict = f"it depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
+        else:
+            verdict = (
+                f"it hardly depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
+            )
+        sentence = f"Creep after {hours:g} h at {self.tension_N:g} N: {verdict}."
+        return {"tension_N": self.tension_N, "time_s": self.time_s, **bands, "prior_share": self.prior_share,
+                "pareto_k": self.pareto_k, "sentence": sentence, "warning": self.warning}  # fmt: skip
+
+
+TIMES_S = np.array([10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0, 14400.0, 28800.0, 86400.0])
+TRUSTED_K = 0.7  # of importance weights (Vehtari et al., Pareto smoothed importance sampling)
+
+
+def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sample: int = 0) -> Extrapolation:
+    """Creep to an hour and a day, with the prior's part in it made visible.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Its own time law is extrapolated, with all effects of the wire.
+    tension_N : float
+    times_s : (t,) array
+    sample : int
+        Whose length B refers to.
+    """
+    problem = fitted.problem
+    here = problem.samples[sample]
+    flat = fitted.flat
+    theta = flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)]
+    # the prior to the power of a half: weights are its inverse root
+    log_weight, k = _statistics.psislw(0.5 * log_priors(fitted, theta).sum(axis=1))
+    weight = np.exp(log_weight - log_weight.max())
+
+    def creep(rows: Array) -> Array:
+        wire = FreshSample(problem.parameters(rows, here), here.model, here.protocol.length_mm)
+        return wire.creep_mm(tension_N, times_s)
+
+    courses, before = creep(theta), creep(problem.prior.rvs(_DRAWS, np.random.default_rng(0)))
+    levels = [0.05, 0.5, 0.95]
+    return Extrapolation(
+        times_s,
+        tension_N,
+        np.quantile(courses, levels, axis=1),
+        np.stack([_weighted_quantiles(course, weight, levels) for course in courses], axis=1),
+        np.quantile(before, levels, axis=1),
+        float(k),
+        float(max(s.protocol.duration_s.max() for s in problem.samples)),
+    )
+
+
+def _weighted_quantiles(values: Array, weight: Array, levels: Sequence[float]) -> Array:
+    order = np.argsort(values)
+    share = (np.cumsum(weight[order]) - 0.5 * weight[order]) / weight.sum()
+    return np.interp(levels, share, values[order])

@@ -1,0 +1,100 @@
+"""Many fits at once: each in a folder of its own, on all cores, resumed where a run was cut off."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from wirebayes.effects import catalogue, named
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.problem import Likelihood, build
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.workers import cores, workers
+
+
+@dataclass(frozen=True)
+class Job:
+    """One fit to be done.
+
+    Attributes
+    ----------
+    folder : str
+        Where its results go, below the run's folder; also what its seed is made of.
+    experiments : tuple of Experiment
+    effects : tuple of str
+        Keys of effects.
+    own_effects : Path or None
+        The user's Python file that some of them come from.
+    law, history, likelihood, length_exponent
+        See `wirebayes.model.problem.build`.
+    provenance : dict
+    near : dict, optional
+        Parameters known to be good (see `wirebayes.inference.fit.fit`).
+    apart : tuple of str
+        Folders of the experiments, one each, where they are stored apart; all in one when left out.
+    """
+
+    folder: str
+    experiments: tuple[Experiment, ...]
+    effects: tuple[str, ...] = ()
+    own_effects: Path | None = None
+    law: ElasticLaw = "hooke"
+    history: History = "saturating"
+    likelihood: Likelihood = "chain"
+    length_exponent: Any = 1.0
+    provenance: dict[str, Any] = field(default_factory=dict)
+    near: dict[str, float] | None = None
+    apart: tuple[str, ...] = ()
+
+    @property
+    def folders(self) -> tuple[str, ...]:
+        """Where results go."""
+        return self.apart or (self.folder,)
+
+
+def run(
+    jobs: Sequence[Job],
+    directory: Path,
+    seed: int,
+    *,
+    policy: Policy = DEFAULT,
+    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+) -> None:
+    """Do all fits of which a folder has no ``summary.json`` yet; the results do not depend on how many cores there are.
+
+    A fit cut off leaves a checkpoint in its folder, from which the next call goes on to the same bytes.
+    """
+    todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
+    if len(todo) == 1 or cores() == 1:
+        for job in todo:
+            one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
+        return
+    work = partial(one, directory=directory, seed=seed, policy=policy)
+    with workers(len(todo)) as each:
+        for done, _ in enumerate(each(work, todo), 1):
+            report("fits", done, len(todo))
+
+
+def one(
+    job: Job, directory: Path, seed: int, policy: Policy, progress: Callable[[float], None] = lambda share: None
+) -> None:
+    """Do one fit and store it."""
+    from wirebayes.results.store import save  # xarray takes a second to load; not every user of jobs stores
+
+    folder = directory / job.folder
+    for place in job.folders:
+        (directory / place).mkdir(parents=True, exist_ok=True)
+    known = catalogue(job.own_effects)
+    problem = build(job.experiments, [named(key, known) for key in job.effects], law=job.law, history=job.history,
+                    likelihood=job.likelihood, length_exponent=job.length_exponent)  # fmt: skip
+    own_seed = seed_of(seed, job.folder)
+    checkpoint = folder / ".checkpoint"
+    result = fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
+    about = job.provenance | {"seed": seed, "policy": vars(policy)}
+    samples = problem.samples if job.apart else (None,)
+    for place, sample in zip(job.folders, samples, strict=True):
+        save(result, directory / place, about, seed=own_seed, sample=sample)
+    checkpoint.unlink(missing_ok=True)

@@ -1,0 +1,102 @@
+"""Posteriors that no sound test gives: checks after a fit, each a sentence with what to change.
+
+Before the fit `wirebayes.io.data_checks` looks at the readings alone.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.fit import Fit
+from wirebayes.io import data_checks
+from wirebayes.model.problem import FINEST, Sample
+
+Floats = NDArray[np.float64]
+
+LOOSE_STEPS = 0.5  # setting error over the typical step: the displacements hardly order the holds then
+NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
+QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer than a load cell resolves
+FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
+TAUGHT = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
+
+
+def warnings(fit: Fit, sample: Sample) -> list[str]:
+    """What is odd about the readings of one sample and about what was fitted to them.
+
+    Parameters
+    ----------
+    fit : Fit
+    sample : Sample
+        One of the fit's.
+
+    Returns
+    -------
+    list of str
+        Sentences: what, where, what to change.
+    """
+    theta = fit.flat
+    own = fit.problem.parameters(theta, sample)
+    prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
+    said = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), taught(own, prior)]
+    readings = sample.readings[..., 0]
+    stated = sample.resolution_N
+    return data_checks.warnings(sample.protocol, readings, stated) + [sentence for sentence in said if sentence]
+
+
+def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
+    """A setting error of the size of the steps, which is what mixed or contradictory readings look like."""
+    steps = np.abs(np.diff(sample.protocol.displacement_mm))
+    if "setting_sd" not in own or not steps.any():
+        return ""
+    step, low = float(np.median(steps[steps > 0])), float(np.quantile(own["setting_sd"], 0.05))
+    if low <= LOOSE_STEPS * step:
+        return ""
+    return (
+        f"setting_sd is at least {low:.2g} mm while the test steps by {step:.3g} mm: the displacements do not explain "
+        "the tensions; look for holds in the wrong order, readings of two wires mixed, or another unit"
+    )
+
+
+def noise(own: Mapping[str, Floats], sample: Sample) -> str:
+    """A sensor error as large as the signal, or none at all."""
+    readings = sample.readings[..., 0][sample.protocol.mask]
+    signal = float(np.ptp(readings))
+    low, high = np.quantile(own["sensor_sd"], [0.05, 0.95])
+    if signal > 0 and low > NOISY * signal:
+        return (
+            f"sensor_sd is at least {low:.2g} N while the readings differ by {signal:.3g} N in all: no wire of this "
+            "model gives them; look for a misprint among them, mixed-up rows, or another unit"
+        )
+    if max(high, sample.resolution_N) < QUIET * np.abs(readings).max():
+        return (
+            f"the readings carry no noise (sensor_sd below {high:.1g} N): they were computed or smoothed, and the "
+            "intervals are far narrower than a bench's; state resolution_N, and fit what the sensor wrote"
+        )
+    return ""
+
+
+def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
+    """A stiffness that the prior all but excludes."""
+    middle, logs = float(np.median(own["k1"])), np.log(prior["k1"])
+    spread = float(logs.std())
+    if not spread or abs(np.log(middle) - np.median(logs)) <= FAR_OUT * spread:
+        return ""
+    low, high = np.quantile(prior["k1"], [0.05, 0.95])
+    return (
+        f"k1 = {middle:.3g} N is far outside its prior ({low:.3g} to {high:.3g} N): check that tension_N is in N and "
+        "that displacement_mm and length_mm are in mm; if they are, give this wire a prior of its own ([prior.k1])"
+    )
+
+
+def taught(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
+    """Readings that taught nothing."""
+
+    def width(values: Floats) -> float:
+        return float(np.subtract(*np.quantile(values, [0.95, 0.05])))
+
+    wire = [name for name in own if name != "sensor_sd" and width(prior[name]) > 0]
+    moved = [1.0 - width(own[name]) / width(prior[name]) for name in wire]
+    if not moved or max(moved) > TAUGHT:
+        return ""
+    return "the posterior is the prior: these readings say nothing of the wire; was it slack, or held at one place?"

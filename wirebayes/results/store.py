@@ -1,0 +1,499 @@
+"""Results on disk: netCDF that ArviZ reads, and a summary in JSON. The only module that knows xarray and ArviZ."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import arviz_base
+import arviz_stats
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from wirebayes import __version__
+from wirebayes.effects import catalogue, named
+from wirebayes.errors import InputError
+from wirebayes.inference.fit import Fit
+from wirebayes.interrupt import unfinished
+from wirebayes.io.run_folder import stored_results, write_bytes, write_json
+from wirebayes.model.prior import Prior
+from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
+from wirebayes.model.replicate import readings as replicate
+from wirebayes.results import posterior_checks
+from wirebayes.results.identifiability import extrapolation, identifiability, told
+from wirebayes.results.stored_check import check
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.staircase import Model
+
+Array = NDArray[Any]
+UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", "sensor_sd": "N",
+         "setting_sd": "mm", LENGTH_EXPONENT: "1"}  # fmt: skip
+CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
+_UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
+_PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
+_CHUNK = 2000
+
+
+def save(
+    fit: Fit, folder: Path, provenance: Mapping[str, Any], *, seed: int = 0, sample: Sample | None = None
+) -> dict[str, Any]:
+    """Write ``posterior.nc`` and ``summary.json`` into an existing folder and return the summary.
+
+    Parameters
+    ----------
+    fit : Fit
+    folder : Path
+    provenance : mapping
+        Data hash, configuration, seed: stored as attributes.
+    seed : int
+        For the draws of the predictive and prior groups.
+    sample : Sample, optional
+        Store the parameters of this sample alone, under their plain names; otherwise all samples, with a dimension
+        ``experiment``. A problem of one sample needs none.
+    """
+    if sample is None and len(fit.problem.samples) == 1:
+        sample = fit.problem.samples[0]
+    tree = _tree(fit, sample, provenance, np.random.default_rng(seed))
+    partial = folder / ".posterior.nc.partial"
+    with unfinished(partial):
+        tree.to_netcdf(partial, engine="h5netcdf")
+        write_bytes(folder / "posterior.nc", partial.read_bytes())
+        partial.unlink()
+    summary = _summary(fit, sample, tree)
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A posterior read back.
+
+    Attributes
+    ----------
+    draws : dict of name to (n,) array
+        Parameters of one experiment, at its own length.
+    sample : Sample
+        Its holds and readings, law, history and effects.
+    likelihood : {"chain", "hold"}
+    length_exponent : (n,) array or None
+        Where samples of two lengths were fitted together: creep grows as length to this power.
+    """
+
+    draws: dict[str, Array]
+    sample: Sample
+    likelihood: str
+    length_exponent: Array | None = None
+
+    @property
+    def problem(self) -> Problem:
+        """A problem whose columns are the stored draws (its prior is not known any more)."""
+        model = Model(self.sample.model.law, self.sample.model.history, self.sample.model.effects,
+                      self.sample.model.tension_ref_N)  # fmt: skip
+        names: dict[str, Any] = dict.fromkeys(self.draws)
+        return Problem(
+            (Sample(self.sample.name, self.sample.material, self.sample.protocol, self.sample.readings,
+                    self.sample.resolution_N, model),),
+            Prior(names, {}, frozenset()),
+            self.likelihood,  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    @property
+    def theta(self) -> Array:
+        """(n, d) draws in the problem's order."""
+        return np.column_stack(list(self.draws.values()))
+
+
+def experiments_in(path: Path) -> tuple[str, ...]:
+    """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
+    with _opened(path) as tree:
+        return tuple(str(name) for name in json.loads(tree["posterior"].attrs["experiments"]))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """The tree of a ``posterior.nc``; whatever is wrong with it is an `InputError`."""
+    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
+        yield tree
+
+
+def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
+    """Read the posterior of one experiment from a folder that `save` wrote.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``posterior.nc``.
+    experiment : str, optional
+        Which sample, where several were fitted together.
+    own_effects : Path, optional
+        The user's Python file of effects, where the fit used one of them.
+
+    Raises
+    ------
+    InputError
+        No posterior there, not one of ours, or the experiment is not in it.
+    """
+    path = folder / "posterior.nc"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected the posterior of a fit")
+    with _opened(path) as tree:
+        about, constant = tree["posterior"].attrs, tree["constant_data"].to_dataset()
+        if "wirebayes_version" not in about:
+            raise InputError(f"{path}: not a posterior of wirebayes")
+        posterior, observed = tree["posterior"].to_dataset(), tree["observed_data"].to_dataset()
+        names = json.loads(about["experiments"])
+        if experiment is None and len(names) > 1:
+            raise InputError(f"{path}: holds {', '.join(names)}; say which with --experiment")
+        if experiment is not None and experiment not in names:
+            raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
+        at = names.index(experiment or names[0])
+        posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
+        draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
+        lengths = json.loads(about["lengths_mm"])
+        keys, known = json.loads(about["effects"]), catalogue(own_effects)
+        model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
+                      float(about["tension_ref_N"]))  # fmt: skip
+        exponent = draws.pop(LENGTH_EXPONENT, None)
+        if len(names) > 1:
+            reference = float(np.exp(np.mean(np.log(lengths))))
+            draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
+            draws = _by_length(draws, model.effects, lengths[at], reference)
+        if "reference_C" not in constant.attrs:
+            raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+        reference_C = json.loads(constant.attrs["reference_C"])[at]
+        protocol, tension = _measured(constant, observed, names[at], float(lengths[at]), reference_C)
+        resolutions = json.loads(about["resolutions_N"])
+        sample = Sample(names[at], about["material"], protocol, tension[..., None], float(resolutions[at]), model)
+        check(draws, sample, about["likelihood"])
+        return Stored(draws, sample, about["likelihood"], exponent)
+
+
+def _measured(
+    constant: Any, observed: Any, name: str, length_mm: float, reference_C: float | None
+) -> tuple[Protocol, Array]:
+    """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
+    own = constant["hold"].values
+    if "experiment" in constant.coords:
+        own = own[constant["experiment"].values == name]
+    here, tension = constant.sel(hold=own), observed["tension_N"].sel(hold=own).values
+    width = int(np.isfinite(tension).sum(axis=1).max())
+    before = np.zeros(0, int)
+    if "unrecorded_hold" in here.dims:
+        if "unrecorded_experiment" in here:
+            here = here.isel(unrecorded_hold=here["unrecorded_experiment"].values == name)
+        before = here["unrecorded_before_hold"].values
+    number = here["number" if "number" in here.coords else "hold"].values
+    # An unrecorded hold stands before the recorded one it names; several keep their order.
+    place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
+
+    def whole(recorded: Array, unrecorded: Array | None = None) -> Array:
+        none = np.full((len(before), *recorded.shape[1:]), np.nan) if unrecorded is None else unrecorded
+        return np.concatenate([none, recorded])[place]
+
+    readings, times = (whole(values)[:, :width] for values in (tension, here["time_s"].values))
+    mask = np.isfinite(readings)
+    if not np.array_equal(mask, np.isfinite(times)):
+        raise ValueError("readings and times that do not belong together")
+    displacement, duration = (
+        whole(here[key].values, here[f"unrecorded_{key}"].values if len(before) else None)
+        for key in ("displacement_mm", "duration_s")
+    )
+    protocol = Protocol(
+        length_mm,
+        displacement,
+        np.nan_to_num(times),
+        mask,
+        duration,
+        whole(number, np.full(len(before), -1)).astype(np.int64),
+        None if reference_C is None else np.nan_to_num(whole(here["warming_K"].values)[:, :width]),
+        reference_C,
+    )
+    return protocol, np.nan_to_num(readings)
+
+
+def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
+    """What was believed before the fit: draws of the prior of one experiment's parameters, each (n,)."""
+    path = folder / "posterior.nc"
+    with _opened(path) as tree:
+        prior, names = tree["prior"].to_dataset(), json.loads(tree["posterior"].attrs["experiments"])
+        if "experiment" in prior.dims:
+            prior = prior.isel(experiment=names.index(experiment or names[0]))
+        return {str(name): values.values.reshape(-1) for name, values in prior.data_vars.items()}
+
+
+def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator) -> Any:
+    problem, (m, draws, _) = fit.problem, fit.theta.shape
+    members = list(problem.samples) if sample is None else [sample]
+    variables, few = _variables(problem, fit.theta, sample), np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS))
+    few = np.unique(few.astype(int))
+    chosen = fit.theta[:, few].reshape(-1, fit.theta.shape[-1])
+    prior = problem.prior.rvs(2000, rng)
+    tree = arviz_base.from_dict(
+        {
+            "posterior": variables,
+            "sample_stats": {"lp": fit.log_density},
+            "prior": _variables(problem, prior[None], sample),
+        },
+        dims={name: ["experiment"] for name, v in variables.items() if v.ndim > 2},
+        coords={} if sample else {"experiment": [s.name for s in members]},
+    )
+    left_out = _left_out(problem, fit.flat)
+    replicated = {s.name: np.moveaxis(replicate(problem, chosen, s, rng), -1, 0) for s in members}
+    groups = {
+        "posterior_predictive": _readings(members, replicated, (m, len(few))),
+        "log_likelihood": {
+            "tension_N": (
+                ("chain", "draw", "hold"),
+                np.concatenate(
+                    [left_out[i][s.protocol.recorded] for i, s in enumerate(problem.samples) if s in members]
+                ).T.reshape(m, draws, -1),
+            )
+        },
+        "observed_data": _readings(members, {s.name: np.moveaxis(s.readings, -1, 0) for s in members}, ()),
+        "constant_data": _protocols(members),
+    }
+    sampled = {"posterior_predictive": few, "log_likelihood": np.arange(draws)}
+    for group, data in groups.items():
+        coords = _hold_coordinates(members, apart=sample is not None)
+        if group in sampled:
+            coords |= {"chain": np.arange(m), "draw": sampled[group]}
+        tree[group] = xr.DataTree(xr.Dataset(data, coords=coords))
+    about = {
+        "wirebayes_version": __version__,
+        "inference_library": "emcee",
+        "experiment": members[0].name,
+        "experiments": json.dumps([s.name for s in members]),
+        "material": members[0].material,
+        "length_mm": members[0].protocol.length_mm,
+        "lengths_mm": json.dumps([s.protocol.length_mm for s in members]),
+        "resolutions_N": json.dumps([s.resolution_N for s in members]),
+        "elastic_law": members[0].model.law,
+        "history": members[0].model.history,
+        "likelihood": problem.likelihood,
+        "effects": json.dumps([e.key for e in members[0].model.effects]),
+        "tension_ref_N": members[0].model.tension_ref_N,
+        "tension_range_N": [float(np.min([s.readings[..., 0][s.protocol.mask].min() for s in members])),
+                            float(np.max([s.readings[..., 0][s.protocol.mask].max() for s in members]))],
+        "time_range_s": [0.0, float(max(s.protocol.duration_s.max() for s in members))],
+        "walkers": fit.chains.z.shape[2],
+        "thin": fit.thin,
+        "converged": int(fit.chains.converged),
+        "provenance": json.dumps(dict(provenance)),
+    }  # fmt: skip
+    for group, node in tree.children.items():
+        node.attrs.clear()
+        for name, variable in node.data_vars.items():
+            if group in ("posterior", "prior"):
+                variable.attrs["units"] = unit_of(str(name), members[0].model.effects)
+            elif group in ("log_likelihood", "sample_stats"):
+                variable.attrs["units"] = "1"
+            else:
+                variable.attrs["units"] = _UNIT_IN_NAME.get(str(name).rsplit("_", 1)[-1], "1")
+    tree["constant_data"].attrs["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
+    tree["posterior"].attrs.update(about)
+    tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
+    return tree
+
+
+def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Any]:
+    """Labels of the recorded holds: their numbers; of several experiments ``NAME:NUMBER``, one after the other.
+
+    Unrecorded holds have no readings, so they are no part of this dimension: what is a missing value for one function
+    of ArviZ is an observation for another.
+    """
+    number = np.concatenate([s.protocol.number[s.protocol.recorded] for s in members])
+    if apart or len(members) == 1:
+        return {"hold": number}
+    names = np.repeat([s.name for s in members], [s.protocol.recorded.sum() for s in members])
+    labels = [f"{name}:{n}" for name, n in zip(names, number, strict=True)]
+    return {"hold": labels, "experiment": ("hold", names), "number": ("hold", number)}
+
+
+def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
+    """(n, holds, R) from (n, H, R) of each sample: recorded holds, one after the other, NaN where nothing was read."""
+    width = max(s.protocol.time_s.shape[1] for s in members)
+    rows = []
+    for s in members:
+        read = np.where(s.protocol.mask, values[s.name], np.nan)[:, s.protocol.recorded]
+        rows.append(np.pad(read, [(0, 0), (0, 0), (0, width - read.shape[2])], constant_values=np.nan))
+    return np.concatenate(rows, axis=1)
+
+
+def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Any]:
+    """Readings of each hold, and their mean, which has the dimensions of the log-likelihood."""
+    read, first = _stacked(members, values), ("chain", "draw") if shape else ()
+    return {
+        "tension_N": ((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
+        "hold_mean_N": ((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
+    }
+
+
+def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
+    """What was done: the recorded holds, and beside them the unrecorded ones, as an experiment file states them."""
+    protocols = [s.protocol for s in members]
+    recorded = np.concatenate([p.recorded for p in protocols])
+
+    def each(field: str) -> Array:
+        return np.concatenate([getattr(p, field) for p in protocols])
+
+    times = {s.name: s.protocol.time_s[None] for s in members}
+    out: dict[str, Any] = {
+        "displacement_mm": ("hold", each("displacement_mm")[recorded]),
+        "duration_s": ("hold", each("duration_s")[recorded]),
+        "time_s": (("hold", "time"), _stacked(members, times)[0]),
+    }
+    if any(p.warming_K is not None for p in protocols):
+        warming = {s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
+                   for s, p in zip(members, protocols, strict=True)}  # fmt: skip
+        out["warming_K"] = (("hold", "time"), _stacked(members, warming)[0])
+    if not recorded.all():
+        following = np.concatenate([_following(p.number) for p in protocols])
+        names = np.repeat([s.name for s in members], [len(p.number) for p in protocols])
+        out |= {
+            "unrecorded_experiment": ("unrecorded_hold", names[~recorded]),
+            "unrecorded_before_hold": ("unrecorded_hold", following[~recorded]),
+            "unrecorded_displacement_mm": ("unrecorded_hold", each("displacement_mm")[~recorded]),
+            "unrecorded_duration_s": ("unrecorded_hold", each("duration_s")[~recorded]),
+        }
+    return out
+
+
+def _following(number: Array) -> Array:
+    """(H,) number of the next recorded hold; every test ends with one."""
+    out = number.copy()
+    for j in range(len(out) - 2, -1, -1):
+        if out[j] < 0:
+            out[j] = out[j + 1]
+    return out
+
+
+def _left_out(problem: Problem, theta: Array) -> list[Array]:
+    """Per sample (H, n) log p(readings of a hold | those of all others, parameters), some draws at a time."""
+    parts = [problem.leave_one_hold_out(theta[i : i + _CHUNK]) for i in range(0, len(theta), _CHUNK)]
+    return [np.concatenate(holds, axis=1) for holds in zip(*parts, strict=True)]
+
+
+def _variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str, Array]:
+    """Parameters (chains, draws), of one sample, or of all with those of one sample each along a last axis."""
+    if sample is None:
+        return _together_variables(problem, theta)
+    own = _own(problem, theta.reshape(-1, theta.shape[-1]), sample)
+    return {name: values.reshape(theta.shape[:2]) for name, values in own.items()}
+
+
+def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
+    """A sample's parameters as they are at its own length, with which it can stand alone."""
+    reference = sample.model.length_ref_mm or sample.protocol.length_mm
+    return _by_length(problem.parameters(theta, sample), sample.model.effects, sample.protocol.length_mm, reference)
+
+
+def _by_length(
+    own: dict[str, Array], effects: Sequence[Effect], length_mm: float, reference_mm: float
+) -> dict[str, Array]:
+    """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with."""
+    hold: Any = SimpleNamespace(length_mm=length_mm, length_ref_mm=reference_mm)
+    out: Any = own
+    for effect in (e for e in effects if e.compares_lengths):
+        amplitudes = {a.name: own[c] for a, c in zip(effect.amplitudes, effect.columns(), strict=True)}
+        out = effect.apply(out, amplitudes, hold)
+    return dict(out)
+
+
+def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
+    """Columns under their plain names; those of one sample each stacked along a last axis."""
+    out: dict[str, Any] = {}
+    for i, name in enumerate(problem.names):
+        plain = name.split("[")[0]
+        if plain == name:
+            out[plain] = theta[..., i]
+        else:
+            out.setdefault(plain, []).append(theta[..., i])
+    return {name: np.stack(v, axis=-1) if isinstance(v, list) else v for name, v in out.items()}
+
+
+def unit_of(name: str, effects: tuple[Effect, ...] = ()) -> str:
+    """Unit of a parameter."""
+    units = UNITS | {c: a.unit for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True)}
+    return units.get(name, "1")
+
+
+def derived(wire: FreshSample, tension_N: float) -> dict[str, Array]:
+    """Quantities people compare, per draw: creep at a tension after some times and in the end, its speed, stiffness."""
+    creep = wire.creep_mm(tension_N, np.array(list(CREEP_TIMES_S.values())))
+    return {
+        **dict(zip(CREEP_TIMES_S, creep, strict=True)),
+        "final_creep_mm": wire.final_creep_mm(tension_N),
+        "median_creep_time_s": wire.median_creep_time_s(tension_N),
+        "stiffness_N": wire.stiffness_N(tension_N),
+    }
+
+
+def band(values: Array) -> dict[str, float] | None:
+    """Mean, sd and quantiles of draws; None where a draw has no finite value (creep that never ends)."""
+    if not np.isfinite(values).all():
+        return None
+    low, middle, high = (float(q) for q in np.quantile(values, [0.05, 0.5, 0.95]))
+    return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
+
+
+def statistics(values: Array) -> dict[str, float]:
+    """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
+    q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
+    with np.errstate(invalid="ignore"):
+        return {
+            "mean": float(values.mean()), "sd": float(values.std(ddof=1)),
+            "q05": float(q05), "q50": float(q50), "q95": float(q95),
+            "ess_bulk": float(arviz_stats.ess(values, method="bulk")),
+            "ess_tail": float(arviz_stats.ess(values, method="tail", prob=(0.05, 0.95))),
+            "r_hat": float(arviz_stats.rhat(values)),
+        }  # fmt: skip
+
+
+def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
+    """What is odd about the readings, with the experiment's name where there are several."""
+    if sample is not None:
+        return posterior_checks.warnings(fit, sample)
+    return [f"{s.name}: {said}" for s in fit.problem.samples for said in posterior_checks.warnings(fit, s)]
+
+
+def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
+    first = sample or fit.problem.samples[0]
+    parameters: dict[str, Any] = {}
+    for name, variable in tree["posterior"].data_vars.items():
+        if variable.ndim == 2:
+            parameters[str(name)] = statistics(variable.values)
+        else:
+            for i, s in enumerate(fit.problem.samples):
+                parameters[f"{name}[{s.name}]"] = statistics(variable.values[..., i])
+    tension = round(first.model.tension_ref_N, 3)
+    wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
+    quantities = {key: band(value) for key, value in derived(wire, tension).items()}
+    chains = fit.chains
+    return {
+        "experiment": sample.name if sample else first.material.replace(" ", "-"),
+        "likelihood": fit.problem.likelihood,
+        "elastic_law": first.model.law,
+        "history": first.model.history,
+        "effects": [e.key for e in first.model.effects],
+        "converged": chains.converged,
+        "convergence": chains.why,
+        "warnings": _warnings(fit, sample),
+        "parameters": parameters,
+        "derived": {"tension_N": tension, **quantities},
+        "identifiability": told(identifiability(fit)),
+        "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).told(),
+        "likelihood_evaluations": chains.evaluations,
+        "kept_evaluations": chains.kept_evaluations,
+        "autocorrelation_steps": float(chains.autocorrelation_steps.max()),
+        "smallest_ess": float(chains.ess.min()),
+        "largest_nested_r_hat": float(chains.r_hat.max()),
+        "acceptance": chains.acceptance,
+        "learned_move": chains.learned,
+        "modes_found": chains.modes,
+    }

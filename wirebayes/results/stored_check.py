@@ -1,0 +1,70 @@
+"""What a stored posterior must satisfy before anything is computed from it."""
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.model.problem import Likelihood, Sample
+from wirebayes.wire.laws import ElasticLaw, History
+
+Array = NDArray[Any]
+_LARGEST = 1e30  # no parameter, time or tension comes near, and its square does not overflow
+_ABOVE_ZERO, _NOT_BELOW = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")
+
+
+def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
+    """Raise a `ValueError` that says what is wrong with a posterior that was read back.
+
+    Parameters
+    ----------
+    draws : mapping of name to (n,) array
+    sample : Sample
+    likelihood : str
+    """
+    model, protocol = sample.model, sample.protocol
+    for what, value, known in [
+        ("elastic law", model.law, get_args(ElasticLaw)),
+        ("history", model.history, get_args(History)),
+        ("likelihood", likelihood, get_args(Likelihood)),
+    ]:
+        if value not in known:
+            raise ValueError(f"{what} {value!r}")
+    needed = ["k1", "B", "U", "k2", "N", "sensor_sd", *(["preload", "setting_sd"] if likelihood == "chain" else [])]
+    needed += [column for effect in model.effects for column in effect.columns()]
+    missing = [name for name in needed if name not in draws]
+    if missing:
+        raise ValueError(f"no draws of {', '.join(missing)}")
+    for name, values in draws.items():
+        if len(values) < 2 or not _usable(values):
+            raise ValueError(f"draws of {name} that are too few or no finite numbers")
+        if (name in _ABOVE_ZERO and values.min() <= 0) or (name in _NOT_BELOW and values.min() < 0):
+            raise ValueError(f"draws of {name} below zero")
+    holds = (len(protocol.displacement_mm),)
+    for what, array in [("durations", protocol.duration_s), ("hold numbers", protocol.number)]:
+        if array.shape != holds:
+            raise ValueError(f"{len(array)} {what} for {holds[0]} holds")
+    readings = sample.readings[..., 0]
+    if protocol.mask.ndim != 2 or not protocol.mask.any() or len(protocol.mask) != holds[0]:
+        raise ValueError("no readings")
+    for array in (protocol.time_s, readings, *([] if protocol.warming_K is None else [protocol.warming_K])):
+        if array.shape != protocol.mask.shape:
+            raise ValueError("readings, times and temperatures that do not belong together")
+    numbers: dict[str, Any] = {
+        "length": protocol.length_mm, "displacements": protocol.displacement_mm, "times": protocol.time_s,
+        "durations": protocol.duration_s, "tensions": readings, "resolution": sample.resolution_N,
+        "reference tension": model.tension_ref_N,
+    }  # fmt: skip
+    for what, value in numbers.items():
+        if not _usable(np.asarray(value)):
+            raise ValueError(f"{what} that are no finite numbers")
+    for what in ("times", "durations", "resolution"):
+        if np.min(numbers[what]) < 0:
+            raise ValueError(f"{what} below zero")
+    if protocol.length_mm <= 0 or model.tension_ref_N <= 0:
+        raise ValueError("length or reference tension that is not above zero")
+
+
+def _usable(values: Array) -> bool:
+    return values.dtype.kind in "fiu" and bool((np.abs(values) < _LARGEST).all())

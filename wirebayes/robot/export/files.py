@@ -1,0 +1,177 @@
+"""A fitted wire for people who run such robots: firmware settings with intervals, and a table of creep.
+
+Hangprinter firmware thinks of a line as a spring of ``constant / length`` with the length in mm, so its constant is k1
+in newtons. It knows no creep: the table beside it says how much each line will have grown. Where the line's stiffness
+changes with its tension, firmware and simulator get the tangent at the tensions the robot works at.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.robot.export.mujoco_model import mjcf
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
+from wirebayes.robot.motion import inverse
+from wirebayes.wire.fresh import FreshSample
+
+Floats = NDArray[np.float64]
+LETTERS = "ABCDEFGHI"
+TABLE = ("tension_N", "time_s", "mean_mm_per_m", "sd_mm_per_m", "q05_mm_per_m", "q50_mm_per_m", "q95_mm_per_m")
+
+
+def is_hangprinter(robot: Robot) -> bool:
+    """Whether Hangprinter firmware can be told of it: four or five drums, orientation held by parallel lines."""
+    return robot.freedom == "position" and not robot.is_linear.any() and 4 <= robot.legs <= 5
+
+
+def reprapfirmware(robot: Robot, line: WireDraws) -> str:
+    """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
+    anchors = " ".join(f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(LETTERS, robot.exit_m, strict=False))
+    spring = working_spring(robot, line)
+    rows = [
+        (f"M669 K6 {anchors}", "anchors, mm"),
+        (f"M666 U{_joined(robot.lines, '.0f')}", "mechanical advantages"),
+        (f"M666 W{robot.mass_kg:g}", "mover, kg"),
+        (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.band}"),
+        (f"M666 Y{_joined(1e3 * robot.beyond_m, '.0f')}", "wire beyond each anchor, mm"),
+        (f"M666 I{_joined(np.full(robot.legs, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
+        (f"M666 X{_joined(np.full(robot.legs, robot.rule.highest_N), 'g')}", "largest planned force, N"),
+    ]
+    return _head(robot, line, spring, ";") + "".join(f"{code} ; {comment}\n" for code, comment in rows)
+
+
+def klipper(robot: Robot, line: WireDraws) -> str:
+    """Sections for ``printer.cfg``: anchors for every Klipper, spring settings for the Hangprinter branch."""
+    spring = working_spring(robot, line)
+    text = _head(robot, line, spring, "#") + (
+        "[printer]\nkinematics: winch\n"
+        "# The next options are those of the Hangprinter branch of Klipper; upstream does not know them.\n"
+        f"winch_mover_weight: {robot.mass_kg:g}  # kg\n"
+        f"winch_spring_constant: {spring.mean_N:.0f}  # N per unit strain: {spring.band}\n"
+        f"winch_mechanical_advantage: {_joined(robot.lines, '.0f', ', ')}\n"
+        f"winch_guy_wire_lengths: {_joined(1e3 * robot.beyond_m, '.0f', ', ')}  # mm\n"
+        f"winch_min_force: {_joined(np.full(robot.legs, robot.rule.lowest_N), 'g', ', ')}  # N\n"
+        f"winch_max_force: {_joined(np.full(robot.legs, robot.rule.highest_N), 'g', ', ')}  # N\n"
+    )
+    for letter, anchor in zip(LETTERS.lower(), 1e3 * robot.exit_m, strict=False):
+        x, y, z = anchor
+        text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
+    return text
+
+
+def creep_table(
+    robot: Robot, line: WireDraws, tensions_N: Sequence[float], times_s: Sequence[float]
+) -> list[tuple[float, ...]]:
+    """Growth of a new line under constant tension, rows of `TABLE`: mm per metre of line with a 90 % interval."""
+    rows: list[tuple[float, ...]] = []
+    sample = _sample(robot, for_robot(robot, line))
+    for load in tensions_N:
+        for time, creep in zip(times_s, sample.creep_mm(load, np.asarray(times_s, float)), strict=True):
+            growth = 1e3 * creep / sample.length_mm
+            low, mid, high = np.quantile(growth, [0.05, 0.5, 0.95])
+            rows.append((float(load), float(time), float(growth.mean()), float(growth.std()), low, mid, high))
+    return rows
+
+
+@dataclass(frozen=True)
+class WorkingSpring:
+    """The line as a spring about the tension it works at.
+
+    Attributes
+    ----------
+    stiffness_N : (n,) array
+        Tangent stiffness, N per unit strain.
+    remark : str
+        At which tension, in words; empty where the stiffness is the same at all.
+    """
+
+    stiffness_N: Floats
+    remark: str
+
+    @property
+    def mean_N(self) -> float:
+        """Posterior mean."""
+        return float(self.stiffness_N.mean())
+
+    @property
+    def band(self) -> str:
+        """Its 90 % interval in words."""
+        low, high = np.quantile(self.stiffness_N, [0.05, 0.95])
+        return f"90 % interval {low:.0f} to {high:.0f}"
+
+
+def working_spring(robot: Robot, line: WireDraws) -> WorkingSpring:
+    """Stiffness of the line at its mean tension at the home pose; a middle tested tension where none holds that pose.
+
+    Draws that cannot carry the tension are left out, and the remark says how many.
+
+    Raises
+    ------
+    InputError
+        No draw of the line can carry that tension.
+    """
+    wires = for_robot(robot, line)
+    tau = inverse.tensions(robot, robot.home_m[None], matrix(robot.home_rotation_rad)[None])[0]
+    fitted = np.array([name not in robot.given for name in robot.wire])
+    held = bool(np.isfinite(tau).all())
+    where = float(tau[fitted if fitted.any() else slice(None)].mean()) if held else line.tension_ref_N
+    stiffness = _sample(robot, wires).stiffness_N(where)
+    good = np.isfinite(stiffness)
+    if not good.any():
+        raise InputError(f"{robot.name}: the fitted line cannot carry {where:.3g} N, so no spring constant is known")
+    if wires.law == "hooke" and not wires.at("strain"):
+        return WorkingSpring(stiffness, "")
+    point = "the mean tension of the lines at the home pose" if held else "a middle tension of the test"
+    remark = f"The spring constant depends on the tension: it is the tangent at {where:.4g} N, {point}."
+    if not good.all():
+        remark += f" {100 * np.mean(~good):.2g} % of the draws cannot carry that tension and are left out."
+    return WorkingSpring(stiffness[good], remark)
+
+
+def mujoco(robot: Robot, line: WireDraws) -> str | None:
+    """MuJoCo model of the robot at its home pose with the mean line; None where no tensions hold that pose.
+
+    Each tendon is a linear spring with the tension and the tangent stiffness that the line has there: under law (1)
+    without effects on the strain that is the line itself.
+    """
+    wires = for_robot(robot, line.centre())
+    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
+    told = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
+    if not told.feasible.all():
+        return None
+    zero, tau = told.zero_m.T, told.tension_N.T
+    k1 = np.broadcast_to(wires.theta["k1"], zero.shape)
+    if wires.law == "hooke" and not wires.at("strain"):
+        return mjcf(robot, k1[:, 0], zero[:, 0], told.offset_m[0])
+    stretched = stretched_length(wires, zero, tau)
+    slope = tension(wires, stretched, zero)[1]
+    rest = stretched - tau / slope
+    pulls = ", ".join(f"{value:.4g}" for value in tau[:, 0])
+    remark = f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
+    return mjcf(robot, (slope * rest)[:, 0], rest[:, 0], told.offset_m[0], remark=remark)
+
+
+def _sample(robot: Robot, wires: Wires) -> FreshSample:
+    """A fresh sample of the fitted line, as long as the first leg that hangs on it."""
+    legs = [i for i, name in enumerate(robot.wire) if name not in robot.given]
+    return wires.sample(legs[0] if legs else 0)
+
+
+def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> str:
+    tested = ""
+    if line.tension_range_N is not None:
+        tested = f", tested from {line.tension_range_N[0]:g} to {line.tension_range_N[1]:g} N"
+    return (
+        f"{mark} {robot.name}: line fitted at {line.length_mm:g} mm{tested}.\n"
+        f"{mark} The firmware knows no creep; creep-table.csv says how much a line grows under load.\n"
+    ) + (f"{mark} {spring.remark}\n" if spring.remark else "")
+
+
+def _joined(values: Floats, form: str, between: str = ":") -> str:
+    return between.join(format(float(v) + 0.0, form) for v in values)

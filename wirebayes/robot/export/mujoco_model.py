@@ -1,0 +1,121 @@
+"""The same robot in another program: a MuJoCo model of laws (1) and (6), and its settled equilibrium.
+
+A spatial tendon with stiffness k1/ℓ and a spring length from 0 to ℓ pulls as Hooke's law does and goes slack. Several
+lines of one wire, and wire beyond the exit point, make one tendon of k1 m²/ℓ that rests at (ℓ - offset)/m.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+
+Floats = NDArray[np.float64]
+
+
+def mjcf(
+    robot: Robot,
+    k1_N: Floats,
+    zero_m: Floats,
+    offset_m: Floats,
+    damping_N_s_m: float = 1.0,
+    timestep_s: float = 1e-3,
+    remark: str = "",
+) -> str:
+    """MuJoCo model (MJCF) of a robot with given lengths.
+
+    Parameters
+    ----------
+    robot : Robot
+    k1_N, zero_m, offset_m : (w,) arrays
+        Stiffness, zero-tension length (creep included), stretched length not between exit and platform point.
+    damping_N_s_m : float
+        Of the platform's displacements; of its rotations times the platform's size squared.
+    timestep_s : float
+    remark : str
+        A comment at the head of the model.
+    """
+    m, arm2 = robot.mass_kg, robot.size_m**2
+    stiffness = k1_N * robot.lines**2 / zero_m
+    rest = np.maximum((zero_m - offset_m) / robot.lines, 0.0)
+    slides = "".join(
+        f'<joint type="slide" axis="{axis}" damping="{damping_N_s_m!r}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
+    )
+    ball = f'<joint type="ball" damping="{damping_N_s_m * arm2!r}"/>' if robot.degrees == 6 else ""
+    exits = "".join(f'<site name="exit{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_m))
+    points = "".join(f'<site name="point{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.platform_m))
+    tendons = "".join(
+        f'<spatial stiffness="{float(k)!r}" springlength="0 {float(rest_m)!r}">'
+        f'<site site="exit{i}"/><site site="point{i}"/></spatial>'
+        for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
+    )
+    comment = f"<!-- {remark} -->" if remark else ""
+    inertia = _row(np.full(3, m * arm2))
+    return (
+        f'<mujoco model="{robot.name}">{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
+        f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}<body>{slides}{ball}'
+        f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
+        f"</body></worldbody><tendon>{tendons}</tendon></mujoco>\n"
+    )
+
+
+def _row(values: Floats) -> str:
+    return " ".join(repr(float(v)) for v in values)
+
+
+def settle(
+    robot: Robot,
+    k1_N: Floats,
+    zero_m: Floats,
+    offset_m: Floats,
+    start_m: Floats,
+    start_rotation: Floats,
+    softest_N_m: float,
+    max_steps: int = 400_000,
+) -> tuple[Floats, Floats, bool]:
+    """Let MuJoCo's damped platform come to rest.
+
+    Parameters
+    ----------
+    robot : Robot
+    k1_N, zero_m, offset_m : (w,) arrays
+    start_m, start_rotation : (3,), (3, 3) arrays
+    softest_N_m : float
+        About the smallest stiffness on the way; it only sets the damping, hence the time to rest.
+
+    Returns
+    -------
+    position_m : (3,) array
+    rotation : (3, 3) array
+    rested : bool
+    """
+    import mujoco
+
+    from wirebayes.robot.mechanics.rotation import vector
+
+    stiffest = float((k1_N * robot.lines**2 / zero_m).sum()) * 4
+    mass = robot.mass_kg
+    damping = 2.0 * float(np.sqrt(softest_N_m * mass))
+    step = 0.3 / float(np.sqrt(stiffest / mass))
+    model: Any = mujoco.MjModel.from_xml_string(mjcf(robot, k1_N, zero_m, offset_m, damping, step))
+    data: Any = mujoco.MjData(model)
+    data.qpos[:3] = start_m
+    if robot.degrees == 6:
+        v = vector(start_rotation[None])[0]
+        angle = float(np.linalg.norm(v))
+        mujoco.mju_axisAngle2Quat(data.qpos[3:7], v / angle if angle > 0 else np.array([1.0, 0, 0]), angle)
+    rested, calm = False, 0
+    for _ in range(0, max_steps, 50):
+        mujoco.mj_step(model, data, 50)
+        slow = np.abs(data.qvel).max() < 1e-11 * np.sqrt(stiffest / mass)
+        calm = calm + 1 if slow else 0
+        if calm >= 3:
+            rested = True
+            break
+    rotation = np.eye(3)
+    if robot.degrees == 6:
+        flat = np.zeros(9)
+        mujoco.mju_quat2Mat(flat, data.qpos[3:7])
+        rotation = flat.reshape(3, 3)
+    return np.array(data.qpos[:3]), rotation, rested

@@ -1,0 +1,180 @@
+"""Posterior draws of wires as the robot takes them: plain arrays, and which draw goes to which leg.
+
+Bench quantities, instrument effects and one-off events are dropped here and go no further.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import GivenWire, Robot
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.wire import laws
+from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
+
+Floats = NDArray[np.float64]
+CORE = ("k1", "B", "U", "k2", "N")
+LENGTH_EXPONENT = "length_exponent"  # creep elongation grows as length to this power; 1, a strain, unless fitted
+
+
+@dataclass(frozen=True)
+class WireDraws:
+    """Joint posterior draws of one line.
+
+    Attributes
+    ----------
+    parameters : mapping of name to (n,) array
+        ``k1`` (N), ``B`` (mm N^-U), ``U``, ``k2`` (s^-N), ``N`` and ``effect_name.parameter``; ``length_exponent``
+        where samples of two lengths told it.
+    length_mm : float
+        Zero-tension length of the tested sample; `B` refers to it.
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+    effects : tuple of Effect
+        Only the material ones are used.
+    tension_range_N, time_range_s : (low, high) or None
+        What was tested; outside, the answer is an extrapolation and is said to be one.
+    tension_ref_N : float
+    """
+
+    parameters: Mapping[str, Floats]
+    length_mm: float
+    law: laws.ElasticLaw = "hooke"
+    history: laws.History = "saturating"
+    effects: tuple[Effect, ...] = ()
+    tension_range_N: tuple[float, float] | None = None
+    time_range_s: tuple[float, float] | None = None
+    tension_ref_N: float = 1.0
+
+    @property
+    def count(self) -> int:
+        """Number of draws."""
+        return len(self.parameters["k1"])
+
+    def material(self) -> tuple[Effect, ...]:
+        """The effects that the robot's wires show too."""
+        return material(self.effects)
+
+    def part(self, index: NDArray[np.intp] | slice) -> "WireDraws":
+        """Some of the draws, each with all its parameters."""
+        return replace(self, parameters={k: v[index] for k, v in self.parameters.items()})
+
+    def centre(self) -> "WireDraws":
+        """One wire with the posterior mean of every parameter: what a controller would be told."""
+        return replace(self, parameters={k: np.array([v.mean()]) for k, v in self.parameters.items()})
+
+
+def material(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Those effects that a wire shows wherever it hangs."""
+    return tuple(e for e in effects if e.scope == "material" and e.place not in OF_THE_BENCH)
+
+
+def given(wire: GivenWire) -> WireDraws:
+    """A wire of stated parameters as one draw without uncertainty."""
+    return WireDraws({k: np.array([v]) for k, v in wire.parameters.items()}, wire.length_mm)
+
+
+def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random.Generator | None = None) -> Wires:
+    """Wires of all legs: one joint draw for all legs of one line, and a spread from specimen to specimen.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+        For every leg whose wire is not given in the robot's file.
+    spread : float
+        Relative standard deviation of stiffness k1, creep amount B and rate k2 from leg to leg (log-normal, the three
+        independent), beside the shared draw.
+    rng : numpy Generator
+        Needed when `spread` is not zero.
+
+    Returns
+    -------
+    Wires
+        With ``(1, n)`` parameters when all legs share everything, else ``(w, n)``.
+    """
+    lines = [given(robot.given[name]) if name in robot.given else line for name in robot.wire]
+    n = line.count
+    effects = line.material()
+    names = CORE + tuple(c for e in effects for c in e.columns())
+    exponent = line.parameters.get(LENGTH_EXPONENT)
+    by_length = [e for e in effects if e.place == "sample"]
+    shared = spread == 0 and not robot.given and exponent is None and not by_length
+    theta: dict[str, Floats] = {}
+    for name in names:
+        if shared:
+            theta[name] = line.parameters[name][None]
+            continue
+        rows = [np.broadcast_to(_value(wire, name, effects), (n,)) for wire in lines]
+        theta[name] = np.stack(rows)
+    if spread > 0:
+        if rng is None:
+            raise ValueError("a specimen spread needs a random generator")
+        for name in ("k1", "B", "k2"):
+            theta[name] = theta[name] * np.exp(spread * rng.standard_normal((robot.legs, n)))
+    length = np.array([wire.length_mm for wire in lines])[:, None]
+    longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
+    if exponent is not None:
+        theta["B"] = theta["B"] * longer ** (exponent - 1.0)
+    hold = steady_hold(theta, length * longer, line.tension_ref_N, length_ref_mm=length)
+    theta = dict(Placed(by_length, theta).change("sample", theta, hold))
+    others = tuple(e for e in effects if e.place != "sample")
+    return Wires(line.law, line.history, theta, length, others, line.tension_ref_N)
+
+
+def nominal_length(robot: Robot) -> Floats:
+    """Length of each leg's wire, (w,) m: all of a linear actuator's, a drum's at the home pose."""
+    points = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+    free = robot.lines * np.linalg.norm(points - robot.exit_m, axis=1) + robot.beyond_m
+    return np.where(robot.is_linear, robot.wire_m, free)
+
+
+def _is_given(robot: Robot) -> NDArray[np.bool_]:
+    return np.array([[name in robot.given] for name in robot.wire])
+
+
+def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
+    """A parameter, or the neutral value of an effect that this leg's wire does not have."""
+    if name in wire.parameters:
+        return wire.parameters[name]
+    for effect in effects:
+        for amplitude, column in zip(effect.amplitudes, effect.columns(), strict=True):
+            if column == name:
+                return np.array([amplitude.neutral])
+    raise KeyError(name)
+
+
+def warnings(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
+    """One sentence for each way in which a use leaves what was tested."""
+    out = []
+    loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
+    if line.tension_range_N is not None and loads.size:
+        low, high = line.tension_range_N
+        if loads.min() < low or loads.max() > high:
+            out.append(
+                f"tensions {loads.min():.3g} to {loads.max():.3g} N leave the tested range {low:.3g} to {high:.3g} N"
+            )
+    if line.time_range_s is not None and time_s > line.time_range_s[1]:
+        out.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
+    lengths = 1e3 * zero_m[np.isfinite(zero_m)]
+    if lengths.size and (lengths.min() < 0.5 * line.length_mm or lengths.max() > 2.0 * line.length_mm):
+        rule = "is taken to be a strain of the whole wire"
+        if LENGTH_EXPONENT in line.parameters:
+            rule = "grows with length by the exponent fitted to the tested lengths"
+        out.append(
+            f"wires of {lengths.min():.0f} to {lengths.max():.0f} mm, tested at {line.length_mm:.0f} mm: creep {rule}"
+        )
+    kept = line.material()
+    out.extend(
+        f"the robot knows no temperature: the effect {e.name} sees none, as at the first reading of the test"
+        for e in kept
+        if e.place == "zero_length"
+    )
+    dropped = [e.name for e in line.effects if e.scope == "material" and e not in kept]
+    out.extend(f"the material effect {name} has no place in the robot and is left out" for name in dropped)
+    if any(e.name == "discrepancy" for e in line.effects):
+        out.append("what the fit could not name is not in the robot: its wires follow the named model only")
+    return out

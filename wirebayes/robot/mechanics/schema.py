@@ -1,0 +1,210 @@
+"""Reads a robot's TOML file, strictly: every key known, every number finite, every complaint one line."""
+
+import math
+import tomllib
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.robot.mechanics.description import GivenWire, Robot, TensionRule
+from wirebayes.robot.mechanics.tensions import CHOICES
+
+_GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
+
+
+def shipped() -> list[str]:
+    """Names of the robots inside the package."""
+    folder = resources.files("wirebayes") / "data" / "robots"
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def read(name_or_file: str | Path) -> Robot:
+    """Read a robot from a TOML file, or a shipped one by its name.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        Naming the file and the key, what was found and what was expected.
+    """
+    text, where = _text(str(name_or_file))
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also what Python refuses: an integer of thousands of digits
+        raise InputError(f"{where}: not valid TOML: {error}") from None
+    return _robot(_Table(table, where, ""))
+
+
+def _text(name: str) -> tuple[str, str]:
+    if name in shipped():
+        entry = resources.files("wirebayes") / "data" / "robots" / f"{name}.toml"
+        return entry.read_text(encoding="utf-8"), f"{name} (shipped)"
+    path = Path(name)
+    try:
+        return path.read_bytes().decode("utf-8"), name
+    except FileNotFoundError:
+        raise InputError(f"{name}: no such file, and no shipped robot of that name ({', '.join(shipped())})") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{name}: not a UTF-8 text file") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read ({error.strerror})") from None
+
+
+class _Table:
+    """One table of the file; remembers which keys were asked for, so that the others can be refused."""
+
+    def __init__(self, content: Any, where: str, path: str) -> None:
+        self.where, self.path = where, path
+        if not isinstance(content, dict):
+            raise InputError(f"{where}: {path or 'file'}: expected a table, found {_kind(content)}")
+        self.content, self.asked = content, set[str]()
+
+    def fail(self, key: str, found: str, expected: str) -> InputError:
+        path = f"{self.path}.{key}" if self.path else key
+        return InputError(f"{self.where}: {path}: {found}; expected {expected}")
+
+    def take(self, key: str, expected: str, default: Any = None) -> Any:
+        self.asked.add(key)
+        if key not in self.content:
+            if default is None:
+                raise self.fail(key, "missing", expected)
+            return default
+        return self.content[key]
+
+    def number(
+        self, key: str, default: float | None = None, above: float = -math.inf, least: float = -math.inf
+    ) -> float:
+        bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
+        value = self.take(key, f"a number{bound}", default)
+        if not _is_number(value) or not value > above or not value >= least:
+            raise self.fail(key, f"found {_shown(value)}", f"a finite number{bound}")
+        return float(value)
+
+    def triple(self, key: str, default: list[float] | None = None) -> np.ndarray[Any, np.dtype[np.float64]]:
+        value = self.take(key, "three numbers", default)
+        if not isinstance(value, list) or len(value) != 3 or not all(_is_number(v) for v in value):
+            raise self.fail(key, f"found {_shown(value)}", "a list of three finite numbers")
+        return np.array(value, float)
+
+    def text(self, key: str, default: str | None = None, among: tuple[str, ...] = ()) -> str:
+        expected = "one of " + ", ".join(among) if among else "a text"
+        value = self.take(key, expected, default)
+        if not isinstance(value, str) or (among and value not in among):
+            raise self.fail(key, f"found {_shown(value)}", expected)
+        return value
+
+    def table(self, key: str, default: dict[str, Any] | None = None) -> "_Table":
+        path = f"{self.path}.{key}" if self.path else key
+        return _Table(self.take(key, "a table", default), self.where, path)
+
+    def finish(self) -> None:
+        for key in self.content:
+            if key not in self.asked:
+                raise self.fail(key, "unknown key", "one of " + ", ".join(sorted(self.asked)))
+
+
+def _robot(t: _Table) -> Robot:
+    version = t.take("version", "the number 1")
+    if version != 1 or isinstance(version, bool):
+        raise t.fail("version", f"found {_shown(version)}", "the number 1")
+    name, description = t.text("name"), t.text("description")
+    source = t.text("source")
+    freedom = t.text("freedom", "pose", ("pose", "position"))
+    platform = t.table("platform")
+    mass, centre = platform.number("mass_kg", above=0), platform.triple("centre_of_mass_m", [0.0, 0.0, 0.0])
+    platform.finish()
+    rule, home, space = t.table("tension"), t.table("pose"), t.table("workspace")
+    tension = TensionRule(
+        rule.text("choice", among=tuple(CHOICES)), rule.number("lowest_N", least=0), rule.number("highest_N", above=0)
+    )
+    if tension.highest_N <= tension.lowest_N:
+        raise rule.fail("highest_N", f"found {tension.highest_N:g}", f"more than lowest_N ({tension.lowest_N:g})")
+    position, turn = home.triple("position_m"), home.triple("rotation_vector_rad", [0.0, 0.0, 0.0])
+    lower, upper = space.triple("lower_m"), space.triple("upper_m")
+    if np.any(upper < lower):
+        raise space.fail("upper_m", f"found {upper.tolist()}", f"at least lower_m ({lower.tolist()}) on every axis")
+    given = _given(t)
+    legs = _legs(t, given)
+    for table in (rule, home, space, t):
+        table.finish()
+    stack: Callable[[str], Any] = lambda key: np.array([leg[key] for leg in legs])  # noqa: E731
+    return Robot(
+        name, description, source, "pose" if freedom == "pose" else "position", mass, centre,
+        stack("exit"), stack("platform"), stack("lines"), stack("beyond"), tuple(leg["actuator"] for leg in legs),
+        stack("ratio"), stack("wire_m"), tuple(leg["wire"] for leg in legs), given, tension,
+        position, turn, lower, upper,
+    )  # fmt: skip
+
+
+def _given(t: _Table) -> dict[str, GivenWire]:
+    tables, out = t.table("wires", {}), {}
+    for name in tables.content:
+        wire = tables.table(name)
+        values = {short: wire.number(key, above=0) for key, short in _GIVEN.items()}
+        out[name] = GivenWire(values, wire.number("length_mm", above=0))
+        wire.finish()
+    return out
+
+
+def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
+    value = t.take("leg", "at least two [[leg]] tables")
+    if not isinstance(value, list) or len(value) < 2:
+        raise t.fail("leg", f"found {_kind(value)}", "at least two [[leg]] tables")
+    out = []
+    for i, content in enumerate(value):
+        leg = _Table(content, t.where, f"leg[{i}]")
+        actuator = leg.text("actuator", "drum", ("drum", "linear"))
+        row: dict[str, Any] = {
+            "exit": leg.triple("exit_point_m"),
+            "platform": leg.triple("platform_point_m"),
+            "lines": leg.number("lines", 1.0, least=1),
+            "beyond": leg.number("beyond_exit_m", 0.0, least=0),
+            "actuator": actuator,
+            "wire": leg.text("wire", "default"),
+            "ratio": 0.0,
+            "wire_m": 0.0,
+        }
+        if row["lines"] != int(row["lines"]):
+            raise leg.fail("lines", f"found {row['lines']:g}", "a whole number")
+        if actuator == "linear":
+            row["ratio"] = leg.number("pulley_ratio", above=0)
+            row["wire_m"] = leg.number("wire_length_m", above=0)
+        if row["wire"] != "default" and row["wire"] not in given:
+            raise leg.fail("wire", f"found {row['wire']!r}", "the name of a table under [wires], or no key")
+        leg.finish()
+        out.append(row)
+    return out
+
+
+def _is_number(value: Any) -> bool:
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    return -_LARGEST < value < _LARGEST  # an integer may be too large for any float
+
+
+_LARGEST = 1e12
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return f"{type(value).__name__} {_shown(value)}"
+
+
+def _shown(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python does not write integers of thousands of digits
+        return f"a huge {type(value).__name__}"
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,167 @@
+"""Geometry, wrench and stiffness matrix of a platform on wires, in closed form.
+
+Batch-last throughout: positions ``(3, n)``, rotations ``(3, 3, n)``, legs ``(w, n)``. A small motion is
+``(displacement, rotation vector)`` of the reference point, both in the world's axes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.wires import Wires, energy, tension
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Where the wires run.
+
+    Attributes
+    ----------
+    distance_m : (w, n)
+        From exit point to platform point.
+    direction : (3, w, n)
+        Unit vectors from the exit point to the platform point (a wire pulls the platform the other way).
+    arm_m : (3, w, n)
+        From the reference point to the platform points, in the world's axes.
+    """
+
+    distance_m: Floats
+    direction: Floats
+    arm_m: Floats
+
+
+def turned(points_m: Floats, rotation: Floats) -> Floats:
+    """Platform points ``(w, 3)`` in the world's axes, ``(3, w, n)``."""
+    x, y, z = points_m.T[:, :, None]
+    return np.asarray(rotation[:, 0, None] * x + rotation[:, 1, None] * y + rotation[:, 2, None] * z)
+
+
+def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
+    """Distances, directions and lever arms at poses ``(3, n)``, ``(3, 3, n)``."""
+    arm = turned(robot.platform_m, rotation)
+    line = position_m[:, None] + arm - robot.exit_m.T[:, :, None]
+    distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
+    return Geometry(distance, line / distance, arm)
+
+
+def jacobian(robot: Robot, shape: Geometry) -> Floats:
+    """Change of the distances with a small motion, ``(6 or 3, w, n)``: rows ``u`` and ``r × u``."""
+    if robot.degrees == 3:
+        return shape.direction
+    u, r = shape.direction, shape.arm_m
+    moment = [r[1] * u[2] - r[2] * u[1], r[2] * u[0] - r[0] * u[2], r[0] * u[1] - r[1] * u[0]]
+    return np.concatenate([u, np.stack(moment)])
+
+
+def weight(robot: Robot, rotation: Floats) -> Floats:
+    """Wrench of gravity about the reference point, ``(6 or 3, n)``: N and N m."""
+    n = rotation.shape[-1]
+    force = robot.mass_kg * GRAVITY
+    out = np.zeros((robot.degrees, n))
+    out[2] = -force
+    if robot.degrees == 6:
+        arm = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
+        out[3], out[4] = -arm[1] * force, arm[0] * force
+    return out
+
+
+def wrench(robot: Robot, shape: Geometry, tension_N: Floats) -> Floats:
+    """Wrench of the wires on the platform about the reference point, ``(6 or 3, n)``."""
+    return np.asarray(-(jacobian(robot, shape) * (robot.lines[:, None] * tension_N)).sum(1))
+
+
+def stretched(robot: Robot, shape: Geometry, offset_m: Floats) -> Floats:
+    """Stretched length of every wire, ``(w, n)``: its lines, and what lies beyond the exit point."""
+    return np.asarray(robot.lines[:, None] * shape.distance_m + offset_m)
+
+
+def unbalance_and_stiffness(
+    robot: Robot, shape: Geometry, rotation: Floats, tension_N: Floats, slope_N_m: Floats
+) -> tuple[Floats, list[list[Floats]]]:
+    """Gradient and Hessian of the potential energy by a small motion.
+
+    Parameters
+    ----------
+    robot : Robot
+    shape : Geometry
+    rotation : (3, 3, n) array
+    tension_N, slope_N_m : (w, n) arrays
+        Tension and its slope by the stretched length.
+
+    Returns
+    -------
+    gradient : (6 or 3, n) array
+        Minus the net wrench.
+    hessian : nested list of (n,) arrays
+        Stiffness matrix, its rotational block symmetrised (which it is by itself at an equilibrium); upper triangle
+        filled in both halves.
+    """
+    J = jacobian(robot, shape)
+    m = robot.lines[:, None]
+    pull = tension_N * m
+    beta = pull / shape.distance_m
+    alpha = slope_N_m * (m * m) - beta
+    degrees = robot.degrees
+    gradient = (J * pull).sum(1) - weight(robot, rotation)
+    scaled = J * alpha
+    H: list[list[Floats]] = [[np.empty(0)] * degrees for _ in range(degrees)]
+    for i in range(degrees):
+        for j in range(i, degrees):
+            H[i][j] = (scaled[i] * J[j]).sum(0)
+    total = beta.sum(0)
+    for i in range(3):
+        H[i][i] = H[i][i] + total
+    if degrees == 6:
+        _add_rotation(robot, shape, rotation, pull, beta, H)
+    for i in range(degrees):
+        for j in range(i):
+            H[i][j] = H[j][i]
+    return gradient, H
+
+
+def _add_rotation(
+    robot: Robot, shape: Geometry, rotation: Floats, pull: Floats, beta: Floats, H: list[list[Floats]]
+) -> None:
+    """Second-order terms of a rotation: swinging wires, turning lever arms, the turning weight."""
+    r, u = shape.arm_m, shape.direction
+    s = [(beta * r[k]).sum(0) for k in range(3)]
+    # -Σβ[r]×, the coupling of displacement and rotation
+    H[0][4], H[0][5] = H[0][4] + s[2], H[0][5] - s[1]
+    H[1][3], H[1][5] = H[1][3] - s[2], H[1][5] + s[0]
+    H[2][3], H[2][4] = H[2][3] + s[1], H[2][4] - s[0]
+    force = robot.mass_kg * GRAVITY
+    c = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
+    f = (0.0, 0.0, -force)
+    q = pull * u - beta * r  # Σ τ u rᵀ - β r rᵀ in one outer product
+    trace = sum((q[k] * r[k]).sum(0) for k in range(3)) - c[2] * f[2]
+    for i in range(3):
+        for j in range(i, 3):
+            swing = 0.5 * (q[i] * r[j] + q[j] * r[i]).sum(0)
+            gravity = 0.5 * (f[i] * c[j] + f[j] * c[i])
+            H[3 + i][3 + j] = H[3 + i][3 + j] + swing - gravity - (trace if i == j else 0.0)
+
+
+def stiffness(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> Floats:
+    """Stiffness matrices ``(n, 6, 6)`` (or 3 × 3) at poses: N/m, N and N m, about the reference point."""
+    shape = geometry(robot, position_m, rotation)
+    tau, slope = tension(wires, stretched(robot, shape, offset_m), zero_m)
+    _, H = unbalance_and_stiffness(robot, shape, rotation, tau, slope)
+    return np.stack([np.stack(row, -1) for row in H], -2)
+
+
+def potential(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> Floats:
+    """Potential energy of wires and weight, ``(n,)`` J; its minima are the stable equilibria."""
+    shape = geometry(robot, position_m, rotation)
+    elastic = energy(wires, stretched(robot, shape, offset_m), zero_m).sum(0)
+    height = position_m[2]
+    if robot.degrees == 6:
+        height = height + np.einsum("jn,j->n", rotation[2], robot.centre_of_mass_m)
+    return np.asarray(elastic + robot.mass_kg * GRAVITY * height)

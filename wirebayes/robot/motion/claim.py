@@ -1,0 +1,165 @@
+"""The paper's section 4 over a workspace: how far a vertical platform moves and tilts within a minute."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import drift, inverse
+from wirebayes.robot.motion.creep import HoldCreep, fresh
+
+Floats = NDArray[np.float64]
+TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
+
+
+@dataclass(frozen=True)
+class WorkspaceDrift:
+    """Drift at one time, everywhere in a workspace.
+
+    Attributes
+    ----------
+    position_m : (p, 3) array
+        Poses asked for, the normal vertical; those that no tensions hold are left out.
+    distance_m, tilt_rad : (p, n) arrays
+        Displacement of the reference point; angle between normal and vertical.
+    tension_N : (p, w) array
+        When the hold begins.
+    feasible : float
+        Share of the grid's points that tensions within the bounds hold.
+    found : float
+        Share of the forward problems that were solved.
+    """
+
+    position_m: Floats
+    distance_m: Floats
+    tilt_rad: Floats
+    tension_N: Floats
+    feasible: float
+    found: float
+
+    @property
+    def median_distance_m(self) -> Floats:
+        """(p,) median over the draws that hold the platform; NaN where none does."""
+        return _median(self.distance_m)
+
+    @property
+    def median_tilt_rad(self) -> Floats:
+        """(p,) median over the draws that hold the platform; NaN where none does."""
+        return _median(self.tilt_rad)
+
+    def holds(self, distance_m: float = DISTANCE_M, tilt_rad: float = TILT_RAD) -> Floats:
+        """(p,) probability, at every point, that both limits are kept."""
+        return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
+
+
+def _median(values: Floats) -> Floats:
+    held = [row[np.isfinite(row)] for row in values]
+    return np.array([np.median(row) if row.size else np.nan for row in held])
+
+
+def grid(robot: Robot, points: tuple[int, int, int]) -> Floats:
+    """Regular grid over the robot's workspace box, (p, 3) m; one layer where the box is flat."""
+    axes = [
+        np.linspace(low, high, count) if count > 1 and high > low else np.array([0.5 * (low + high)])
+        for low, high, count in zip(robot.lower_m, robot.upper_m, points, strict=True)
+    ]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+
+
+def over_workspace(
+    robot: Robot, wires: Wires, position_m: Floats, time_s: float = TIME_S, loaded_s: float = 0.0
+) -> WorkspaceDrift:
+    """Drift of a vertical platform after a time, at every position and draw in one batch.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    position_m : (p, 3) array
+    time_s : float
+    loaded_s : float
+        How long the wires carried the same tensions before they were commanded, exactly, to the pose; 0: new wires.
+
+    Returns
+    -------
+    WorkspaceDrift
+    """
+    upright = np.broadcast_to(np.eye(3), (len(position_m), 3, 3))
+    tau = inverse.tensions(robot, position_m, upright)
+    good = np.isfinite(tau).all(1)
+    if not good.any():
+        empty = np.empty((0, 1))
+        return WorkspaceDrift(np.empty((0, 3)), empty, empty, np.empty((0, robot.legs)), 0.0, 0.0)
+    x, tau = position_m[good], tau[good]
+    n, p = max(v.shape[-1] for v in wires.theta.values()), len(x)
+    # Draws vary fastest; every (position, draw) is one row of the batch.
+    many = replace(wires, theta={k: np.tile(np.broadcast_to(v, (len(v), n)), p) for k, v in wires.theta.items()})
+    where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
+    R = np.broadcast_to(np.eye(3), (n * p, 3, 3))
+    state = fresh(robot.legs, n * p)
+    if loaded_s > 0:
+        state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
+    told = inverse.commands(robot, many, where, R, pull, state.strain(many))
+    held = drift.stably(robot, many, told, where, R)
+    course = drift.hold(robot, many, np.where(held[:, None], told.joint_m, np.nan), np.array([time_s]), where, R, state)
+    shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
+    tilt = turning.tilt(course.rotation[:, 0])  # commanded level: against the vertical and the command alike
+    return WorkspaceDrift(
+        x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
+    )
+
+
+def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
+    """The same robot at another size and mass; tension bounds follow the mass."""
+    lengths = ("exit_m", "platform_m", "centre_of_mass_m", "beyond_m", "wire_m", "home_m", "lower_m", "upper_m")
+    rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
+                   highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip
+    return replace(robot, mass_kg=mass_kg, rule=rule, **{name: getattr(robot, name) * factor for name in lengths})
+
+
+def summary(out: WorkspaceDrift) -> dict[str, float]:
+    """The claim in numbers: quantiles over workspace and draws, and how probable it is, somewhere and everywhere."""
+    inside = (out.distance_m < DISTANCE_M) & (out.tilt_rad < TILT_RAD)
+    numbers: dict[str, float] = {}
+    for name, unit, value in (("drift", "mm", 1e3 * out.distance_m), ("tilt", "deg", np.degrees(out.tilt_rad))):
+        held = value[np.isfinite(value)]
+        low, middle, high = np.quantile(held, [0.05, 0.5, 0.95]) if held.size else [np.nan] * 3
+        numbers |= {f"q05_{name}_{unit}": low, f"q50_{name}_{unit}": middle, f"q95_{name}_{unit}": high}
+    return {key: float(value) for key, value in numbers.items()} | {
+        "probability": float(inside.mean()),
+        "probability_everywhere": float(inside.all(0).mean()),
+        "lowest_tension_N": float(out.tension_N.min()),
+        "highest_tension_N": float(out.tension_N.max()),
+        "feasible": out.feasible,
+        "solved": out.found,
+    }
+
+
+def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.05, steps: int = 9) -> float:
+    """Largest platform mass, kg, for which the claim holds with 95 % at nineteen poses of twenty, by bisection.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    size : float
+        Factor on every length of the robot.
+    spread : float
+        From specimen to specimen.
+    steps : int
+        Halvings of the range from 1 g to 20 kg on a logarithmic scale.
+    """
+    low, high = 1e-3, 20.0
+    for _ in range(steps):
+        mass = float(np.sqrt(low * high))
+        other = scaled(robot, size, mass)
+        wires = for_robot(other, line, spread, np.random.default_rng(1))
+        out = over_workspace(other, wires, grid(other, (3, 3, 2)))
+        good = np.mean(out.holds() >= 0.95) >= 0.95
+        low, high = (mass, high) if good else (low, mass)
+    return low

@@ -1,0 +1,145 @@
+"""Acting on creep: commands that foresee it, the error that is left, and how long a calibration lasts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import drift, inverse
+from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
+from wirebayes.robot.motion.drift import without_creep
+
+Floats = NDArray[np.float64]
+Schedule = Callable[[float], Floats]
+
+
+def known(wires: Wires) -> Wires:
+    """One wire without creep, the mean of every other parameter: what statics is told of uncertain wires."""
+    plain = without_creep(wires)
+    return replace(plain, theta={k: v.mean(axis=-1, keepdims=True) for k, v in plain.theta.items()})
+
+
+def hooke_only(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
+    """Commands of a controller that knows the mean stiffness and nothing of creep."""
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    joint = inverse.commands(robot, known(told), position_m[None], rotation[None], tau).joint_m
+    return lambda time_s: joint
+
+
+def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
+    """Commands that take off, at every time, the creep expected under the tensions wanted there.
+
+    The expectation is over the draws of `told`: parameters of creep are too entangled for their means to mean a wire.
+    """
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    draws = max(v.shape[-1] for v in told.theta.values())
+    ahead = HoldCreep(told, fresh(robot.legs, draws), np.repeat(tau.T, draws, 1), "start")
+    plain = known(told)
+
+    def joint(time_s: float) -> Floats:
+        strain = ahead.advance(time_s, tau.T).strain(told).mean(1, keepdims=True)
+        return inverse.commands(robot, plain, position_m[None], rotation[None], tau, strain).joint_m
+
+    return joint
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """How far the platform is from where it was told to be.
+
+    Attributes
+    ----------
+    times_s : (t,) array
+    distance_m : (n, t) array
+    angle_rad : (n, t) array
+    found : (n,) bool array
+    """
+
+    times_s: Floats
+    distance_m: Floats
+    angle_rad: Floats
+    found: NDArray[np.bool_]
+
+    def probability(self, tolerance_m: float, tolerance_rad: float = np.inf) -> Floats:
+        """(t,) share of draws within both tolerances; a draw without equilibrium is never within."""
+        inside = (self.distance_m < tolerance_m) & (self.angle_rad < tolerance_rad) & self.found[:, None]
+        return np.asarray(inside.mean(0))
+
+
+def error(
+    robot: Robot, wires: Wires, schedule: Schedule, position_m: Floats, rotation: Floats, times_s: Floats
+) -> PoseError:
+    """Pose error over time of uncertain wires under one controller's commands.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws: what the wires may really be.
+    schedule : function
+        From `hooke_only` or `creep_aware`.
+    position_m, rotation : (3,), (3, 3) arrays
+        The pose asked for.
+    times_s : (t,) array
+    """
+    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation)
+    shift, angle = drift.moved(course, position_m, rotation)
+    return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found)
+
+
+def longest_interval(
+    errors: PoseError, tolerance_m: float, tolerance_rad: float = np.inf, probability: float = 0.95
+) -> float:
+    """Longest time up to which the pose is within tolerance with a probability, at every time before, s.
+
+    Zero when not even the first time is; infinite when the last time still is.
+    """
+    good = errors.probability(tolerance_m, tolerance_rad) >= probability
+    if good.all():
+        return float("inf")
+    first = int(np.argmin(good))
+    return float(errors.times_s[first - 1]) if first else 0.0
+
+
+def after_calibration(
+    robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats, times_s: Floats
+) -> tuple[PoseError, PoseError]:
+    """Error that grows from a perfect calibration on, after a load history: held still, and with creep foreseen.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    carried : CreepState
+        Creep of the load history; the command at the calibration restarts the wires' clocks.
+    position_m, rotation : (3,), (3, 3) arrays
+    times_s : (t,) array
+        Since the calibration.
+
+    Returns
+    -------
+    still, foreseen : PoseError
+        `foreseen`: the controller takes off the creep expected over the draws, given the same history.
+    """
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    draws = max(v.shape[-1] for v in wires.theta.values())
+    load = np.repeat(tau.T, draws, 1)
+    before = carried.strain(wires)
+    joint = inverse.commands(robot, wires, position_m[None], rotation[None], tau, before).joint_m
+    ahead = HoldCreep(wires, carried, load, "start")
+
+    def expected(time_s: float) -> Floats:
+        # every robot starts exact; what is foreseen is the mean growth since then
+        growth = (ahead.advance(time_s, load).strain(wires) - before).mean(1, keepdims=True)
+        return inverse.commands(robot, wires, position_m[None], rotation[None], tau, before + growth).joint_m
+
+    out = []
+    for schedule in (lambda time_s: joint, expected):
+        course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried)
+        shift, angle = drift.moved(course, position_m, rotation)
+        out.append(PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found))
+    return out[0], out[1]

@@ -1,0 +1,334 @@
+"""Drift: what becomes of a pose while the wires creep under their own, changing tension."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward, inverse, path
+from wirebayes.robot.motion.creep import CreepState, Follow, HoldCreep, fresh
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Poses of ``n`` draws at ``t`` times of one hold.
+
+    Attributes
+    ----------
+    times_s : (t,) array
+    position_m : (n, t, 3) array
+    rotation : (n, t, 3, 3) array
+    tension_N : (n, t, w) array
+    status : (n, t) int array
+        As in `forward.Equilibria`.
+    end : CreepState
+        What the wires carry out of the last time.
+    falls : Falls or None
+    """
+
+    times_s: Floats
+    position_m: Floats
+    rotation: Floats
+    tension_N: Floats
+    status: NDArray[np.int64]
+    end: CreepState
+    falls: "Falls | None" = None
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """(n,) True where every time has a stable equilibrium."""
+        return np.asarray((self.status == forward.FOUND).all(1))
+
+
+@dataclass(frozen=True)
+class Falls:
+    """When the platform leaves the equilibrium it was sent to, and how near it came to that.
+
+    Attributes
+    ----------
+    time_s : (n,) array
+        Of the fall; infinite where there is none.
+    wire : (n,) int array
+        The wire that had lost the largest share of its tension before the fall; -1 without a fall.
+    drop_m : (n,) array
+        Distance to the pose that catches the platform; infinite where none does, 0 without a fall.
+    slack_s : (n, w) array
+        When each wire first went slack; infinite where it did not, 0 where it was slack from the start.
+    tension_share : (n, w) array
+        Lowest tension of each wire up to the end (or the fall), by its first; NaN where that was zero.
+    stiffness_share : (n,) array
+        Stiffness against the softest motion at the end (or at the fall), by that at the start.
+    """
+
+    time_s: Floats
+    wire: NDArray[np.int64]
+    drop_m: Floats
+    slack_s: Floats
+    tension_share: Floats
+    stiffness_share: Floats
+
+    @property
+    def fell(self) -> NDArray[np.bool_]:
+        """(n,) True where the platform falls."""
+        return np.isfinite(self.time_s)
+
+
+_TOLERANCE = 2e-4  # of the creep so far, a step: the drift is then right to .2 % even where wires go slack
+_FIRST = 0.02  # first step tried, in creep's own clock k2 t^N
+
+
+def hold(
+    robot: Robot,
+    wires: Wires,
+    joint_m: Floats | Callable[[float], Floats],
+    times_s: Floats,
+    start_m: Floats,
+    start_rotation: Floats,
+    carried: CreepState | None = None,
+    follow: Follow = "current",
+    tolerance: float = _TOLERANCE,
+) -> Course:
+    """Hold the actuators still, or let them follow a slow schedule, while the wires creep.
+
+    The equilibrium is followed through time. Steps are as long as their error allows, so that no time's answer depends
+    on later ones; draws whose platform falls have no pose from then on.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    joint_m : (n, w) or (w,) array, or function of time returning one
+        Joint values; a drum's is the zero-tension length before creep. A schedule's corrections are taken to be too
+        small and slow to restart the wires' clocks.
+    times_s : (t,) array
+        Rising times since the command; the wires' clocks start with it.
+    start_m, start_rotation : (3,) or (n, 3); (3, 3) or (n, 3, 3) arrays
+        Where the first forward solution starts from.
+    carried : CreepState, optional
+        Creep from earlier holds; default: wires never loaded.
+    follow : {"current", "start"}
+        Whether the creep still to come follows the tension or is fixed when the hold begins.
+    tolerance : float
+        Error allowed in a step, of the creep so far. A tenth of the draws may err ten times as much where a wire goes
+        slack, which each does but once.
+
+    Returns
+    -------
+    Course
+    """
+    times = np.asarray(times_s, float)
+    walk = _Walk(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
+    n, legs = walk.n, robot.legs
+    position, rotation = np.empty((n, len(times), 3)), np.empty((n, len(times), 3, 3))
+    tension, status = np.empty((n, len(times), legs)), np.empty((n, len(times)), np.int64)
+    for k, time in enumerate(times):
+        walk.to(float(time))
+        lost = ~walk.live
+        for out, value in ((position, walk.here.position_m), (rotation, walk.here.rotation)):
+            out[:, k] = value
+            out[lost, k] = np.nan
+        tension[:, k], status[:, k] = walk.here.tension_N, walk.here.status
+        tension[lost, k] = np.nan
+    return Course(times, position, rotation, tension, status, walk.creep.state(), walk.falls())
+
+
+class _Walk:
+    """One hold on its way: creep's state, the pose of every draw, and which draws still have one."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        wires: Wires,
+        joint_m: Floats | Callable[[float], Floats],
+        start: tuple[Floats, Floats],
+        carried: CreepState | None,
+        follow: Follow,
+        tolerance: float,
+    ) -> None:
+        self.robot, self.wires, self.joint, self.tolerance = robot, wires, joint_m, tolerance
+        self.n = max(v.shape[-1] for v in wires.theta.values())
+        state = carried or fresh(robot.legs, self.n)
+        self.lengths = self._lengths(0.0, state)
+        self.here = forward.solve(robot, wires, *self.lengths, *start)
+        self.live = self.here.found
+        self.creep = HoldCreep(wires, state, self.here.tension_N.T, follow)
+        self.power = float(np.median(wires.theta["N"]))  # steps are laid in t^power, in which creep starts straight
+        self.step = _FIRST / max(float(np.max(self.creep.k2)), 1e-300)
+        self.slope: Floats | None = None  # of the amount by creep's clock, and the length of the step it comes from
+        self.before: Floats = np.zeros(1)
+        self.fall_s, self.drop_m = np.full(self.n, np.inf), np.zeros(self.n)
+        self.first_N = self.here.tension_N.copy()
+        self.lowest_N = self.first_N.copy()
+        self.slack_s = np.where(self.first_N > 0, np.inf, 0.0)
+        self.stiff = self._stiffness()
+        self.left = np.full(self.n, np.nan)  # of the stiffness, at the last pose before a fall
+
+    def _lengths(self, time_s: float, state: CreepState) -> tuple[Floats, Floats]:
+        joint = self.joint(time_s) if callable(self.joint) else self.joint
+        bare, offset = inverse.lengths(self.robot, np.broadcast_to(joint, (self.n, self.robot.legs)))
+        return bare * (1.0 + state.strain(self.wires).T), np.broadcast_to(offset, bare.shape)
+
+    def to(self, stop_s: float) -> None:
+        """Go on to a time, by steps of bounded error."""
+        while self.creep.time_s < stop_s:
+            clock, end = self.creep.time_s**self.power, stop_s**self.power
+            whole = clock + self.step >= end * (1 - 1e-12)
+            time = stop_s if whole else (clock + self.step) ** (1 / self.power)
+            error = self._try(time)
+            factor = min(max(0.8 * (self.tolerance / max(error, 1e-300)) ** (1 / 3), 0.2), 3.0)
+            length = min(self.step, end - clock)
+            refused = error > self.tolerance and length > 1e-9 * end
+            if refused or not whole or factor < 1:
+                self.step = factor * length
+            else:  # cut short by the time that was asked for: no reason to go on so cautiously
+                self.step = max(self.step, factor * length)
+
+    def _try(self, time: float) -> float:
+        """One step by prediction and correction; taken unless its error, which is returned, is too large."""
+        creep, now = self.creep, self.creep.time_s
+        done = np.maximum(creep.progress(time), 1e-300)
+        guess = creep.toward(time, np.zeros(1) if self.slope is None else self.slope)
+        there = self._follow(guess, time)
+        first = creep.toward(time, np.zeros(1), creep.amount_at(there.here.tension_N.T))
+        if self.slope is None:
+            # Nothing to extrapolate from yet: correct twice, the change says how good the first correction was.
+            here = self._settle(first, time, there.here)
+            last = creep.toward(time, np.zeros(1), creep.amount_at(here.tension_N.T))
+            off = np.abs(last.grown - first.grown)
+        else:
+            # Errors of prediction and correction are in a known ratio; the part of the corrected is taken off.
+            share = 1.0 / (3.0 * (1.0 + self.before / done))
+            last, off = first, np.abs(first.grown - guess.grown) * share
+            last.grown = first.grown - (first.grown - guess.grown) * share
+        alive = self.live & there.here.found
+        size = np.broadcast_to(np.abs(last.grown), (self.robot.legs, self.n)).max(0)
+        error = (np.broadcast_to(off, (self.robot.legs, self.n)).max(0) / np.maximum(size, 1e-300))[alive]
+        worst = float(max(np.quantile(error, 0.9), 0.1 * error.max())) if error.size else 0.0
+        if worst > self.tolerance and time**self.power - now**self.power > 1e-9 * time**self.power:
+            return worst
+        here = self._settle(last, time, there.here)
+        fell = self.live & ~(there.here.found & here.found)
+        self._note(fell, there, here, (now, time))
+        if creep.follow == "current":
+            last.amount = np.where(self.live, creep.amount_at(here.tension_N.T), creep.amount)
+            self.slope, self.before = (last.amount - creep.amount) / done, done
+        self.creep, self.here = last, here
+        self.lengths = self._lengths(time, last.state())
+        return worst
+
+    def _follow(self, creep: HoldCreep, time_s: float) -> path.Followed:
+        rows = np.flatnonzero(self.live)
+        new = self._lengths(time_s, creep.state())
+        part = [(a[rows], b[rows]) for a, b in (self.lengths, new, (self.here.position_m, self.here.rotation))]
+        found = path.follow(self.robot, self.wires.part(rows), part[2], part[0], part[1])
+        if len(rows) == self.n:
+            return found
+        whole = path.Followed(forward.spread(found.here, rows, self.n), np.ones(self.n), np.zeros(self.n))
+        whole.share[rows], whole.drop_m[rows] = found.share, found.drop_m
+        return whole
+
+    def _settle(self, creep: HoldCreep, time_s: float, near: forward.Equilibria) -> forward.Equilibria:
+        """The pose at corrected lengths, hardly away from one that was followed."""
+        zero, offset = self._lengths(time_s, creep.state())
+        zero = np.where(near.found[:, None], zero, np.nan)
+        return path.settle(self.robot, self.wires, (near.position_m, near.rotation), (zero, offset))
+
+    def _note(self, fell: NDArray[np.bool_], there: path.Followed, here: forward.Equilibria,
+              span_s: tuple[float, float]) -> None:  # fmt: skip
+        """Write down falls and slack wires of a step."""
+        a, b = (t**self.power for t in span_s)
+        share = np.where(there.share < 1, there.share, 1.0)
+        self.fall_s[fell] = ((a + share * (b - a)) ** (1 / self.power))[fell]
+        self.drop_m[fell] = np.where(there.drop_m > 0, there.drop_m, np.inf)[fell]
+        tau = np.where(fell[:, None], there.here.tension_N, here.tension_N)
+        moving = self.live[:, None] & np.isfinite(tau)
+        before = self.here.tension_N
+        newly = moving & (tau <= 0) & np.isinf(self.slack_s) & ~fell[:, None]
+        self.slack_s = np.where(newly & (before > 0), span_s[1], self.slack_s)
+        # A wire that has all but lost its tension when the platform falls is the one that goes slack.
+        slackens = fell[:, None] & np.isinf(self.slack_s) & (tau < 1e-3 * self.first_N)
+        self.slack_s = np.where(slackens, self.fall_s[:, None], self.slack_s)
+        self.lowest_N = np.where(moving, np.minimum(self.lowest_N, tau), self.lowest_N)
+        if fell.any():
+            held = there.here.position_m, there.here.rotation
+            self.left = np.where(fell, self._stiffness(held), self.left)
+        self.live = self.live & ~fell
+        here.status[fell] = np.where(there.here.found, forward.FELL, there.here.status)[fell]
+        lost = ~self.live & ~fell
+        here.status[lost] = self.here.status[lost]
+
+    def _stiffness(self, pose: tuple[Floats, Floats] | None = None) -> Floats:
+        pose = pose or (self.here.position_m, self.here.rotation)
+        return path.lowest_stiffness(self.robot, self.wires, pose, self.lengths)
+
+    def falls(self) -> Falls:
+        """What was written down on the way."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.where(self.first_N > 0, self.lowest_N / self.first_N, np.nan)
+            stiff = np.where(self.live, self._stiffness(), self.left) / self.stiff
+        lowest = np.argmin(np.where(np.isfinite(share), share, np.inf), axis=1)
+        wire = np.where(np.isfinite(self.fall_s), lowest, -1)
+        return Falls(self.fall_s, wire, self.drop_m, self.slack_s, share, stiff)
+
+
+def from_command(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, times_s: Floats, follow: Follow = "current"
+) -> Course:
+    """Drift from a pose that every draw takes exactly when the hold begins (its own inverse kinematics).
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    position_m : (3,) array
+    rotation : (3, 3) array
+    times_s : (t,) array
+
+    Returns
+    -------
+    Course
+        NaN poses when no tensions hold the pose, or not stably (status `forward.NOT_HELD`).
+    """
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    told = inverse.commands(robot, wires, position_m[None], rotation[None], tau)
+    stable = stably(robot, wires, told, position_m, rotation)
+    joint = np.where(stable[:, None], told.joint_m, np.nan)
+    course = hold(robot, wires, joint, times_s, position_m, rotation, follow=follow)
+    course.status[told.feasible & ~stable] = forward.NOT_HELD
+    return course
+
+
+def stably(
+    robot: Robot, wires: Wires, told: inverse.Commands, position_m: Floats, rotation: Floats
+) -> NDArray[np.bool_]:
+    """(n,) whether commands hold their own poses, ``(3,)`` or ``(n, 3)``, stably: not every balance is stable."""
+    n = len(told.zero_m)
+    pose = np.broadcast_to(position_m, (n, 3)), np.broadcast_to(rotation, (n, 3, 3))
+    zero = np.where(told.feasible[:, None], told.zero_m, 1.0)
+    return told.feasible & (path.lowest_stiffness(robot, wires, pose, (zero, told.offset_m)) > 0)
+
+
+def moved(course: Course, origin_m: Floats, origin_rotation: Floats) -> tuple[Floats, Floats]:
+    """Displacement ``(n, t, 3)``, m, and rotation angle ``(n, t)``, rad, from an origin (of all draws or of each)."""
+    x0 = np.broadcast_to(origin_m, (len(course.position_m), 3))[:, None]
+    R0 = np.broadcast_to(origin_rotation, (len(course.position_m), 3, 3))[:, None]
+    turn = course.rotation @ np.swapaxes(R0, -1, -2)
+    # The antisymmetric part keeps small angles exact where the trace would lose half the digits.
+    axis = 0.5 * np.stack(
+        [turn[..., 2, 1] - turn[..., 1, 2], turn[..., 0, 2] - turn[..., 2, 0], turn[..., 1, 0] - turn[..., 0, 1]], -1
+    )
+    cosine = 0.5 * (np.trace(turn, axis1=-2, axis2=-1) - 1.0)
+    return course.position_m - x0, np.arctan2(np.linalg.norm(axis, axis=-1), cosine)
+
+
+def without_creep(wires: Wires) -> Wires:
+    """The same wires under Hooke's law alone."""
+    theta = dict(wires.theta) | {"B": np.zeros_like(wires.theta["B"])}
+    kept = tuple(e for e in wires.effects if e.place == "strain")
+    return replace(wires, theta=theta, effects=kept)

@@ -1,0 +1,328 @@
+"""Forward kinematics: zero-tension lengths and joint values to the pose of equilibrium, many at once.
+
+An equilibrium is a minimum of the potential energy of weight and wires, slack wires storing none. Newton's method on
+that energy, damped where the Hessian is not positive definite or the energy would rise, finds it from any start.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics import cholesky, statics
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.wires import Wires, energy, tension
+
+Floats = NDArray[np.float64]
+FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
+STATUS = {
+    FOUND: "stable equilibrium",
+    NOT_CONVERGED: "not converged",
+    NO_EQUILIBRIUM: "no equilibrium: the wires cannot carry the platform",
+    NOT_HELD: "in balance, but free to move or about to fall: no isolated stable pose",
+    FELL: "fell: the equilibrium that was followed lost its stability",
+}
+_CHUNK, _QUICK = 2048, 7
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """Solutions of ``n`` forward problems.
+
+    Attributes
+    ----------
+    position_m : (n, 3) array
+    rotation : (n, 3, 3) array
+    tension_N : (n, w) array
+        Zero for slack wires.
+    status : (n,) int array
+        `FOUND`, `NOT_CONVERGED`, `NO_EQUILIBRIUM` or `NOT_HELD`; poses mean something where found only. `FELL` is set
+        by those who follow an equilibrium (`path`), never here.
+    iterations : (n,) int array
+    residual_N : (n,) array
+        Largest force left over (moments divided by the platform's size).
+    """
+
+    position_m: Floats
+    rotation: Floats
+    tension_N: Floats
+    status: NDArray[np.int64]
+    iterations: NDArray[np.int64]
+    residual_N: Floats
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """(n,) True where a stable equilibrium was found."""
+        return np.asarray(self.status == FOUND)
+
+
+def solve(
+    robot: Robot,
+    wires: Wires,
+    zero_m: Floats,
+    offset_m: Floats,
+    start_m: Floats,
+    start_rotation: Floats,
+    max_iterations: int = 200,
+) -> Equilibria:
+    """Find the equilibrium reached downhill from each start.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    zero_m : (n, w) array
+        Zero-tension length of every wire, creep included. Rows with NaN are not solved.
+    offset_m : (n, w) or (w,) array
+        Stretched length that is not between exit and platform point: wire beyond the exit point, and ``r q``.
+    start_m : (n, 3) or (3,) array
+    start_rotation : (n, 3, 3) or (3, 3) array
+
+    Returns
+    -------
+    Equilibria
+    """
+    n = len(zero_m)
+    finite = [np.isfinite(zero_m), np.isfinite(np.broadcast_to(offset_m, zero_m.shape))]
+    finite.append(np.isfinite(np.broadcast_to(start_m, (n, 3))))
+    sane = np.flatnonzero(np.logical_and.reduce([f.all(1) for f in finite]))
+    if len(sane) < n:
+        offsets = np.broadcast_to(offset_m, zero_m.shape)[sane]
+        x, R = np.broadcast_to(start_m, (n, 3))[sane], np.broadcast_to(start_rotation, (n, 3, 3))[sane]
+        return spread(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
+    if not n:
+        return spread(None, sane, 0, robot.legs)
+    # Counted from the middle of the exit points, so that nothing depends on where the robot's origin is.
+    middle = robot.exit_m.mean(0)
+    robot = replace(robot, exit_m=robot.exit_m - middle)
+    position = np.array(np.broadcast_to(start_m, (n, 3)).T) - middle[:, None]
+    rotation = np.array(np.moveaxis(np.broadcast_to(start_rotation, (n, 3, 3)), 0, -1))
+    zero = np.ascontiguousarray(zero_m.T)
+    offset = np.ascontiguousarray(np.broadcast_to(offset_m, zero_m.shape).T)
+    quick = min(_QUICK, max_iterations)
+    at, turn, tau, status, count, left = _in_chunks(robot, wires, zero, offset, position, rotation, quick)
+    slow = np.flatnonzero(status == NOT_CONVERGED)
+    if slow.size and max_iterations > quick:
+        # The few slow cases of all chunks go on together: small arrays waste the machine.
+        part = wires.part(slow), zero[:, slow], offset[:, slow], at[:, slow], turn[..., slow]
+        rest = _in_chunks(robot, *part, max_iterations - quick)
+        at[:, slow], turn[..., slow], tau[:, slow], status[slow], left[slow] = *rest[:4], rest[5]
+        count[slow] += rest[4]
+    return Equilibria(at.T + middle, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
+
+
+def spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
+    """Solutions put back among rows that could not be tried."""
+    if found is not None:
+        legs = found.tension_N.shape[1]
+    whole = Equilibria(
+        np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, legs), np.nan),
+        np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf),
+    )  # fmt: skip
+    if found is not None:
+        for field in fields(Equilibria):
+            getattr(whole, field.name)[rows] = getattr(found, field.name)
+    return whole
+
+
+def _in_chunks(
+    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+) -> list[NDArray[Any]]:
+    parts = []
+    for first in range(0, zero.shape[1], _CHUNK):
+        cut = slice(first, first + _CHUNK)
+        part = wires.part(cut), zero[:, cut], offset[:, cut], x[:, cut], R[..., cut]
+        parts.append(_solve(robot, *part, max_iterations))
+    return [np.concatenate(arrays, -1) for arrays in zip(*parts, strict=True)]
+
+
+def _solve(
+    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+) -> tuple[NDArray[Any], ...]:
+    """One chunk; solved cases leave the batch as they finish."""
+    n, d, size = zero.shape[1], robot.degrees, robot.size_m
+    scale = np.ones((d, 1))
+    scale[3:] = 1.0 / size  # rotations are stepped in metres at the platform's edge
+    span = robot.span_m + zero.max(0)
+    reach = 10.0 * span
+    out_x, out_R, out_tau = np.array(x), np.array(R), np.zeros_like(zero)
+    status, count, left = np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf)
+    live = np.arange(n)
+    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, n))
+    # Below this no computed force can be trusted: S/ℓ - 1 is known to one rounding error.
+    # Moments are divided by the platform's size; points far from the reference point make more of the same error.
+    arm = max(1.0, np.abs(robot.platform_m).max() / size) if d == 6 else 1.0
+    floor = 32 * np.finfo(float).eps * arm * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
+    # The stiffness if every wire were taut: a measure of damping that exists also when all are slack.
+    level = np.sum(k1 * robot.lines[:, None] ** 2 / zero, axis=0)
+    damping = np.zeros(n)
+    at = _evaluate(robot, wires, zero, offset, x, R, scale)
+    for iteration in range(1, max_iterations + 1):
+        damped = [row[:] for row in at.H]
+        for i in range(d):
+            damped[i][i] = at.H[i][i] + damping * level
+        step, positive = cholesky.solve(damped, -at.gradient)
+        np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
+        length = np.sqrt((step * step).sum(0))
+        # A step across the room is no Newton step; it is cut, the direction kept.
+        cut = np.minimum(1.0, 0.25 * reach / np.maximum(length, 1e-300))
+        step *= cut
+        new_x = x + step[:3] * scale[:3]
+        new_R = turning.compose(step[3:] * scale[3:], R) if d == 6 else R
+        new = _evaluate(robot, wires, zero, offset, new_x, new_R, scale)
+        downhill = (at.gradient * step).sum(0)
+        noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * span)
+        accept = positive & (new.energy <= at.energy + 1e-4 * downhill + noise)
+        accept |= positive & (damping == 0) & (new.size < 0.5 * at.size) & (length < 1e-3 * size)
+        # Uphill or indefinite: shorter, more cautious steps; as predicted: back towards pure Newton.
+        predicted = 0.5 * (damping * level * length * length - downhill)
+        foretold = at.energy - new.energy > 0.5 * predicted - noise
+        calmer = np.where(foretold, np.where(damping < 2e-5, 0.0, damping / 100), damping)
+        tried, damping = damping, np.where(accept, calmer, np.maximum(1e-3, damping * 10))
+        x, R = np.where(accept, new_x, x), np.where(accept, new_R, R)
+        at = at.where(accept, new)
+        balanced = at.size <= floor
+        done = positive & (tried == 0) & (balanced | (accept & (length < 1e-9 * size)))
+        loose = balanced & ~positive & (tried == 0)
+        damping = np.where(balanced, 0.0, damping)  # so that the next step asks the bare stiffness
+        lost = np.abs(x).max(0) > reach
+        stuck = damping > 1e12
+        finished = done | lost | stuck | loose
+        count[live] = iteration
+        if finished.any():
+            gone = live[finished]
+            out_x[:, gone], out_R[..., gone], out_tau[:, gone] = x[:, finished], R[..., finished], at.tau[:, finished]
+            kinds = np.select([lost, done, loose], [NO_EQUILIBRIUM, FOUND, NOT_HELD], NOT_CONVERGED)
+            status[gone] = kinds[finished]
+            left[gone] = at.size[finished]
+            keep = np.flatnonzero(~finished)
+            live, damping, floor, level = live[keep], damping[keep], floor[keep], level[keep]
+            reach, span = reach[keep], span[keep]
+            x, R, zero, offset = x[:, keep], R[..., keep], zero[:, keep], offset[:, keep]
+            wires, at = wires.part(keep), at.part(keep)
+        if not live.size:
+            break
+    if live.size:
+        out_x[:, live], out_R[..., live], out_tau[:, live], left[live] = x, R, at.tau, at.size
+    return out_x, out_R, out_tau, status, count, left
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Energy, gradient and Hessian at a batch of poses, rotations scaled to metres."""
+
+    energy: Floats
+    gradient: Floats
+    H: list[list[Floats]]
+    tau: Floats
+    size: Floats
+
+    def where(self, accept: NDArray[np.bool_], other: "_Point") -> "_Point":
+        if accept.all():
+            return other
+        H = [[np.where(accept, b, a) for a, b in zip(r, s, strict=True)] for r, s in zip(self.H, other.H, strict=True)]
+        pick = [np.where(accept, b, a) for a, b in
+                ((self.energy, other.energy), (self.gradient, other.gradient), (self.tau, other.tau),
+                 (self.size, other.size))]  # fmt: skip
+        return _Point(pick[0], pick[1], H, pick[2], pick[3])
+
+    def part(self, keep: NDArray[np.intp]) -> "_Point":
+        H = [[a[keep] for a in row] for row in self.H]
+        return _Point(self.energy[keep], self.gradient[:, keep], H, self.tau[:, keep], self.size[keep])
+
+
+def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Point:
+    shape = statics.geometry(robot, x, R)
+    S = statics.stretched(robot, shape, offset)
+    tau, slope = tension(wires, S, zero)
+    gradient, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
+    height = x[2]
+    if robot.degrees == 6:
+        c = robot.centre_of_mass_m
+        height = height + (R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
+        s = float(scale[3, 0])
+        for i in range(6):
+            for j in range(max(i, 3), 6):
+                H[i][j] = H[i][j] * (s if i < 3 else s * s)
+    total = energy(wires, S, zero).sum(0) + robot.mass_kg * GRAVITY * height
+    gradient = gradient * scale
+    return _Point(total, gradient, H, tau, np.abs(gradient).max(0))
+
+
+def balance_at(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> tuple[Floats, list[list[Floats]]]:
+    """Gradient ``(6 or 3, n)`` and Hessian of the energy at poses ``(n, ...)``, rotations in metres at the edge."""
+    scale = np.ones((robot.degrees, 1))
+    scale[3:] = 1.0 / robot.size_m
+    offset = np.broadcast_to(offset_m, zero_m.shape).T
+    at = _evaluate(robot, wires, zero_m.T, offset, position_m.T, np.moveaxis(rotation, 0, -1), scale)
+    return at.gradient, at.H
+
+
+def tensions_at(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> Floats:
+    """Tensions ``(n, w)`` that lengths give at poses ``(n, ...)``, in balance or not."""
+    shape = statics.geometry(robot, position_m.T, np.moveaxis(rotation, 0, -1))
+    return tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)[0].T
+
+
+def equilibria(
+    robot: Robot,
+    wires: Wires,
+    zero_m: Floats,
+    offset_m: Floats,
+    rng: np.random.Generator,
+    starts: int = 64,
+    known: tuple[Floats, Floats] | None = None,
+) -> Equilibria:
+    """Every stable equilibrium that many random starts find for one set of lengths.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        Of one draw (``n`` = 1).
+    zero_m, offset_m : (w,) arrays
+    rng : numpy Generator
+    starts : int
+        Starting poses: anywhere below and among the exit points, any orientation.
+    known : (3,), (3, 3) arrays, optional
+        A pose to start from too: the commanded one, say, which few random starts may reach.
+
+    Returns
+    -------
+    Equilibria
+        Distinct ones, the lowest energy first.
+    """
+    low, high = robot.exit_m.min(0), robot.exit_m.max(0)
+    low = low - np.array([0.0, 0.0, 0.5 * zero_m.max()])
+    begin = rng.uniform(low, high, (starts, 3))
+    turn = np.eye(3) if robot.degrees == 3 else turning.matrix(rng.normal(0.0, 1.2, (starts, 3)))
+    turn = np.broadcast_to(turn, (starts, 3, 3))
+    if known is not None:
+        begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
+    tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
+    found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
+    good = np.flatnonzero(found.found)
+    near_m = 1e-6 * robot.span_m  # poses nearer than this, rotations at the platform's edge, are one
+    height = statics.potential(
+        robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]
+    )
+    kept: list[int] = []
+    for i in good[np.argsort(height[good], kind="stable")]:
+        apart = [
+            max(np.abs(found.position_m[i] - found.position_m[k]).max(),
+                robot.size_m * np.abs(found.rotation[i] - found.rotation[k]).max())
+            for k in kept
+        ]  # fmt: skip
+        if all(a > near_m for a in apart):
+            kept.append(int(i))
+    pick = np.array(kept, int)
+    return Equilibria(
+        found.position_m[pick], found.rotation[pick], found.tension_N[pick], found.status[pick],
+        found.iterations[pick], found.residual_N[pick],
+    )  # fmt: skip

@@ -1,0 +1,160 @@
+"""Following an equilibrium while lengths change: where a stable pose goes, and where it stops to exist.
+
+A solver finds some equilibrium of the new lengths; the platform stays on the one that continues its own. A step is
+believed when it ends where the stiffness at its start says it will; otherwise it is divided until it does, or until a
+jump is left that no division removes: there the platform falls.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics import cholesky, statics
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward
+
+Floats = NDArray[np.float64]
+_SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
+_TRUST = 0.5  # a step that ends further from its prediction, relative to its length, is divided
+_SMALL = 1e-7  # of the platform's size: so short a Newton step leaves only rounding
+_JUMP = 1e-7  # of the robot's span: the smallest jump that counts as one
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Where ``n`` equilibria went.
+
+    Attributes
+    ----------
+    here : Equilibria
+        At the new lengths; of those that fell the last pose before, with the status `forward.FELL`.
+    share : (n,) array
+        Share of the change up to which each could be followed; 1 where to the end.
+    drop_m : (n,) array
+        How far the platform falls, to the equilibrium that catches it; infinite where none does, 0 without a fall.
+    """
+
+    here: forward.Equilibria
+    share: Floats
+    drop_m: Floats
+
+
+def follow(
+    robot: Robot,
+    wires: Wires,
+    start: tuple[Floats, Floats],
+    old: tuple[Floats, Floats],
+    new: tuple[Floats, Floats],
+) -> Followed:
+    """Follow equilibria from old lengths to new ones, in a straight line.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    start : (n, 3), (n, 3, 3) arrays
+        Stable poses at the old lengths.
+    old, new : pairs of (n, w) arrays
+        Zero-tension lengths and offsets, as in `forward.solve`.
+
+    Returns
+    -------
+    Followed
+    """
+    n = len(start[0])
+    x, R = (np.array(v) for v in start)
+    whole, good = _step(robot, wires, (x, R), new)  # most need no division: all at once
+    share, drop = np.where(good, 1.0, 0.0), np.zeros(n)
+    step = np.full(n, 0.5)
+    hesitant = np.zeros(n, bool)
+    tau = forward.tensions_at(robot, wires, x, R, *old)
+    for name, before in (("position_m", x), ("rotation", R), ("tension_N", tau)):
+        getattr(whole, name)[~good] = before[~good]
+    live = np.flatnonzero(~good & np.isfinite(whole.position_m).all(1))
+    while live.size:
+        to = np.minimum(share[live] + step[live], 1.0)
+        between = [a[live] + to[:, None] * (b[live] - a[live]) for a, b in zip(old, new, strict=True)]
+        part, at = wires.part(live), (whole.position_m[live], whole.rotation[live])
+        there, held = _step(robot, part, at, (between[0], between[1]))
+        rows = live[held]
+        for name in ("position_m", "rotation", "tension_N", "status", "residual_N"):
+            getattr(whole, name)[rows] = getattr(there, name)[held]
+        share[rows] = to[held]
+        # After a division one step of the same length: what was hard a moment ago is still near.
+        step[rows] *= np.where(hesitant[rows], 1.0, 2.0)
+        hesitant[live] = ~held
+        step[live[~held]] *= 0.5
+        fell = ~held & (step[live] < _SMALLEST)
+        gone = live[fell]
+        whole.status[gone] = np.where(there.status[fell] == forward.NOT_CONVERGED, forward.NOT_CONVERGED, forward.FELL)
+        distance = np.linalg.norm(there.position_m - at[0], axis=1)[fell]
+        drop[gone] = np.where(there.found[fell], distance, np.inf)
+        live = live[~fell & (share[live] < 1.0)]
+    return Followed(whole, share, drop)
+
+
+def _step(
+    robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
+) -> tuple[forward.Equilibria, NDArray[np.bool_]]:
+    """Solutions from starts, and whether each is where one Newton step says that it is."""
+    ahead = newton_step(robot, wires, start, lengths)
+    predicted = moved(robot, start, ahead)
+    there = forward.solve(robot, wires, *lengths, *predicted)
+    turn = there.rotation @ np.swapaxes(predicted[1], -1, -2) - np.eye(3)
+    off = np.maximum(
+        np.linalg.norm(there.position_m - predicted[0], axis=1), robot.size_m * np.linalg.norm(turn, axis=(1, 2))
+    )
+    near = off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
+    return there, np.asarray(there.found & near)
+
+
+def settle(
+    robot: Robot, wires: Wires, near: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
+) -> forward.Equilibria:
+    """Solutions hardly away from poses: one Newton step is exact enough for most, the others are solved in full."""
+    step = newton_step(robot, wires, near, lengths)
+    x, R = moved(robot, near, step)
+    n = len(x)
+    tau = forward.tensions_at(robot, wires, x, R, *lengths)
+    out = forward.Equilibria(x, R, tau, np.full(n, forward.FOUND), np.ones(n, np.int64), np.zeros(n))
+    # the error left is of the order of the step's square over a wire's length
+    far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < _SMALL * robot.size_m))
+    if far.size:
+        rest = forward.solve(robot, wires.part(far), lengths[0][far], lengths[1][far], near[0][far], near[1][far])
+        for field in fields(forward.Equilibria):
+            getattr(out, field.name)[far] = getattr(rest, field.name)
+    return out
+
+
+def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
+    """Poses ``(n, ...)`` after steps ``(n, 6 or 3)``, turns in metres at the platform's edge; NaN steps change none."""
+    step = np.where(np.isfinite(step), step, 0.0)
+    x = pose[0] + step[:, :3]
+    if robot.degrees == 3:
+        return x, pose[1]
+    turn = turning.compose(step[:, 3:].T / robot.size_m, np.moveaxis(pose[1], 0, -1))
+    return x, np.moveaxis(turn, -1, 0)
+
+
+def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
+    """Where one Newton step leads, ``(n, 6 or 3)`` m: displacement, then turn times the platform's size.
+
+    NaN where the stiffness there is not positive definite.
+    """
+    gradient, H = forward.balance_at(robot, wires, *start, *lengths)
+    step, positive = cholesky.solve(H, -gradient)
+    return np.where(positive, step, np.nan).T
+
+
+def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
+    """Smallest eigenvalue of the stiffness matrix, rotations weighed at the platform's edge, ``(n,)`` N/m."""
+    turn = np.moveaxis(pose[1], 0, -1)
+    K = statics.stiffness(robot, wires, pose[0].T, turn, lengths[0].T, np.broadcast_to(lengths[1], lengths[0].shape).T)
+    scale = np.ones(robot.degrees)
+    scale[3:] = 1.0 / robot.size_m
+    K = np.where(np.isfinite(K), K, 0.0) * np.outer(scale, scale)
+    return np.where(np.isfinite(pose[0]).all(1), np.linalg.eigvalsh(K)[:, 0], np.nan)

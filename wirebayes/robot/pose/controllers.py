@@ -1,0 +1,100 @@
+"""Pose error under controllers told different things of the wires, and how long a calibration lasts, as numbers."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics import draws
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.motion import control, inverse
+from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.pose.request import Question, band
+
+Floats = NDArray[np.float64]
+HISTORIES_S = (0.0, 3600.0)  # under load before the calibration: new wires, and an hour
+_SINCE_S = np.concatenate([[0.0], np.geomspace(1.0, 1e5, 41)])
+_DRAWS = 300
+
+
+def errors(
+    robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator, other: WireDraws | None = None
+) -> list[dict[str, Any]]:
+    """Pose error under controllers told the posterior, and how long each stays within tolerance.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+        What the wires may really be.
+    asked : Question
+    rng : numpy Generator
+    other : WireDraws, optional
+        Another fit of the same line (the plain model beside one with effects), told to a third controller.
+    """
+    told = draws.for_robot(robot, line)
+    schedules = {
+        "hooke_only": control.hooke_only(robot, told, asked.position_m, asked.rotation),
+        "creep_aware": control.creep_aware(robot, told, asked.position_m, asked.rotation),
+    }
+    if other is not None:
+        less = draws.for_robot(robot, other)
+        schedules["creep_aware_told_otherwise"] = control.creep_aware(robot, less, asked.position_m, asked.rotation)
+    out = []
+    for spread in asked.spreads:
+        wires = draws.for_robot(robot, line, spread, rng)
+        for name, schedule in schedules.items():
+            error = control.error(robot, wires, schedule, asked.position_m, asked.rotation, asked.times_s)
+            out.append({
+                "specimen_spread": spread,
+                "controller": name,
+                "times_s": error.times_s,
+                "solved": float(error.found.mean()),
+                "distance_mm": band(1e3 * error.distance_m[error.found]),
+                "rotation_deg": band(np.degrees(error.angle_rad[error.found])),
+                **_tolerances(asked),
+                **_lasts(error, asked),
+            })  # fmt: skip
+    return out
+
+
+def between_calibrations(
+    robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator
+) -> list[dict[str, Any]]:
+    """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
+
+    The pose is exact when the calibration ends; before it the wires carried the same tensions for a time.
+    """
+    x, R = asked.position_m, asked.rotation
+    line = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
+    load = np.repeat(inverse.tensions(robot, x[None], R[None]).T, line.count, 1)
+    out: list[dict[str, Any]] = []
+    for spread in asked.spreads:
+        wires = draws.for_robot(robot, line, spread, rng)
+        for loaded_s in HISTORIES_S:
+            state = fresh(robot.legs, line.count)
+            if loaded_s:
+                state = HoldCreep(wires, state, load).advance(loaded_s, load)
+            for name, error in zip(
+                ("held_still", "creep_aware"),
+                control.after_calibration(robot, wires, state, x, R, _SINCE_S),
+                strict=True,
+            ):
+                row: dict[str, Any] = {"specimen_spread": spread, "loaded_before_s": loaded_s, "controller": name}
+                row["solved"] = float(error.found.mean())
+                out.append(row | _tolerances(asked) | _lasts(error, asked))
+    return out
+
+
+def _tolerances(asked: Question) -> dict[str, float]:
+    return {"tolerance_mm": 1e3 * asked.tolerance_m, "tolerance_deg": float(np.degrees(asked.tolerance_rad))}
+
+
+def _lasts(error: control.PoseError, asked: Question) -> dict[str, Any]:
+    within = control.longest_interval(error, asked.tolerance_m, asked.tolerance_rad)
+    at_end = not np.isfinite(within)
+    return {
+        "longest_time_within_s": float(error.times_s[-1]) if at_end else within,
+        "still_within_at_the_end": at_end,
+    }

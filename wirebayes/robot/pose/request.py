@@ -1,0 +1,53 @@
+"""What is asked of a robot and a line, and how draws become a band."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
+
+Floats = NDArray[np.float64]
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked.
+
+    Attributes
+    ----------
+    position_m : (3,) array
+    rotation : (3, 3) array
+    times_s : (t,) array
+        Rising, the first zero.
+    tolerance_m, tolerance_rad : float
+        Of the pose, for the longest time between calibrations.
+    specimen_spread : float
+        Relative, of stiffness, creep amount and rate from wire to wire; answers are given for it and for wires alike.
+    seed : int
+    """
+
+    position_m: Floats
+    rotation: Floats
+    times_s: Floats
+    tolerance_m: float = DISTANCE_M
+    tolerance_rad: float = TILT_RAD
+    specimen_spread: float = 0.05
+    seed: int = 0
+
+    @property
+    def spreads(self) -> tuple[float, float]:
+        """Wires alike, and wires that differ."""
+        return 0.0, self.specimen_spread
+
+
+def band(values: Floats) -> dict[str, Any]:
+    """Mean, sd and quantiles over the first axis (the draws); NaN draws are left out."""
+    good = values[np.isfinite(values).all(axis=tuple(range(1, values.ndim)))]
+    if not len(good):
+        return dict.fromkeys(("mean", "sd", *QUANTILES), None)
+    quantiles = np.quantile(good, list(QUANTILES.values()), axis=0)
+    named = dict(zip(QUANTILES, quantiles, strict=True))
+    return {"mean": good.mean(0), "sd": good.std(0)} | named

@@ -1,0 +1,103 @@
+"""What to say of falls: how probable, when, by which wire, and how near a platform that holds comes to one."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.motion.drift import Course, Falls
+from wirebayes.robot.pose.request import band
+
+Floats = NDArray[np.float64]
+NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these
+
+
+def summary(course: Course) -> dict[str, Any]:
+    """Falls, slack wires and margins over the draws whose hold began in a stable pose.
+
+    Probabilities are shares of the draws that began; wires are numbered from 1 in the order of the robot's legs.
+    """
+    falls = course.falls
+    began = np.isfinite(falls.stiffness_share) if falls is not None else np.zeros(0, bool)
+    if falls is None or not began.any():
+        return {"began": 0.0}
+    fell, slack = falls.fell[began], np.isfinite(falls.slack_s[began])
+    drop = falls.drop_m[began][fell]
+    lowest = np.nanmin(np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[began], axis=1)
+    return {
+        "began": float(began.mean()),
+        "fall_probability": float(fell.mean()),
+        "fall_probability_at": (falls.time_s[began][:, None] <= course.times_s).mean(0),
+        "fall_time_s": _spread(falls.time_s[began][fell]),
+        "fall_wires": _by_wire(falls.wire[began][fell], course.tension_N.shape[-1], len(fell)),
+        "fall_distance_mm": _spread(1e3 * drop[np.isfinite(drop)]),
+        "caught_probability": float(np.isfinite(drop).mean()) if fell.any() else None,
+        "slack_probability": slack.mean(0),
+        "slack_time_s": [_spread(t[s]) for t, s in zip(falls.slack_s[began].T, slack.T, strict=True)],
+        "least_tension_wire": int(_nearest(falls, began)) + 1,
+        "least_tension_share": band(lowest),
+        "stiffness_share": band(falls.stiffness_share[began]),
+    }
+
+
+def _spread(values: Floats) -> dict[str, float] | None:
+    if not len(values):
+        return None
+    return {"first": float(values.min()), "median": float(np.median(values)), "last": float(values.max())}
+
+
+def _by_wire(wires: NDArray[np.int64], legs: int, draws: int) -> Floats:
+    return np.bincount(wires, minlength=legs) / draws
+
+
+def _nearest(falls: Falls, began: NDArray[np.bool_]) -> int:
+    """The wire that comes nearest to slackness in most draws."""
+    share = np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[began]
+    return int(np.bincount(share.argmin(1), minlength=share.shape[1]).argmax())
+
+
+def warnings(course: Course, spread: float, stable: bool = True) -> list[str]:
+    """One sentence for each way in which the platform may lose its hold, the worst first.
+
+    Parameters
+    ----------
+    course : Course
+    spread : float
+        The specimen spread it was computed for, to be named.
+    stable : bool
+        Whether the commanded pose is a stable equilibrium at all.
+    """
+    told, out = summary(course), []
+    who = f"specimens differing by {100 * spread:g} %" if spread else "specimens alike"
+    last = course.times_s[-1]
+    if told["began"] < 1:
+        reason = "the pose is balanced but not stable" if not stable else "no stable equilibrium is found there"
+        out.append(f"{_percent(1 - told['began'])} of the draws cannot begin at the pose ({who}): {reason}")
+    if not told["began"]:
+        return out
+    if told["fall_probability"]:
+        times, drop = told["fall_time_s"], told["fall_distance_mm"]
+        wire = int(np.argmax(told["fall_wires"])) + 1
+        fall = f"; it drops {drop['median']:.3g} mm" if drop else "; nothing catches it nearby"
+        out.append(
+            f"the platform falls in {_percent(told['fall_probability'])} of the draws within {last:g} s ({who}), first "
+            f"after {times['first']:.3g} s, in the median after {times['median']:.3g} s, wire {wire} giving way{fall}"
+        )
+    slack = [
+        f"wire {i + 1} in {_percent(p)} of the draws, first after {t['first']:.3g} s"
+        for i, (p, t) in enumerate(zip(told["slack_probability"], told["slack_time_s"], strict=True))
+        if t is not None
+    ]
+    if slack:
+        out.append(f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}")
+    elif (told["least_tension_share"]["q05"] or 0.0) < NEAR_SLACK:
+        left = _percent(float(told["least_tension_share"]["q05"] or 0.0))
+        out.append(f"wire {told['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})")
+    if told["stiffness_share"]["q05"] < NEAR_LOOSE:
+        left = _percent(max(float(told["stiffness_share"]["q05"]), 0.0))
+        out.append(f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})")
+    return out
+
+
+def _percent(share: float) -> str:
+    return "nearly all" if 0.995 <= share < 1 else f"{100 * share:.3g} %"

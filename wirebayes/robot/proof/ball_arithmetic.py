@@ -1,0 +1,200 @@
+"""Forces and moments on a platform in ball arithmetic by FLINT (extra ``certificate``), for proofs.
+
+A pose is a displacement and Cayley's three numbers of a turn from the pose in question, all in metres at the platform's
+edge. Where a wire may go slack its slope is the hull of both sides: the mean value theorem holds, and so do proofs.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.wire.laws import ElasticLaw
+
+Floats = NDArray[np.float64]
+Bounds = tuple[Floats, Floats]  # lower and upper, (w,) each
+
+
+class Strand(NamedTuple):
+    """A wire over a box of poses: stretched length, its slope by the pose, and the wrench of 1 N of tension."""
+
+    length: Any
+    slope: list[Any]
+    wrench: list[Any]
+
+
+class Balance:
+    """Forces and moments (divided by the platform's size) and their slopes, in ball arithmetic."""
+
+    def __init__(
+        self, robot: Robot, law: ElasticLaw, k1: Bounds, zero: Bounds, offset: Floats, x: Floats, R: Floats
+    ) -> None:
+        import flint
+
+        self.robot, self.law, self.arb = robot, law, flint.arb
+        self.k1 = [self._hull(*pair) for pair in zip(*k1, strict=True)]
+        self.zero = [self._hull(*pair) for pair in zip(*zero, strict=True)]
+        self.offset = [flint.arb(float(v)) for v in offset]
+        self.x = [flint.arb(float(v)) for v in x]
+        # The turn starts from the given matrix as it is; that it is orthogonal only to rounding is part of the robot.
+        self.R = flint.arb_mat(R.tolist())
+        self.size = flint.arb(robot.size_m)
+
+    def _hull(self, low: float, high: float) -> Any:
+        return self.arb(float(low)).union(self.arb(float(high)))
+
+    def middle_slope(self) -> Floats:
+        """Slope at the centre with the middle parameters, as numbers."""
+        _, slope = self.evaluate([self.arb(0)] * self.robot.degrees)
+        d = self.robot.degrees
+        return np.array([[float(slope[i, j].mid()) for j in range(d)] for i in range(d)])
+
+    def evaluate(self, y: list[Any], pulls: list[tuple[Any, Any]] | None = None) -> tuple[list[Any], Any]:
+        """Balance (d,) and slope (d, d) over a box `y` of displacements and turns, both in metres.
+
+        `pulls`: tension and slope of every wire, where they are known more narrowly than the box tells.
+        """
+        from flint import arb_mat
+
+        arb, robot = self.arb, self.robot
+        d = robot.degrees
+        turn, by_turn = self._turn(y[3:]) if d == 6 else (self.R, None)
+        weight = [arb(0), arb(0), -arb(robot.mass_kg) * arb(GRAVITY)]
+        force = list(weight)
+        c = _times(turn, robot.centre_of_mass_m, arb)
+        moment = _cross(c, weight)
+        slope = arb_mat(d, d)
+        if d == 6:
+            slope += _block(arb_mat(3, 3), None, _skew(weight, arb) * _skew(c, arb) * by_turn, self.size)
+        for i in range(robot.legs):
+            r, line = self._line(i, y, turn)
+            length = _square(line).sqrt()
+            m = arb(float(robot.lines[i]))
+            S = m * length + self.offset[i]
+            tau, stiff = pulls[i] if pulls else self.pull(i, self.strain(i, S), S)
+            u = [a / length for a in line]
+            pull = [-m * tau * a for a in u]
+            swing = tau / length
+            along = stiff * m - swing
+            rows = [[-m * (along * a * b + (swing if a is b else 0)) for b in u] for a in u]
+            A = arb_mat(rows)
+            force = [p + q for p, q in zip(force, pull, strict=True)]
+            if d == 3:
+                slope += A
+                continue
+            moment = [p + q for p, q in zip(moment, _cross(r, pull), strict=True)]
+            by_arm = -(_skew(r, arb) * by_turn)
+            lever = _skew(r, arb)
+            slope += _block(A, A * by_arm, lever * A * by_arm - _skew(pull, arb) * by_arm, self.size, lever * A)
+        return (force if d == 3 else force + [v / self.size for v in moment]), slope
+
+    def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
+        """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
+        from flint import arb_mat
+
+        arb, robot = self.arb, self.robot
+        still = [arb(0)] * robot.degrees
+        weight = [arb(0), arb(0), -arb(robot.mass_kg) * arb(GRAVITY)]
+        arm = _cross(_times(self.R, robot.centre_of_mass_m, arb), weight)
+        moment = [v / self.size for v in arm][: robot.degrees - 3]
+        pulls = []
+        for i in range(robot.legs):
+            strand = self.strand(i, still)
+            tau, _ = self.pull(i, self.strain(i, strand.length), strand.length)
+            pulls.append((arb_mat([[v] for v in strand.wrench]), tau))
+        return arb_mat([[v] for v in [*weight, *moment]]), pulls
+
+    def strand(self, i: int, y: list[Any]) -> "Strand":
+        """One wire's geometry over a box of poses."""
+        robot, m = self.robot, self.arb(float(self.robot.lines[i]))
+        turn, by_turn = self._turn(y[3:]) if robot.degrees == 6 else (self.R, None)
+        r, line = self._line(i, y, turn)
+        length = _square(line).sqrt()
+        u = [m * a / length for a in line]
+        if by_turn is None:
+            return Strand(m * length + self.offset[i], u, [-a for a in u])
+        # u . (s x r) = s . (r x u): the stretch by a turn is the moment
+        moment = _cross(r, u)
+        slope = [sum((moment[k] * by_turn[k, j] for k in range(3)), self.arb(0)) for j in range(3)]
+        return Strand(m * length + self.offset[i], [*u, *slope], [-a for a in u] + [-v / self.size for v in moment])
+
+    def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
+        """Platform point from the reference point, and from the exit point."""
+        r = _times(turn, self.robot.platform_m[i], self.arb)
+        return r, [self.x[k] + y[k] + r[k] - self.arb(float(self.robot.exit_m[i, k])) for k in range(3)]
+
+    def strain(self, i: int, S: Any) -> Any:
+        """Strain at a stretched length, eq (1) or (3)."""
+        return S / self.zero[i] - 1 if self.law == "hooke" else 1 - self.zero[i] / S
+
+    def strain_slopes(self, i: int, S: Any) -> tuple[Any, Any]:
+        """Strain by the stretched and by the zero-tension length."""
+        zero = self.zero[i]
+        return (1 / zero, -S / (zero * zero)) if self.law == "hooke" else (zero / (S * S), -1 / S)
+
+    def pull(self, i: int, strain: Any, S: Any) -> tuple[Any, Any]:
+        """Tension and its slope by S; the hull of taut and slack where both are possible."""
+        slope = self.k1[i] * self.strain_slopes(i, S)[0]
+        if strain > 0:
+            return self.k1[i] * strain, slope
+        if strain < 0:
+            return self.arb(0), self.arb(0)
+        return self.k1[i] * strain.max(self.arb(0)), slope.union(self.arb(0))
+
+    def by_wire(self, i: int, S: Any, strain: Any) -> tuple[Any, Any]:
+        """Tension by stiffness and by zero-tension length, slackness minded as in `pull`."""
+        by_zero = self.k1[i] * self.strain_slopes(i, S)[1]
+        if strain > 0:
+            return strain, by_zero
+        if strain < 0:
+            return self.arb(0), self.arb(0)
+        return strain.max(self.arb(0)), by_zero.union(self.arb(0))
+
+    def _turn(self, y: list[Any]) -> tuple[Any, Any]:
+        """Rotation by Cayley's numbers s = y / (2 size), and the turn's slope by y."""
+        from flint import arb_mat
+
+        arb = self.arb
+        s = [v / (2 * self.size) for v in y]
+        norm = 1 + _square(s)
+        K = _skew(s, arb)
+        eye = arb_mat([[int(i == j) for j in range(3)] for i in range(3)])
+        by = (eye + K) * (1 / (norm * self.size))
+        return (eye + (K + K * K) * (2 / norm)) * self.R, by
+
+
+def _times(matrix: Any, vector: Floats, arb: Any) -> list[Any]:
+    return [sum((matrix[i, j] * arb(float(vector[j])) for j in range(3)), arb(0)) for i in range(3)]
+
+
+def _square(v: list[Any]) -> Any:
+    # not v**2: the power of a ball that holds zero is taken by logarithms and lost
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+
+
+def _cross(a: list[Any], b: list[Any]) -> list[Any]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _skew(v: list[Any], arb: Any) -> Any:
+    from flint import arb_mat
+
+    z = arb(0)
+    return arb_mat([[z, -v[2], v[1]], [v[2], z, -v[0]], [-v[1], v[0], z]])
+
+
+def _block(corner: Any, right: Any, below_right: Any, size: Any, below: Any = None) -> Any:
+    """Six by six from three by three blocks, the lower rows divided by the platform's size."""
+    from flint import arb_mat
+
+    out = arb_mat(6, 6)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = corner[i, j]
+            out[i + 3, j + 3] = below_right[i, j] / size
+            if right is not None:
+                out[i, j + 3] = right[i, j]
+            if below is not None:
+                out[i + 3, j] = below[i, j] / size
+    return out

@@ -1,0 +1,151 @@
+"""What interval arithmetic proves of a robot at a pose: one equilibrium, and a box that holds it for all wires."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import control, forward, inverse
+from wirebayes.robot.motion.drift import Course
+from wirebayes.robot.proof.certificate import certify
+from wirebayes.robot.proof.reach import Reach, apart, reach
+from wirebayes.wire.laws import ElasticLaw
+
+Floats = NDArray[np.float64]
+_Pose = tuple[Floats, Floats, Floats]  # position, rotation, and how exactly they are known
+_STEP = 0.1  # how far, of the whole creep, wires may be out of step
+SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of the bands, the largest that can be proved
+
+
+def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> dict[str, Any]:
+    """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed."""
+    if wires.at("strain"):
+        return {"proved": None, "sentence": "Proofs know laws (1), (3) and (6) without further effects."}
+    mean = control.known(wires)
+    k1 = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    here = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
+    lengths = here.zero_m[0], here.zero_m[0]
+    try:
+        proof = certify(robot, wires.law, (k1, k1), lengths, here.offset_m[0], position_m, rotation)
+    except ImportError:
+        return {"proved": None, "sentence": "python-flint is not installed (extra: certificate)."}
+    return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}
+
+
+def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rotation: Floats) -> dict[str, Any]:
+    """Where the platform surely is at the last time while every wire's stiffness and creep lie in their 90 % bands.
+
+    Each wire may lie anywhere in the bands on its own: a box that holds more than the joint posterior does. Commanded
+    are the mean wire's joint values. The whole way from the commanded pose is proved, not its end alone: the
+    equilibrium at the end must be the one that continues the pose. Where the whole band cannot be proved, a share of it
+    about its middle is.
+    """
+    if wires.at("strain"):
+        return {}
+    end_s = course.times_s[-1]
+    nothing = {"band": {"time_s": end_s, "share": 0.0, "low_mm": None, "high_mm": None}}
+    if not course.found.any() or (course.falls is not None and course.falls.fell.any()):
+        return nothing
+    mean = control.known(wires)
+    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    told = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
+    bare, offset = inverse.lengths(robot, told.joint_m[0])
+    strain = np.broadcast_to(course.end.strain(wires), (robot.legs, len(course.found)))[:, course.found]
+    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, len(course.found)))[:, course.found]
+    known = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
+    bands = [(np.quantile(v, 0.05, axis=1), np.quantile(v, 0.95, axis=1)) for v in (k1, strain)]
+    for share in SHARES:
+        stiff, grown = (_middle(low, high, share) for low, high in bands)
+        # the commanded pose itself must be among what is proved
+        stiff = np.minimum(stiff[0], known), np.maximum(stiff[1], known)
+        try:
+            way = _Way(robot, wires.law, stiff, grown, bare, offset)
+            proof = way.proved(position_m, rotation, known)
+        except ImportError:
+            return {}
+        if proof is not None:
+            span = 1e3 * (proof.centre_m - position_m + np.array([-1.0, 1.0])[:, None] * proof.radius_m[:3])
+            return {"band": {"time_s": end_s, "share": share, "low_mm": span[0], "high_mm": span[1]}}
+    return nothing
+
+
+def _middle(low: Floats, high: Floats, share: float) -> tuple[Floats, Floats]:
+    middle, half = 0.5 * (low + high), 0.5 * share * (high - low)
+    return middle - half, middle + half
+
+
+class _Way:
+    """Proofs from the commanded lengths to the crept ones, piece by piece, each joined to the one before.
+
+    In a piece from share a to share b of the creep, every wire's creep is anywhere between a times the least and b
+    times the most that it comes to, and a tenth of the whole beyond: wires of different rates need not keep step.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        law: ElasticLaw,
+        k1_N: tuple[Floats, Floats],
+        strain: tuple[Floats, Floats],
+        bare_m: Floats,
+        offset_m: Floats,
+    ) -> None:
+        self.robot, self.law, self.k1, self.strain = robot, law, k1_N, strain
+        self.bare, self.offset = bare_m, offset_m
+
+    def proved(self, x: Floats, R: Floats, k1_N: Floats) -> Reach | None:
+        """The proof for the end, None where a piece of the way is not proved; from the commanded pose and stiffness."""
+        here, at = self._certain((x, R), k1_N, np.zeros(self.robot.legs)), k1_N
+        if here is None or np.abs(here[0] - x).max() > 1e-6 * self.robot.span_m:  # not held stably
+            return None
+        low, high = self.strain
+        pieces, strain = [(0.0, 1.0)], np.zeros(self.robot.legs)
+        while here is not None and pieces:
+            a, b = pieces.pop()
+            ahead = np.maximum(a * low - _STEP * high, 0.0), np.minimum(b + _STEP, 1.0) * high
+            piece = self._reach(here, at, strain, ahead)
+            if piece is None:
+                if b - a < _STEP:  # what varies now is not the creep: smaller pieces are as wide
+                    return None
+                pieces += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
+                continue
+            at, strain = 0.5 * (self.k1[0] + self.k1[1]), 0.5 * b * (low + high)
+            here = self._certain((here[0], here[1]), at, strain)
+            if here is None or not self._joined(piece, here, at, strain, ahead):
+                return None
+        return None if here is None else self._reach(here, at, strain, self.strain)
+
+    def _certain(self, near: tuple[Floats, Floats], k1_N: Floats, strain: Floats) -> _Pose | None:
+        """A pose proved for known wires, with the width of its proof."""
+        pose = self._solved(near, k1_N, strain)
+        if pose is None:
+            return None
+        zero = self.bare * (1 + strain)
+        proof = certify(self.robot, self.law, (k1_N, k1_N), (zero, zero), self.offset, *pose, how_alone=False)
+        return (*pose, proof.radius_m) if proof.proved else None
+
+    def _solved(self, near: tuple[Floats, Floats], k1_N: Floats, strain: Floats) -> tuple[Floats, Floats] | None:
+        wires = Wires(self.law, "saturating", {"k1": k1_N[:, None]}, np.full((self.robot.legs, 1), 1000.0))
+        found = forward.solve(self.robot, wires, (self.bare * (1 + strain))[None], self.offset, *near)
+        left, _, right = np.linalg.svd(found.rotation[0])
+        return (found.position_m[0], left @ right) if found.found[0] else None
+
+    def _reach(self, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> Reach | None:
+        """A piece's proof about its middle, if the pose here is the equilibrium that it proves."""
+        stiff, grown = (0.5 * (low + high) for low, high in (self.k1, band))
+        middle = self._solved((here[0], here[1]), stiff, grown)
+        if middle is None:
+            return None
+        half = 0.5 * (self.k1[1] - self.k1[0]), 0.5 * self.bare * (band[1] - band[0])
+        proof = reach(self.robot, self.law, stiff, self.bare * (1 + grown), apart(*half), self.offset, *middle)
+        return proof if proof.proved and self._joined(proof, here, k1_N, strain, band) else None
+
+    def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> bool:
+        p = []
+        for value, (low, high) in ((k1_N, self.k1), (strain, band)):
+            half = 0.5 * (high - low)
+            p.append((value - 0.5 * (low + high)) / np.where(half > 0, half, 1.0))
+        return proof.holds(here[0], here[1], np.concatenate(p), self.robot.size_m, here[2])

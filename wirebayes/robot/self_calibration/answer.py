@@ -1,0 +1,99 @@
+"""Everything `calibrate` answers: lengths with intervals, what Hooke alone says, what cannot be seen, what next."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from wirebayes.robot.mechanics import rotation
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion import control, inverse
+from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
+from wirebayes.robot.self_calibration.session import Prior, Session
+
+Floats = NDArray[np.float64]
+CANDIDATES, NEXT = 200, 5
+
+
+def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0) -> dict[str, Any]:
+    """Calibrate one robot and say how far the answer can be trusted.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : Prior
+    session : Session
+    readings : (r,) array
+        Standardised, as `session.Prediction.readings`.
+    seed : int
+
+    Returns
+    -------
+    dict
+        The content of ``calibrate.json``; without a pose and joint values where the search did not converge.
+    """
+    known = calibrate(robot, prior, session, readings[None])
+    plain = calibrate(robot, replace(prior, creeps=False), session, readings[None])
+    content: dict[str, Any] = {
+        "version": 1,
+        "robot": robot.name,
+        "holds": len(session.duration_s),
+        "read": int(session.read.sum()),
+        "prior": {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread},
+        "with_creep_model": _lengths(robot, prior, known),
+        "by_hooke_alone": _lengths(robot, prior, plain),
+    }
+    content["pose_now"] = content["joint_values_for_home_m"] = None
+    if known.converged[0]:  # else nobody should send the robot anywhere by it
+        turn = rotation.vector(known.rotation)[0]
+        content["pose_now"] = {"position_m": known.position_m[0], "rotation_vector_rad": turn}
+        home = rotation.matrix(robot.home_rotation_rad)
+        content["joint_values_for_home_m"] = corrected(robot, prior, known, robot.home_m, home)[0]
+    return content | _observed(robot, prior, session, np.random.default_rng(seed))
+
+
+def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
+    half = float(norm.ppf(0.95)) * known.length_sd_m[0]
+    sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
+    return {
+        "converged": bool(known.converged[0]),
+        "misfit": float(known.misfit[0]),
+        "length_m": {
+            "mean": known.length_m[0],
+            "sd": known.length_sd_m[0],
+            "q05": known.length_m[0] - half,
+            "q95": known.length_m[0] + half,
+        },
+        "creep_strain": known.creep[0],
+        "reference_error_mm": {"mean": 1e3 * known.unknowns[0, : robot.legs], "sd": 1e3 * sd},
+    }
+
+
+def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator) -> dict[str, Any]:
+    """Rank and sentence for the poses that were read; poses worth reading next."""
+    wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
+    wires = control.known(wires)
+    zero, offset = inverse.lengths(robot, session.joint_m[session.read])
+    done = observability.sensitivity(
+        robot, wires, session.position_m[session.read], session.rotation[session.read], zero, offset
+    )[1]
+    seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m)
+    x = rng.uniform(robot.lower_m, robot.upper_m, (CANDIDATES, 3))
+    R = np.broadcast_to(rotation.matrix(robot.home_rotation_rad), (CANDIDATES, 3, 3))
+    tau = inverse.tensions(robot, x, R)
+    good = np.isfinite(tau).all(1)
+    told = inverse.commands(robot, wires, x[good], R[good], tau[good])
+    ahead = observability.sensitivity(robot, wires, x[good], R[good], told.zero_m, told.offset_m)[1]
+    pick = observability.choose_poses(ahead, NEXT, session.tension_sd_N, prior.reference_sd_m)
+    return {
+        "observability": {
+            "rank": seen.rank,
+            "of": robot.legs,
+            "weakest_combination": seen.weakest,
+            "sentence": seen.sentence,
+        },
+        "next_positions_m": x[good][pick],
+    }

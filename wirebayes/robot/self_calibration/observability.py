@@ -1,0 +1,133 @@
+"""What tension readings can say about zero-tension lengths: sensitivities, rank, a sentence, and better poses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.linear_algebra import solve
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires, tension
+
+Floats = NDArray[np.float64]
+
+
+def response(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """How an equilibrium answers when wires pull differently, in closed form.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws, or one.
+    position_m, rotation : (n, 3), (n, 3, 3) arrays
+        Poses of equilibrium.
+    zero_m, offset_m : (n, w) arrays
+
+    Returns
+    -------
+    motion : (n, 6 or 3, w) array
+        Small motion when a wire's law gives 1 N more at the same stretched length: m and rad.
+    change : (n, w, w) array
+        Change of all tensions, that newton included.
+    by_zero : (n, w) array
+        Change of a wire's tension with its zero-tension length at the same stretched length, N/m.
+    """
+    R = np.moveaxis(rotation, 0, -1)
+    shape = statics.geometry(robot, position_m.T, R)
+    S, zero = statics.stretched(robot, shape, offset_m.T), zero_m.T
+    tau, slope = tension(wires, S, zero)
+    _, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
+    K = np.stack([np.stack(row, -1) for row in H], -2)
+    J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0)
+    motion = np.asarray(-solve(K, J), np.float64)
+    change = slope.T[:, :, None] * (np.swapaxes(J, 1, 2) @ motion) + np.eye(robot.legs)
+    # The tension depends on S/ℓ alone under either law, so its slope by ℓ follows from that by S.
+    return motion, np.asarray(change), (-slope * S / zero).T
+
+
+def sensitivity(
+    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
+) -> tuple[Floats, Floats]:
+    """Small motion ``(n, 6 or 3, w)`` and change of the tensions ``(n, w, w)``, N, per metre of zero-tension length."""
+    motion, change, by_zero = response(robot, wires, position_m, rotation, zero_m, offset_m)
+    return motion * by_zero[:, None], change * by_zero[:, None]
+
+
+@dataclass(frozen=True)
+class Observability:
+    """Which combinations of lengths the readings show.
+
+    Attributes
+    ----------
+    rank : int
+        Combinations whose standard error is below a tenth of the prior one.
+    sd_m : (w,) array
+        Standard error of each length given prior and readings.
+    weakest : (w,) array
+        Unit combination that the readings show least.
+    weakest_sd_m : float
+        Its standard error from the readings alone.
+    sentence : str
+    """
+
+    rank: int
+    sd_m: Floats
+    weakest: Floats
+    weakest_sd_m: float
+    sentence: str
+
+
+def observe(change_N: Floats, tension_sd_N: float, prior_sd_m: float) -> Observability:
+    """Observability of the lengths from tensions at several poses.
+
+    Parameters
+    ----------
+    change_N : (p, w, w) array
+        From `sensitivity`, a pose a row.
+    tension_sd_N : float
+    prior_sd_m : float
+    """
+    w = change_N.shape[-1]
+    information = (np.swapaxes(change_N, 1, 2) @ change_N).sum(0) / tension_sd_N**2
+    if not np.isfinite(information).all():
+        said = "What the readings show cannot be computed at these poses: nothing holds the platform there."
+        return Observability(0, np.full(w, prior_sd_m), np.full(w, np.nan), np.inf, said)
+    values, vectors = np.linalg.eigh(information)
+    alone = 1.0 / np.sqrt(np.maximum(values, 1e-300))
+    rank = int((alone < 0.1 * prior_sd_m).sum())
+    sd = np.sqrt(np.diag(np.linalg.inv(information + np.eye(w) / prior_sd_m**2)))
+    weakest = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
+    parts = [f"{weakest[i]:+.2f} of wire {i + 1}" for i in np.argsort(-np.abs(weakest)) if abs(weakest[i]) > 0.2]
+    seen = f"The readings show {rank} of {w} combinations of lengths to a tenth of their prior uncertainty"
+    said = f"{seen}; least of all {', '.join(parts)}, known to {1e3 * min(alone[0], prior_sd_m):.2g} mm."
+    return Observability(rank, sd, weakest, float(alone[0]), said)
+
+
+def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: float) -> list[int]:
+    """Poses that together shrink the lengths' joint uncertainty most, chosen one after another.
+
+    Parameters
+    ----------
+    change_N : (c, w, w) array
+        Sensitivities at candidate poses.
+    count : int
+
+    Returns
+    -------
+    list of int
+        Indices of candidates; a pose may be worth repeating.
+    """
+    pieces = np.swapaxes(change_N, 1, 2) @ change_N / tension_sd_N**2
+    total = np.eye(change_N.shape[-1]) / prior_sd_m**2
+    chosen: list[int] = []
+    if not len(pieces):
+        return chosen
+    for _ in range(count):
+        gain = np.linalg.slogdet(total + pieces)[1]
+        chosen.append(int(np.argmax(gain)))
+        total = total + pieces[chosen[-1]]
+    return chosen

@@ -1,0 +1,191 @@
+"""A calibration session: what the robot did and read, what was known before, and what any unknowns predict.
+
+Unknown are the error of every wire's reference length, the line's parameters, and each specimen's own deviation.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, for_robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.motion.drift import without_creep
+
+Floats = NDArray[np.float64]
+OWN = ("k1", "B", "k2")  # what differs from specimen to specimen
+
+
+@dataclass(frozen=True)
+class Session:
+    """What the robot did, in order, from wires never loaded on.
+
+    Attributes
+    ----------
+    position_m, rotation : (p, 3), (p, 3, 3) arrays
+        Poses asked for. The robot went there in small steps, so it is at the equilibrium next to them.
+    joint_m : (p, w) array
+    duration_s : (p,) array
+    read : (p,) bool array
+        True where tensions were read, at the hold's end.
+    tension_sd_N : float
+    tilt_sd_rad : float or None
+        Error of the two components of the platform's normal, when an inclinometer is on board.
+    """
+
+    position_m: Floats
+    rotation: Floats
+    joint_m: Floats
+    duration_s: Floats
+    read: NDArray[np.bool_]
+    tension_sd_N: float
+    tilt_sd_rad: float | None = None
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known before: the line's posterior, the spread of specimens, the error of the reference lengths.
+
+    Attributes
+    ----------
+    line : WireDraws
+    reference_sd_m : float
+    spread : float
+        Relative, of k1, B and k2 from wire to wire.
+    creeps : bool
+        False: calibration by Hooke's law alone, lengths thought constant.
+    """
+
+    line: WireDraws
+    reference_sd_m: float
+    spread: float = 0.05
+    creeps: bool = True
+
+    @property
+    def names(self) -> list[str]:
+        """The line's parameters among the unknowns."""
+        return [*CORE, *(column for effect in self.line.material() for column in effect.columns())]
+
+    def moments(self, legs: int) -> tuple[Floats, Floats]:
+        """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens."""
+        drawn = self.line.parameters
+        values = np.array([np.log(drawn[k]) if k in CORE else drawn[k] for k in self.names])
+        p, own = len(values), len(OWN) * legs
+        mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own)])
+        cov = np.zeros((len(mean), len(mean)))
+        cov[:legs, :legs] = self.reference_sd_m**2 * np.eye(legs)
+        # A parameter that is given exactly still gets a relative uncertainty, far below anything that matters.
+        cov[legs : legs + p, legs : legs + p] = np.cov(values) if self.line.count > 1 else 0.0
+        cov[legs : legs + p, legs : legs + p] += 1e-12 * np.eye(p)
+        cov[legs + p :, legs + p :] = max(self.spread, 1e-6) ** 2 * np.eye(own)
+        return mean, cov
+
+    def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
+        """Wires, and reference errors ``(n, w)``, of unknowns ``(n, d)``."""
+        n, legs, p = len(unknowns), robot.legs, len(self.names)
+        columns = unknowns[:, legs : legs + p].T
+        values = {k: np.exp(c) if k in CORE else c for k, c in zip(self.names, columns, strict=True)}
+        if LENGTH_EXPONENT in self.line.parameters:
+            values[LENGTH_EXPONENT] = self.line.parameters[LENGTH_EXPONENT].mean(keepdims=True)
+        wires = for_robot(robot, replace(self.line, parameters=values))
+        own = unknowns[:, legs + p :].T.reshape(len(OWN), legs, n)
+        theta = dict(wires.theta) | {
+            name: wires.theta[name] * np.exp(deviation) for name, deviation in zip(OWN, own, strict=True)
+        }
+        whole = replace(wires, theta=theta)
+        return (whole if self.creeps else without_creep(whole)), unknowns[:, :legs]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Readings and state that unknowns lead to, ``n`` rows.
+
+    Attributes
+    ----------
+    readings : (n, r) array
+        Tensions of all read holds, then tilts, in units of their standard errors.
+    length_m, creep : (n, w) arrays
+        Zero-tension lengths at the end, creep included; their creep strain.
+    position_m, rotation : (n, q, 3), (n, q, 3, 3) arrays
+        Pose at every reading.
+    begun_m, begun_rotation : (n, p, 3), (n, p, 3, 3) arrays
+        Pose at the beginning of every hold.
+    read_length_m : (n, q, w) array
+        Zero-tension lengths at every reading.
+    solved : (n,) bool array
+    """
+
+    readings: Floats
+    length_m: Floats
+    creep: Floats
+    position_m: Floats
+    rotation: Floats
+    begun_m: Floats
+    begun_rotation: Floats
+    read_length_m: Floats
+    solved: NDArray[np.bool_]
+
+
+def predict(
+    robot: Robot,
+    prior: Prior,
+    session: Session,
+    unknowns: Floats,
+    longest_step: float = 2.5,
+    near: tuple[Floats, Floats] | None = None,
+) -> Prediction:
+    """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : Prior
+    session : Session
+    unknowns : (n, d) array
+    longest_step : float
+        Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
+    near : (n, p, 3), (n, p, 3, 3) arrays, optional
+        Where the holds are known to begin, about; default: the poses asked for.
+    """
+    wires, error = prior.wires(robot, unknowns)
+    n, legs = len(unknowns), robot.legs
+    state = fresh(legs, n)
+    solved = np.ones(n, bool)
+    tensions, poses, turns, lengths, begun = [], [], [], [], []
+    for k, (joint, duration) in enumerate(zip(session.joint_m, session.duration_s, strict=True)):
+        bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
+        bare = bare + error
+        begin = (session.position_m[k], session.rotation[k]) if near is None else (near[0][:, k], near[1][:, k])
+        here = forward.solve(robot, wires, bare * (1 + state.strain(wires).T), offset, *begin)
+        begun.append(here)
+        creep = HoldCreep(wires, state, here.tension_N.T)
+        for time in _steps(float(duration), longest_step):
+            state = creep.advance(time, here.tension_N.T)
+            here = forward.solve(
+                robot, wires, bare * (1 + state.strain(wires).T), offset, here.position_m, here.rotation
+            )
+        solved &= here.found
+        if session.read[k]:
+            tensions.append(here.tension_N)
+            poses.append(here.position_m)
+            turns.append(here.rotation)
+            lengths.append(bare * (1 + state.strain(wires).T))
+    normals = np.stack(turns, 1)[:, :, :2, 2].reshape(n, -1)
+    readings = np.concatenate(tensions, 1) / session.tension_sd_N
+    if session.tilt_sd_rad is not None:
+        readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
+    strain = np.broadcast_to(state.strain(wires).T, bare.shape)
+    return Prediction(
+        readings, bare * (1 + strain), strain, np.stack(poses, 1), np.stack(turns, 1),
+        np.stack([b.position_m for b in begun], 1), np.stack([b.rotation for b in begun], 1),
+        np.stack(lengths, 1), solved,
+    )  # fmt: skip
+
+
+def _steps(duration_s: float, longest: float) -> Floats:
+    """Times of a hold, geometrically spaced no wider than `longest`, after a first thousandth."""
+    steps = int(np.ceil(np.log(1e3) / longest))
+    return duration_s * 1e-3 ** (1 - np.arange(steps + 1) / steps)

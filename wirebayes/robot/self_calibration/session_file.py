@@ -1,0 +1,105 @@
+"""Reads a calibration session from CSV, strictly: a row a hold, complaints with line and column."""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.self_calibration.session import Session
+
+Floats = NDArray[np.float64]
+POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+NORMAL = ("normal_x", "normal_y")
+
+
+def columns(robot: Robot, tilted: bool) -> list[str]:
+    """The file's header: pose asked for, duration, joint values, tensions at the end, and the normal's components."""
+    legs = range(1, robot.legs + 1)
+    joints, tensions = [f"joint_{i}_m" for i in legs], [f"tension_{i}_N" for i in legs]
+    return ["hold", *POSE, "duration_s", *joints, *tensions, *(NORMAL if tilted else ())]
+
+
+def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> tuple[Session, Floats]:
+    """A session and its standardised readings ``(r,)``.
+
+    A row without tensions is a hold that was not read. With the columns ``normal_x,normal_y`` an inclinometer's
+    readings join in.
+
+    Raises
+    ------
+    InputError
+        Naming line and column, what was found and what was expected.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a UTF-8 text file") from None
+    lines = csv.reader(io.StringIO(text, newline=""))
+    try:
+        numbered = [(lines.line_num, row) for row in lines if row]
+    except csv.Error as error:
+        raise InputError(f"{path}: line {lines.line_num}: not CSV ({error}); expected cells with commas") from None
+    rows = [row for _, row in numbered]
+    tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
+    wanted = columns(robot, tilted)
+    if not rows or rows[0] != wanted:
+        found = ",".join(rows[0])[:200] if rows else "nothing"
+        raise InputError(f"{path}: line 1: found {found}; expected the header {','.join(wanted)}")
+    table = np.array([_row(path, line, row, wanted) for line, row in numbered[1:]]).reshape(-1, len(wanted))
+    if not len(table):
+        raise InputError(f"{path}: no holds; expected at least one row")
+    w = robot.legs
+    joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
+    measured = table[:, 8 + w :]
+    read_here = np.isfinite(measured).all(1)
+    half = ~read_here & np.isfinite(measured).any(1)
+    if half.any():
+        raise InputError(
+            f"{path}: line {numbered[int(np.argmax(half)) + 1][0]}: some readings are empty; expected all or none"
+        )
+    if not read_here.any():
+        raise InputError(f"{path}: no row has tensions; expected at least one")
+    turn = table[:, 4:7] if robot.degrees == 6 else np.tile(robot.home_rotation_rad, (len(table), 1))
+    session = Session(
+        table[:, 1:4], matrix(turn), joint, table[:, 7], read_here, tension_sd_N, tilt_sd_rad if tilted else None
+    )
+    readings = [(tension[read_here] / tension_sd_N).ravel()]
+    if tilted:
+        readings.append((table[read_here][:, -2:] / tilt_sd_rad).ravel())
+    return session, np.concatenate(readings)
+
+
+_LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
+
+
+def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]:
+    if len(row) != len(names):
+        raise InputError(f"{path}: line {line}: found {len(row)} cells; expected {len(names)}")
+    out = []
+    for name, cell in zip(names, row, strict=True):
+        optional = name.startswith(("tension_", "normal_"))
+        if optional and not cell.strip():
+            out.append(np.nan)
+            continue
+        try:
+            value = float(cell)
+        except ValueError:
+            value = np.nan
+        allowed, kind = abs(value) < _LARGEST, "a finite number"
+        if name == "duration_s":
+            allowed, kind = 0 < value < _LARGEST, "a number above 0"
+        elif name.startswith("tension_"):
+            allowed, kind = 0 <= value < _LARGEST, "a finite number of at least 0"
+        elif name in NORMAL:
+            allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
+        if not np.isfinite(value) or not allowed:
+            raise InputError(f"{path}: line {line}, column {name}: found {cell[:60]!r}; expected {kind}")
+        out.append(value)
+    return out

@@ -1,0 +1,265 @@
+"""Synthetic tests with known truth: what a bench would have written down, in the format the toolkit reads.
+
+A bench says what was done, a truth what the wire is; whatever the truth leaves open is drawn from the prior. Setting
+errors enter the staircase exactly, readings get the sensor's error and are rounded.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import Hold, frozen
+from wirebayes.io.run_folder import write_csv, write_json, write_text
+from wirebayes.model.problem import Problem, Sample, build, with_readings
+from wirebayes.model.replicate import rounded
+from wirebayes.units import nearest
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.staircase import simulate, tension_reference
+
+Array = NDArray[Any]
+FILE, TRUTH = "experiments.toml", "truth.json"
+PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What is done to one sample.
+
+    Attributes
+    ----------
+    name, material : str
+        Samples of one material share its parameters.
+    length_mm, resolution_N : float
+        Resolution 0 writes tensions as they are.
+    displacements_mm : sequence of float
+        One a hold; holds are numbered from 1.
+    times_s : sequence of float, or one such sequence a hold
+        Reading times since the hold began.
+    unrecorded : set of int
+        Numbers of holds of which no reading is kept; they last as long as they would have been read.
+    temperatures_C : sequence of float
+        Temperatures at evenly spaced moments of the test, straight lines between; empty for no log.
+    """
+
+    name: str = "simulated"
+    material: str = "simulated"
+    length_mm: float = 1000.0
+    resolution_N: float = 0.01
+    displacements_mm: Sequence[float] = tuple(range(1, 13))
+    times_s: Sequence[float] | Sequence[Sequence[float]] = PAPER_TIMES_S
+    unrecorded: frozenset[int] = frozenset()
+    temperatures_C: Sequence[float] = ()
+
+    def experiment(self) -> Experiment:
+        """The test with tensions still at zero."""
+        count = len(self.displacements_mm)
+        several = np.ndim(self.times_s[0]) > 0
+        each = [np.array(t) for t in self.times_s] if several else [np.array(self.times_s)] * count
+        starts = np.concatenate([[0.0], np.cumsum([t[-1] for t in each])])
+        holds = []
+        for i, (displacement, times) in enumerate(zip(self.displacements_mm, each, strict=True)):
+            kept = times if i + 1 not in self.unrecorded else times[:0]
+            log = None
+            if len(self.temperatures_C):
+                moments = np.linspace(0.0, starts[-1], len(self.temperatures_C))
+                # logged to a hundredth of a degree, and the wire follows the log
+                log = frozen(np.round(np.interp(starts[i] + kept, moments, self.temperatures_C), 2).tolist())
+            number = i + 1 if len(kept) else None
+            holds.append(Hold(number, float(displacement), float(times[-1]), frozen(kept.tolist()),
+                              frozen([0.0] * len(kept)), log, float(starts[i])))  # fmt: skip
+        return Experiment(self.name, self.material, self.length_mm, self.resolution_N, tuple(holds), Path(FILE))
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the wire is; parameters that are not named are drawn from the prior.
+
+    Attributes
+    ----------
+    parameters : mapping of name to value
+        ``k1``, ``setting_sd``, ``strain_stiffening.c`` …; ``k1[material]`` or ``preload[name]`` for one of several.
+    effects : sequence of Effect
+    law, history
+        See `wirebayes.wire.laws`.
+    """
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    effects: Sequence[Effect] = ()
+    law: ElasticLaw = "hooke"
+    history: History = "saturating"
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Synthetic tests.
+
+    Attributes
+    ----------
+    problem : Problem
+        Holds the simulated readings.
+    theta : (1, d) array
+        The truth, in the problem's columns.
+    setting_mm : list of (H,) arrays
+        The setting error of every hold, per sample.
+    noise_free_N : list of (H, R) arrays
+        Tension with the setting errors, before sensor error and rounding.
+    """
+
+    problem: Problem
+    theta: Array
+    setting_mm: list[Array]
+    noise_free_N: list[Array]
+
+
+def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random.SeedSequence = 0) -> Simulated:
+    """Simulate tests without writing them.
+
+    Raises
+    ------
+    InputError
+        If a parameter is unknown or impossible.
+    """
+    rng = np.random.default_rng(seed)
+    problem = build([bench.experiment() for bench in benches], truth.effects, law=truth.law, history=truth.history)
+    theta = problem.prior.rvs(1, rng)
+    for name, value in truth.parameters.items():
+        hits = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
+        if not hits:
+            hint = nearest(name, problem.names)
+            raise InputError(f"parameter {name}: no such parameter{hint}; there are {', '.join(problem.names)}")
+        for i in hits:
+            low, high = problem.prior.distributions[problem.names[i]].support()
+            if not low <= value <= high:
+                raise InputError(f"parameter {name}: found {value:g}, expected a number from {low:g} to {high:g}")
+            theta[0, i] = value
+    problem = replace(problem, samples=tuple(_referred(problem, theta, sample) for sample in problem.samples))
+    settings, clean, readings = [], [], []
+    for sample in problem.samples:
+        own = problem.parameters(theta, sample)
+        setting = rng.normal(size=(len(sample.protocol.displacement_mm), 1)) * own["setting_sd"]
+        tension = simulate(sample.protocol, own, sample.model, setting)
+        noisy = tension + rng.normal(size=tension.shape) * own["sensor_sd"]
+        readings.append(np.where(sample.protocol.mask[..., None], rounded(noisy, sample.resolution_N), 0.0))
+        settings.append(setting[:, 0])
+        clean.append(tension[..., 0])
+    return Simulated(with_readings(problem, readings), theta, settings, clean)
+
+
+def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: int = 0) -> Simulated:
+    """Write ``experiments.toml``, a CSV a test, and ``truth.json`` into an existing folder.
+
+    Parameters
+    ----------
+    folder : Path
+    benches : sequence of Bench
+    truth : Truth
+    seed : int
+
+    Returns
+    -------
+    Simulated
+    """
+    made = draw(benches, truth, seed)
+    for bench, sample in zip(benches, made.problem.samples, strict=True):
+        _write_readings(folder / f"{bench.name}.csv", bench.experiment(), sample)
+    write_text(folder / FILE, "\n".join(_table(bench) for bench in benches))
+    truths = {sample.name: _truth(made, i) for i, sample in enumerate(made.problem.samples)}
+    write_json(folder / TRUTH, {"seed": seed, "experiments": truths})
+    return made
+
+
+def effect_option(text: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> tuple[Effect, dict[str, float]]:
+    """An effect and the amplitude given with it, from ``NAME``, ``NAME.p=VALUE`` or ``NAME@HOLD.p=VALUE``.
+
+    Parameters
+    ----------
+    text : str
+    known : mapping of name to effect class, optional
+
+    Raises
+    ------
+    InputError
+        If there is no such effect or parameter, or the value is no number.
+    """
+    left, equals, value = text.partition("=")
+    if not equals:
+        return named(text, known), {}
+    key, _, parameter = left.rpartition(".")
+    effect = named(key or left, known)
+    own = [amplitude.name for amplitude in effect.amplitudes]
+    if parameter not in own:
+        raise InputError(f"--effect {text}: {effect.name} has no amplitude {parameter!r}; it has {', '.join(own)}")
+    return effect, {f"{effect.name}.{parameter}": number(f"--effect {text}", value)}
+
+
+def number(key: str, text: str) -> float:
+    """A finite number, or an `InputError` that names `key`."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(f"{key}: found {text!r}, expected a finite number")
+    return value
+
+
+def _referred(problem: Problem, theta: Array, sample: Sample) -> Sample:
+    """The sample with the reference tension that its own tensions have, found by a few repetitions."""
+    own = problem.parameters(theta, sample)
+    for _ in range(5):
+        reference = tension_reference(simulate(sample.protocol, own, sample.model)[sample.protocol.mask])
+        sample = replace(sample, model=replace(sample.model, tension_ref_N=reference))
+    return sample
+
+
+def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
+    step = Decimal(repr(sample.resolution_N)).normalize()
+    digits = max(0, -int(step.as_tuple().exponent)) if step else None
+    rows = []
+    for hold, tensions in zip(experiment.holds, sample.readings[..., 0], strict=True):
+        for i, time in enumerate(hold.time_s):
+            tension = float(tensions[i]) if digits is None else round(float(tensions[i]), digits)
+            row = [hold.number, hold.displacement_mm, time, tension + 0.0]  # no minus before a zero
+            rows.append(row if hold.temperature_C is None else [*row, hold.temperature_C[i]])
+    header = ["hold", "displacement_mm", "time_s", "tension_N"]
+    write_csv(path, header if len(rows[0]) == 4 else [*header, "temperature_C"], rows)
+
+
+def _table(bench: Bench) -> str:
+    lines = ["[[experiment]]", f'name = "{bench.name}"', f'material = "{bench.material}"']
+    lines.append(f"length_mm = {float(bench.length_mm)!r}")
+    if bench.resolution_N:
+        lines.append(f"resolution_N = {float(bench.resolution_N)!r}")
+    lines.append(f'readings = "{bench.name}.csv"')
+    holds = bench.experiment().holds
+    gaps = [
+        f"{{ before_hold = {next(h.number for h in holds[i:] if h.recorded)}, "
+        f"displacement_mm = {hold.displacement_mm!r}, duration_s = {hold.duration_s!r} }}"
+        for i, hold in enumerate(holds) if not hold.recorded
+    ]  # fmt: skip
+    if gaps:
+        lines.append(f"unrecorded_holds = [{', '.join(gaps)}]")
+    return "\n".join(lines) + "\n"
+
+
+def _truth(made: Simulated, i: int) -> dict[str, Any]:
+    sample = made.problem.samples[i]
+    return {
+        "material": sample.material,
+        "elastic_law": sample.model.law,
+        "history": sample.model.history,
+        "effects": [effect.key for effect in sample.model.effects],
+        "parameters": {name: float(v[0]) for name, v in made.problem.parameters(made.theta, sample).items()},
+        "tension_ref_N": sample.model.tension_ref_N,
+        "setting_mm": made.setting_mm[i],
+        "noise_free_N": [row[mask] for row, mask in zip(made.noise_free_N[i], sample.protocol.mask, strict=True)],
+    }
