@@ -9,10 +9,9 @@ ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors", "linear_algebra"},
     {"units", "interrupt"},
-    {"wire"},
-    {"effects"},
     {"workers"},
-    {"io"},
+    {"wire"},
+    {"io", "effects"},
     {"model"},
     {"simulation", "inference"},
     {"results"},

@@ -1,5 +1,6 @@
 """Work spread over processes: in order, for any amount of it, with effects that only a user's file has."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ def test_answers_come_in_order_for_any_amount_of_work(pieces: int) -> None:
 def test_processes_know_a_users_own_effects() -> None:
     known = catalogue(OWN)
     [name] = known.keys() - catalogue().keys()
-    with workers(own_effects=OWN) as each:
+    with workers(prepare=partial(catalogue, OWN)) as each:
         [columns] = each(known[name].columns, [known[name]()])
     assert columns == known[name]().columns()
 

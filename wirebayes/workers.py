@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from wirebayes.interrupt import held_back, watch_silently
@@ -24,7 +23,7 @@ def cores() -> int:
 
 
 @contextmanager
-def workers(most: int | None = None, own_effects: Path | None = None) -> Iterator[Each]:
+def workers(most: int | None = None, prepare: Callable[[], object] | None = None) -> Iterator[Each]:
     """A `map` over processes, as many as there are cores.
 
     There are processes on one core, too: a copy that was sent may be laid out otherwise in memory, and what is computed
@@ -34,8 +33,8 @@ def workers(most: int | None = None, own_effects: Path | None = None) -> Iterato
     ----------
     most : int, optional
         Pieces of work, where their number is known: no more processes than that, and none for a single piece.
-    own_effects : Path, optional
-        The user's file of effects, which the processes must know too.
+    prepare : function, optional
+        Called once in every process before its first piece of work, such as to load a user's own effects.
     """
     if most is not None and most < 2:
         yield map
@@ -49,7 +48,7 @@ def workers(most: int | None = None, own_effects: Path | None = None) -> Iterato
     os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"]))
     n = cores() if most is None else min(cores(), most)
     before = active_children()
-    pool = ProcessPoolExecutor(n, get_context("spawn"), _prepare, (own_effects,))
+    pool = ProcessPoolExecutor(n, get_context("spawn"), _prepare, (prepare,))
     try:
         with held_back():
             for _ in range(n):
@@ -64,14 +63,13 @@ def workers(most: int | None = None, own_effects: Path | None = None) -> Iterato
     pool.shutdown()
 
 
-def _prepare(own_effects: Path | None) -> None:
+def _prepare(prepare: Callable[[], object] | None) -> None:
     from threading import Thread
-
-    from wirebayes.effects import catalogue  # the command line imports this module before it knows what is asked
 
     watch_silently()
     Thread(target=_leave_with_parent, daemon=True).start()
-    catalogue(own_effects)
+    if prepare is not None:
+        prepare()
 
 
 def _leave_with_parent() -> None:

@@ -103,7 +103,7 @@ def test_fit_puts_a_failed_check_first(
 ) -> None:
     simulated(tmp_path / "wire", {"strain_stiffening.c": 60.0}, ("strain_stiffening",))
     monkeypatch.setattr(model_check, "SIMULATIONS", 49)
-    monkeypatch.setattr(model_check, "workers", lambda own_effects: _Serial())
+    monkeypatch.setattr(model_check, "workers", lambda prepare: _Serial())
     out = tmp_path / "fit"
     command = ["fit", str(tmp_path / "wire" / "experiments.toml"), "--output", str(out)]
     assert cli.main(command) == 0

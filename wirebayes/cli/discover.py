@@ -36,6 +36,8 @@ def discover(
     own_effects: OwnEffects = None,
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
+    from functools import partial
+
     from wirebayes import __version__
     from wirebayes.cli.progress import progress
     from wirebayes.discovery.search import catalogue_without, investigate
@@ -60,7 +62,7 @@ def discover(
     if opened.state == "done":
         return
     with progress() as report:
-        with workers(own_effects=own_effects) as each:
+        with workers(prepare=partial(catalogue, own_effects)) as each:
             findings = investigate(experiments, Settings(elastic_law, history, kinds), seed, report, each)
         jobs = _jobs(findings, elastic_law, history, own_effects)
         run(jobs, output, seed, report=report)

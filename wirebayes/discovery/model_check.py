@@ -153,7 +153,7 @@ def write_checks(jobs: Sequence[Job], directory: Path, seed: int, report: Report
     todo = [job for job in jobs if "model_check" not in summaries[job.folder]]
     work = partial(check_model, seed=seed, alpha=alpha)
     own_effects = jobs[0].own_effects
-    with workers(own_effects=own_effects) as each:
+    with workers(prepare=partial(catalogue, own_effects)) as each:
         # One fit shares its simulations among the cores, several are each done on one.
         checks = [work(todo[0], each=each)] if len(todo) == 1 else each(work, todo)
         for done, (job, check) in enumerate(zip(todo, checks, strict=True), 1):
