@@ -1,6 +1,7 @@
 """Damaged, truncated and foreign files: every command that reads them works or ends in one plain line, exit code 2."""
 
 import collections
+import copy
 import json
 import random
 import shutil
@@ -88,7 +89,7 @@ def json_changed(rng: random.Random, content: bytes) -> bytes:
         elif way == 1 and isinstance(parent, dict):
             parent[rng.choice(["", "name", "k1"])] = parent.pop(key)
         else:
-            parent[key] = rng.choice(WILD_JSON)
+            parent[key] = copy.deepcopy(rng.choice(WILD_JSON))  # a later change must not reach the list
     return json.dumps(document).encode()
 
 
