@@ -134,14 +134,18 @@ def drift(rig, theta, length_mm, zero, q, times_s):
     Every wire's creep g obeys dg/du = k2 (B tau^U - g) with u = t^N, the tension that of the pose at the time.
     """
     N = theta["N"]
-    good = {"q": q}
+    seen_g, seen_q = [np.zeros(rig.robot.legs)], [q[0]]
 
     def pose(g):
-        there, ok = rig.newton(good["q"], zero * (1 + g / length_mm))
-        ok = ok & (np.abs(there - good["q"]).max(1) < 0.02) & (rig.softest(there, zero * (1 + g / length_mm)) > 0)
-        if ok[0]:
-            good["q"] = there
-        return good["q"], bool(ok[0])
+        # from the pose of the nearest creep that has one, whatever the integrator tried in between
+        near = seen_q[int(np.abs(np.array(seen_g) - g).max(1).argmin())][None]
+        there, ok = rig.newton(near, zero * (1 + g / length_mm))
+        ok = ok & (np.abs(there - near).max(1) < 0.005) & (rig.softest(there, zero * (1 + g / length_mm)) > 0)
+        if not ok[0]:
+            return near, False
+        seen_g.append(g[0])
+        seen_q.append(there[0])
+        return there, True
 
     def rate(u, g):
         here, _ = pose(g[None])
@@ -158,9 +162,8 @@ def drift(rig, theta, length_mm, zero, q, times_s):
         rate, (0.0, u[-1]), np.zeros(rig.robot.legs), "Radau", u, events=holds, rtol=1e-5, atol=1e-8 * scale,
         first_step=1e-3 * u[-1],
     )  # fmt: skip
-    good["q"], out = q, []
-    for g in done.y.T:
-        # in small steps from pose to pose, so that none is lost
+    out = []
+    for g in np.reshape(done.y, (rig.robot.legs, -1)).T:
         out.append(pose(g[None])[0][0])
     fall = done.t_events[0][0] ** (1 / N) if len(done.t_events[0]) else np.inf
-    return np.array(out), fall
+    return np.reshape(out, (-1, rig.d)), fall

@@ -23,7 +23,8 @@ def summary(course: Course) -> dict[str, Any]:
         return {"began": 0.0}
     fell, slack = falls.fell[began], np.isfinite(falls.slack_s[began])
     drop = falls.drop_m[began][fell]
-    lowest = np.nanmin(np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[began], axis=1)
+    holds = began & ~falls.fell  # margins mean something where there is a hold to lose
+    lowest = np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[holds].min(axis=1, initial=np.inf)
     return {
         "began": float(began.mean()),
         "fall_probability": float(fell.mean()),
@@ -36,7 +37,7 @@ def summary(course: Course) -> dict[str, Any]:
         "slack_time_s": [_spread(t[s]) for t, s in zip(falls.slack_s[began].T, slack.T, strict=True)],
         "least_tension_wire": int(_nearest(falls, began)) + 1,
         "least_tension_share": band(lowest),
-        "stiffness_share": band(falls.stiffness_share[began]),
+        "stiffness_share": band(falls.stiffness_share[holds]),
     }
 
 
@@ -90,11 +91,11 @@ def warnings(course: Course, spread: float, stable: bool = True) -> list[str]:
     ]
     if slack:
         out.append(f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}")
-    elif (told["least_tension_share"]["q05"] or 0.0) < NEAR_SLACK:
-        left = _percent(float(told["least_tension_share"]["q05"] or 0.0))
+    elif (tension := told["least_tension_share"]["q05"]) is not None and tension < NEAR_SLACK:
+        left = _percent(float(tension))
         out.append(f"wire {told['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})")
-    if told["stiffness_share"]["q05"] < NEAR_LOOSE:
-        left = _percent(max(float(told["stiffness_share"]["q05"]), 0.0))
+    if (stiffness := told["stiffness_share"]["q05"]) is not None and stiffness < NEAR_LOOSE:
+        left = _percent(max(float(stiffness), 0.0))
         out.append(f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})")
     return out
 
