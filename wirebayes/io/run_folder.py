@@ -81,10 +81,16 @@ def read_json(path: Path, otherwise: str = "") -> Any:
 
 
 @contextmanager
-def stored_results(path: Path) -> Iterator[None]:
+def stored_results(path: Path, instead: str = "run its command again in a new folder") -> Iterator[None]:
     """Blame what is stored, not the code, when something cannot be taken out of it: it was damaged or is another's.
 
     Libraries raise whatever they like on a damaged file, so every exception counts; it stays the error's cause.
+
+    Parameters
+    ----------
+    path : Path
+    instead : str
+        What the user can do.
 
     Raises
     ------
@@ -97,7 +103,7 @@ def stored_results(path: Path) -> Iterator[None]:
         raise
     except Exception as error:
         found = f"{type(error).__name__}: {error}"
-        expected = f"what wirebayes {__version__} wrote there, unchanged; run its command again in a new folder"
+        expected = f"what wirebayes {__version__} wrote there, unchanged; {instead}"
         raise InputError(f"{path}: cannot be used ({_short(found, 120)}), expected {expected}") from error
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 from wirebayes.inference.modes import Optimum
-from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.inference.policy import DEFAULT, Policy, describe
 from wirebayes.inference.sampler import burn_in
 from wirebayes.inference.sampler.state import POOL, State, advance
 from wirebayes.inference.transform import Target
@@ -88,7 +88,8 @@ def sample(
     policy : Policy
     checkpoint : Path, optional
         A file that is rewritten whole after each block; a later call with the same arguments goes on from it and
-        ends with the same bytes. It is the caller's business that the configuration is the same.
+        ends with the same bytes. Readings and model are the caller's business, the file knows only the seed, the
+        policy and the names of the parameters.
     progress : function of a share between 0 and 1
     found : Optimum, optional
         Modes already known, instead of a search.
@@ -100,9 +101,15 @@ def sample(
     Returns
     -------
     Chains
+
+    Raises
+    ------
+    InputError
+        The checkpoint is damaged, of another format, or of another fit.
     """
-    state = State.load(checkpoint) or burn_in.begin(target, seed, policy, found, near, rough)
-    state.save(checkpoint)
+    of_fit = {"seed": seed, "policy": describe(policy), "parameters": target.problem.names}
+    state = State.load(checkpoint, of_fit) or burn_in.begin(target, seed, policy, found, near, rough)
+    state.save(checkpoint, of_fit)
     while not state.finished:
         if not state.frozen:
             burn_in.one_round(target, state, policy)
@@ -113,7 +120,7 @@ def sample(
             if not state.finished and (_doubtful(state) or not state.again and _promises_more(state, policy)):
                 burn_in.learn_again(target, state, policy)
             progress(min(1.0, 0.2 + 0.8 * float(state.ess.min()) / policy.ess))
-        state.save(checkpoint)
+        state.save(checkpoint, of_fit)
     z, log_density = (_by_ensemble(blocks, policy) for blocks in (state.kept_z, state.kept_log_density))
     return Chains(
         z, log_density, state.autocorrelation, state.ess, state.r_hat, state.converged, state.why, state.evaluations,

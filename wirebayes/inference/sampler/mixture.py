@@ -1,6 +1,6 @@
 """A mixture of multivariate Student-t distributions: density, draws, and its fit by expectation-maximisation."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,6 +21,15 @@ class Mixture:
     centres: Array
     factors: Array
     degrees: float = DEGREES
+
+    def to_arrays(self) -> dict[str, Any]:
+        """What `from_arrays` makes the same mixture of."""
+        return {"weights": self.weights, "centres": self.centres, "factors": self.factors, "degrees": self.degrees}
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Any]) -> "Mixture":
+        """The mixture that gave these arrays."""
+        return Mixture(arrays["weights"], arrays["centres"], arrays["factors"], float(arrays["degrees"]))
 
     def log_density(self, x: Array) -> Array:
         """(n,) log density of points (n, d)."""

@@ -5,6 +5,7 @@ over proposal in bounds in the tails: along bends the straightened one, where th
 one. The start's keeps small modes in reach.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +42,19 @@ class Proposal:
     wide: Mixture
     plain: Mixture
     start: Mixture
+
+    def to_arrays(self) -> dict[str, Any]:
+        """What `from_arrays` makes the same proposal of."""
+        parts = {name: getattr(self, name).to_arrays() for name in ("straight", *_MIXTURES)}
+        return {"shares": np.array(self.shares), **parts}
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Any]) -> "Proposal":
+        """The proposal that gave these arrays."""
+        close, wide, plain, start = (Mixture.from_arrays(arrays[name]) for name in _MIXTURES)
+        near, far, as_it_is, before = map(float, arrays["shares"])
+        straight = Straight.from_arrays(arrays["straight"])
+        return Proposal((near, far, as_it_is, before), straight, close, wide, plain, start)
 
     def log_density(self, x: Array) -> Array:
         """(n,) log density of points (n, d)."""
@@ -103,4 +117,5 @@ def fit(
     return Proposal(shares, straight, close, wide, plain, start)
 
 
+_MIXTURES = ("close", "wide", "plain", "start")
 _LIGHT = 40.0  # degrees of freedom where the wide mixtures look after the tails

@@ -1,7 +1,7 @@
 """Walkers: their state between two stretches of work, which a file can hold, and the stretches themselves."""
 
-import pickle
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +10,19 @@ import numpy as np
 from emcee.moves.move import Move
 from numpy.typing import NDArray
 
+from wirebayes.inference.sampler import checkpoint
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import Target
+from wirebayes.io.run_folder import stored_results
 
 Array = NDArray[Any]
 
 
 @dataclass
 class State:
-    """Everything a resumed run needs, in one pickled file of our own making.
+    """Everything a resumed run needs (the file: `wirebayes.inference.sampler.checkpoint`).
 
     Attributes
     ----------
@@ -75,18 +77,57 @@ class State:
     why: str = ""
 
     @staticmethod
-    def load(path: Path | None) -> "State | None":
-        if path is None or not path.exists():
+    def load(path: Path | None, of_fit: Mapping[str, Any]) -> "State | None":
+        """The state in a resume file; None where there is none (errors: `checkpoint.read`)."""
+        stored = None if path is None else checkpoint.read(path, of_fit)
+        if path is None or stored is None:
             return None
-        with path.open("rb") as stream:
-            state: State = pickle.load(stream)
-        return state
+        with stored_results(path, checkpoint.INSTEAD):
+            return State.from_stored(*stored)
 
-    def save(self, path: Path | None) -> None:
+    def save(self, path: Path | None, of_fit: Mapping[str, Any]) -> None:
+        """Write the resume file whole."""
         if path is not None:
-            part = path.with_name(path.name + ".part")
-            part.write_bytes(pickle.dumps(self))
-            part.replace(path)
+            checkpoint.write(path, of_fit, self.to_values(), self.to_arrays())
+
+    def to_values(self) -> dict[str, Any]:
+        """Everything but the arrays, in JSON's own types."""
+        values = {each.name: getattr(self, each.name) for each in fields(self) if each.type in (bool, int, float, str)}
+        return values | {"generator": self.generator.bit_generator.state, "random": self.random[2:]}
+
+    def to_arrays(self) -> dict[str, Any]:
+        """Arrays by name, those of parts under the part's name; absent ones are None."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        arrays |= {name: _numbered(getattr(self, name)) for name in _TUPLES}
+        arrays |= {name: np.concatenate(kept) if (kept := getattr(self, name)) else None for name in _KEPT}
+        learned = "proposal" if isinstance(self.proposal, Proposal) else "mixture"
+        arrays |= {learned: self.proposal.to_arrays(), "start": self.start.to_arrays(), "random": self.random[1]}
+        return arrays
+
+    @staticmethod
+    def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> "State":
+        """The state that gave these values and arrays."""
+        start = Mixture.from_arrays(arrays["start"])
+        if "proposal" in arrays:
+            learned: Mixture | Proposal = Proposal.from_arrays(arrays["proposal"])
+        else:
+            learned = Mixture.from_arrays(arrays["mixture"])
+        generator = np.random.default_rng()
+        generator.bit_generator.state = values["generator"]
+        parts: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
+        parts |= {name: tuple(arrays[name].values()) if name in arrays else None for name in _TUPLES}
+        parts |= {name: [arrays[name]] if name in arrays else [] for name in _KEPT}
+        parts |= {"random": ("MT19937", arrays["random"], *values["random"]), "generator": generator}
+        return State(**{**values, **parts, "proposal": learned, "start": start})
+
+
+_ARRAYS = ("positions", "values", "autocorrelation", "ess", "r_hat")
+_TUPLES = ("witness", "walk", "seen")
+_KEPT = ("kept_z", "kept_log_density")
+
+
+def _numbered(arrays: tuple[Array, ...] | None) -> dict[str, Array] | None:
+    return None if arrays is None else {str(i): array for i, array in enumerate(arrays)}
 
 
 def advance(target: Target, state: State, steps: int, ensembles: int = 1, power: float = 1.0) -> tuple[Any, int]:

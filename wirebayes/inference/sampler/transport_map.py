@@ -12,7 +12,8 @@ References
 M. C. Jones and A. Pewsey, Sinh-arcsinh distributions, Biometrika 96 (2009).
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,15 @@ class Straight:
     least: Array
     most: Array
     shape: Array
+
+    def to_arrays(self) -> dict[str, Any]:
+        """What `from_arrays` makes the same map of."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Any]) -> "Straight":
+        """The map that gave these arrays."""
+        return Straight(**arrays)
 
     def forward(self, x: Array) -> tuple[Array, Array]:
         """(n, d) straightened points and the (n,) logarithm of the map's Jacobian, of points (n, d)."""

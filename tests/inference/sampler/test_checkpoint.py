@@ -1,0 +1,213 @@
+"""The resume file: a killed fit goes on to the same bytes, and a file that cannot be used is refused in one line."""
+
+import json
+import random
+import re
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wirebayes
+from tests.statistical.targets import two_modes
+from wirebayes.cli import main
+from wirebayes.errors import InputError
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import checkpoint
+from wirebayes.inference.sampler.ensemble import sample
+from wirebayes.inference.sampler.state import State
+from wirebayes.io import paper
+from wirebayes.results import jobs
+
+PACKAGE = Path(wirebayes.__file__).parent
+PAPER = str(PACKAGE.parent / "data" / "paper" / "experiments.toml")
+SMALL = Policy(walkers=32, ess=2000.0, rounds=2, round_draws=1024, most_rounds=3, block=8, most_steps=48, r_hat=1.5)
+OF_FIT = {"seed": 1, "policy": {"ess": 1.0}, "parameters": ["a", "b"]}
+A_PICKLE = b"\x80\x04}\x8c\x06format\x8c\x011s."
+
+
+class Killed(Exception):
+    pass
+
+
+def kill_once(stage: Callable[[Mapping[str, Any]], bool], patch: pytest.MonkeyPatch) -> None:
+    """End the next fit right after it writes the first resume file of a stage."""
+
+    def write(*arguments: Any, whole: Callable[..., None] = checkpoint.write) -> None:
+        whole(*arguments)
+        if stage(arguments[2]):
+            raise Killed
+
+    patch.setattr(checkpoint, "write", write)
+
+
+STAGES: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+    "search": lambda values: values["round"] == 0,
+    "burn-in": lambda values: values["round"] == 1,
+    "frozen": lambda values: values["frozen"],
+    "kept": lambda values: values["kept_evaluations"] > 0,
+    "learned again": lambda values: values["again"] > 0,
+    "finished": lambda values: values["finished"],
+}
+
+
+def one_fit(folder: Path) -> dict[str, bytes]:
+    kite = next(experiment for experiment in paper.experiments() if experiment.name == "kite-1.5m")
+    jobs.one(jobs.Job("kite", (kite,)), folder, 3, SMALL)
+    return {path.name: path.read_bytes() for path in (folder / "kite").iterdir()}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    return one_fit(tmp_path_factory.mktemp("undisturbed"))
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_fit_killed_in_any_stage_goes_on_to_the_same_bytes(
+    stage: str, undisturbed: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        kill_once(STAGES[stage], patch)
+        with pytest.raises(Killed):
+            one_fit(tmp_path)
+    assert (tmp_path / "kite" / ".checkpoint").exists()
+    assert one_fit(tmp_path) == undisturbed
+    assert {"posterior.nc", "summary.json"} <= undisturbed.keys()
+
+
+def flat(stored: Any) -> Any:
+    """What a file holds, comparable by equality."""
+    if isinstance(stored, Mapping):
+        return {name: flat(value) for name, value in stored.items()}
+    return (stored.dtype.str, stored.shape, stored.tobytes()) if isinstance(stored, np.ndarray) else stored
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The resume file of a fit in burn-in."""
+    path = tmp_path_factory.mktemp("written") / ".checkpoint"
+    policy = Policy(walkers=16, rounds=2, round_draws=256)
+    with pytest.MonkeyPatch.context() as patch:
+        kill_once(STAGES["burn-in"], patch)
+        with pytest.raises(Killed):
+            sample(two_modes(), 1, policy, checkpoint=path)
+    return path
+
+
+def of_fit(path: Path) -> Any:
+    with np.load(path, allow_pickle=False) as stored:
+        return json.loads(stored["state.json"])["fit"]
+
+
+def test_a_state_that_was_stored_is_the_same_state(written: Path, tmp_path: Path) -> None:
+    about = of_fit(written)
+    state = State.load(written, about)
+    assert state is not None and state.seen is not None and state.witness is not None
+    state.save(tmp_path / "again", about)
+    first, again = checkpoint.read(written, about), checkpoint.read(tmp_path / "again", about)
+    assert first is not None and again is not None
+    assert first[0] == again[0]
+    assert flat(first[1]) == flat(again[1])
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_damaged_file_is_refused_in_one_line_or_holds_what_was_written(
+    seed: int, written: Path, tmp_path: Path
+) -> None:
+    rng, content = random.Random(seed), bytearray(written.read_bytes())
+    about = of_fit(written)
+    if seed % 3 == 0:
+        del content[rng.randrange(len(content)) :]
+    else:
+        # headers and the directory of an archive are a small part of it: aim at both ends as well
+        start, end = rng.choice([(0, len(content)), (0, 400), (len(content) - 3000, len(content))])
+        content[rng.randrange(start, end)] ^= 1 << rng.randrange(8)
+    path = tmp_path / "damaged"
+    path.write_bytes(content)
+    try:
+        stored = checkpoint.read(path, about)
+    except InputError as error:
+        assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
+        assert checkpoint.INSTEAD in str(error)
+    else:
+        whole = checkpoint.read(written, about)
+        assert stored is not None and whole is not None
+        assert stored[0] == whole[0]
+        assert flat(stored[1]) == flat(whole[1])
+
+
+@pytest.mark.parametrize("content", [b"", A_PICKLE, b"\x89HDF\r\n\x1a\n", b"PK\x03\x04", b"{}"])
+def test_a_foreign_file_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / ".checkpoint"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=re.escape(checkpoint.INSTEAD)):
+        checkpoint.read(path, OF_FIT)
+
+
+def test_another_format_is_refused_before_anything_else_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / ".checkpoint"
+    monkeypatch.setattr(checkpoint, "FORMAT", 2)
+    checkpoint.write(path, {"unknown": "here"}, {}, {"x": np.zeros(2)})
+    monkeypatch.undo()
+    monkeypatch.setattr(checkpoint.np, "load", None)
+    with pytest.raises(InputError, match=r"found format 2, expected 1; remove this file to start the fit anew"):
+        checkpoint.read(path, OF_FIT)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"seed": 2}, "seed is 1 there, 2 here"),
+        ({"policy": {"ess": 5.0}}, "policy.ess is 1.0 there, 5.0 here"),
+        ({"parameters": ["a"]}, 'parameters is ["a", "b"] there, ["a"] here'),
+    ],
+)
+def test_the_file_of_another_fit_is_refused(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
+    path = tmp_path / ".checkpoint"
+    checkpoint.write(path, OF_FIT, {}, {"x": np.zeros(2)})
+    with pytest.raises(InputError, match=re.escape(f"belongs to another fit: {said}; {checkpoint.INSTEAD}")):
+        checkpoint.read(path, OF_FIT | changed)
+
+
+def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
+    path, objects = tmp_path / ".checkpoint", np.array([{"run": "me"}], dtype=object)
+    with pytest.raises(ValueError, match="Object arrays"):
+        checkpoint.write(path, OF_FIT, {}, {"x": objects})
+    assert not path.exists()
+    with path.open("wb") as stream:
+        np.savez(stream, x=objects)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("state.json", json.dumps({"format": checkpoint.FORMAT, "fit": OF_FIT, "values": {}}))
+    with pytest.raises(InputError, match="Object arrays"):
+        checkpoint.read(path, OF_FIT)
+
+
+def test_the_command_ends_in_one_line_and_goes_on_once_the_file_is_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["fit", PAPER, "--experiment", "kite-1.5m", "--output", str(tmp_path / "out")]
+    stored = tmp_path / "out" / "kite-1.5m" / ".checkpoint"
+    with monkeypatch.context() as patch:
+        kill_once(STAGES["search"], patch)
+        with pytest.raises(Killed):
+            main(command)
+    capsys.readouterr()
+    stored.write_bytes(A_PICKLE)
+    assert main(command) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{stored}: cannot be used (") and line.endswith(checkpoint.INSTEAD)
+    stored.unlink()
+    kill_once(STAGES["search"], monkeypatch)  # far enough to see that it began anew
+    with pytest.raises(Killed):
+        main(command)
+
+
+def test_nothing_in_the_package_reads_pickles() -> None:
+    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    forbidden = re.compile(r"(import|from) (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|allow_pickle\s*=\s*True")
+    assert not [str(path) for path, text in texts.items() if forbidden.search(text)]

@@ -1,0 +1,86 @@
+"""The resume file: plain values as JSON and named arrays in one zip archive, which nothing in it can make run code.
+
+``state.json`` holds the format's number, which fit the file belongs to, and the plain values; it is read and checked
+before any array. Arrays are ``.npy`` files beside it, as in numpy's ``.npz``; nested names are joined by dots.
+"""
+
+import json
+import zipfile
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import differences, plain, stored_results, write_bytes
+
+FORMAT = 1  # raise it whenever what is stored changes its meaning
+_VALUES = "state.json"
+INSTEAD = "remove this file to start the fit anew"
+
+
+def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+    """Write the file whole, or leave the one that is there.
+
+    Parameters
+    ----------
+    path : Path
+    fit : mapping
+        What tells this fit from others.
+    values : mapping
+        Of JSON's own types.
+    arrays : mapping
+        Of arrays, or of such mappings; None is left out.
+    """
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr(_VALUES, json.dumps({"format": FORMAT, "fit": plain(fit), "values": values}))
+        for name, array in _flat(arrays).items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                np.lib.format.write_array(stream, np.asarray(array), allow_pickle=False)
+    write_bytes(path, content.getvalue())
+
+
+def read(path: Path, fit: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    """The values and the nested arrays of a file; None where there is no file.
+
+    Raises
+    ------
+    InputError
+        The file is damaged, of another format, or of another fit.
+    """
+    if not path.exists():
+        return None
+    with stored_results(path, INSTEAD):
+        with zipfile.ZipFile(path) as archive:
+            stored = json.loads(archive.read(_VALUES))
+        if stored["format"] != FORMAT:
+            raise InputError(f"{path}: found format {stored['format']}, expected {FORMAT}; {INSTEAD}")
+        different = differences(stored["fit"], plain(fit))
+        if different:
+            raise InputError(f"{path}: belongs to another fit: {different[0]}; {INSTEAD}")
+        with np.load(path, allow_pickle=False) as arrays:
+            return stored["values"], _nested({name: arrays[name] for name in arrays.files if name != _VALUES})
+
+
+def _flat(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in arrays.items():
+        if isinstance(value, Mapping):
+            flat |= {f"{name}.{inner}": array for inner, array in _flat(value).items()}
+        elif value is not None:
+            flat[name] = value
+    return flat
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    nested: dict[str, Any] = {}
+    for name, array in flat.items():
+        *path, last = name.split(".")
+        here = nested
+        for part in path:
+            here = here.setdefault(part, {})
+        here[last] = array
+    return nested
