@@ -82,7 +82,7 @@ class ModelCheck:
         return (
             f"{model} does not describe the readings (p = {self.p:.2g}, level {self.alpha:.2g}): its parameters, "
             "intervals and predictions can be wrong by more than they say. Run wirebayes discover to look for "
-            f"{other}; the readings deviate most in the direction of {', '.join(self.surprising)}.{gross}"
+            f"{other}; the readings deviate most in the direction of {', '.join(self.surprising).replace('_', ' ')}.{gross}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class ModelCheck:
 
 def level(tests: int) -> float:
     """Level of each of several tests so that all pass with probability 1 - `ALPHA` if nothing is missing (Šidák)."""
-    return float(1.0 - (1.0 - ALPHA) ** (1.0 / tests))
+    return ALPHA if tests == 1 else 1.0 - (1.0 - ALPHA) ** (1.0 / tests)
 
 
 def check_model(

@@ -76,7 +76,16 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
     blocks.append(Pictures(told, small=True))
     taught = [t["sentence"] for t in summary["identifiability"].values()]
-    blocks.append(Columns([Points("What the data determine", taught)]))
+    blocks.append(
+        Columns(
+            [
+                Points(
+                    "What the data determine" if trusted else "What the data would determine if the model were right",
+                    taught,
+                )
+            ]
+        )
+    )
     blocks.append(_derived(summary))
     ahead = summary["extrapolation"]
     alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
