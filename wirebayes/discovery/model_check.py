@@ -79,10 +79,11 @@ class ModelCheck:
             )
         model = "The model with these effects" if self.with_effects else "The plain model"
         other = "other effects of the catalogue" if self.with_effects else "what is missing"
+        directions = ", ".join(self.surprising).replace("_", " ")
         return (
             f"{model} does not describe the readings (p = {self.p:.2g}, level {self.alpha:.2g}): its parameters, "
             "intervals and predictions can be wrong by more than they say. Run wirebayes discover to look for "
-            f"{other}; the readings deviate most in the direction of {', '.join(self.surprising).replace('_', ' ')}.{gross}"
+            f"{other}; the readings deviate most in the direction of {directions}.{gross}"
         )
 
     def to_dict(self) -> dict[str, Any]:
