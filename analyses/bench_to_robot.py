@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 from analyses.hidden_effects.truth import draw_wire
-from wirebayes.cli.wires import wire_draws
 from wirebayes.discovery.search import final_models, investigate
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import CATALOGUE
@@ -48,6 +47,7 @@ from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw, write
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model, simulate
+from wirebayes.workflows.wires import wire_draws
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0)
 SIMULATIONS = 199  # behind p, here; the command makes 999

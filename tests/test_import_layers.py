@@ -19,10 +19,11 @@ LAYERS: list[set[str]] = [
     {"comparison", "discovery"},
     {"report"},
     {"reproduce"},
+    {"workflows"},
     {"cli"},
 ]
 ROBOT_MAY_USE = {"errors", "linear_algebra", "units", "wire", "robot"}
-MAY_USE_ROBOT = {"report", "reproduce", "cli"}
+MAY_USE_ROBOT = {"report", "reproduce", "workflows", "cli", "__init__"}
 
 
 def imports() -> set[tuple[str, str, str]]:

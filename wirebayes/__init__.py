@@ -1,3 +1,86 @@
-"""A Bayesian toolkit for wires that creep."""
+"""A Bayesian toolkit for wires that creep.
+
+``import wirebayes as wb`` offers what the command line does as functions. Names are loaded when they are first used, so
+the import itself costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wirebayes.errors import InputError as InputError
+    from wirebayes.inference.policy import Policy as Policy
+    from wirebayes.io.arrays import from_arrays as from_arrays
+    from wirebayes.io.experiment import Experiment as Experiment
+    from wirebayes.io.experiment import read_experiments as read_experiments
+    from wirebayes.robot.mechanics.description import Robot as Robot
+    from wirebayes.workflows.calibrate import calibrate as calibrate
+    from wirebayes.workflows.compare import compare as compare
+    from wirebayes.workflows.discover import discover as discover
+    from wirebayes.workflows.export import export as export
+    from wirebayes.workflows.fit import fit as fit
+    from wirebayes.workflows.list_effects import EffectDescription as EffectDescription
+    from wirebayes.workflows.list_effects import list_effects as list_effects
+    from wirebayes.workflows.load import load as load
+    from wirebayes.workflows.pose import pose as pose
+    from wirebayes.workflows.predict import predict as predict
+    from wirebayes.workflows.reproduce_paper import reproduce_paper as reproduce_paper
+    from wirebayes.workflows.results import Calibration as Calibration
+    from wirebayes.workflows.results import Comparison as Comparison
+    from wirebayes.workflows.results import Export as Export
+    from wirebayes.workflows.results import Findings as Findings
+    from wirebayes.workflows.results import Pose as Pose
+    from wirebayes.workflows.results import Posterior as Posterior
+    from wirebayes.workflows.results import Posteriors as Posteriors
+    from wirebayes.workflows.results import Reproduction as Reproduction
+    from wirebayes.workflows.results import SimulatedTests as SimulatedTests
+    from wirebayes.workflows.simulate_tests import simulate_tests as simulate_tests
+    from wirebayes.workflows.wires import read_robot as read_robot
+    from wirebayes.workflows.write_report import write_report as write_report
 
 __version__ = "0.1.0"
+
+_PLACES = {
+    "read_experiments": "wirebayes.io.experiment",
+    "from_arrays": "wirebayes.io.arrays",
+    "fit": "wirebayes.workflows.fit",
+    "compare": "wirebayes.workflows.compare",
+    "discover": "wirebayes.workflows.discover",
+    "predict": "wirebayes.workflows.predict",
+    "simulate_tests": "wirebayes.workflows.simulate_tests",
+    "load": "wirebayes.workflows.load",
+    "read_robot": "wirebayes.workflows.wires",
+    "pose": "wirebayes.workflows.pose",
+    "calibrate": "wirebayes.workflows.calibrate",
+    "export": "wirebayes.workflows.export",
+    "list_effects": "wirebayes.workflows.list_effects",
+    "write_report": "wirebayes.workflows.write_report",
+    "reproduce_paper": "wirebayes.workflows.reproduce_paper",
+    "Experiment": "wirebayes.io.experiment",
+    "Posterior": "wirebayes.workflows.results",
+    "Posteriors": "wirebayes.workflows.results",
+    "Findings": "wirebayes.workflows.results",
+    "Comparison": "wirebayes.workflows.results",
+    "SimulatedTests": "wirebayes.workflows.results",
+    "Robot": "wirebayes.robot.mechanics.description",
+    "Pose": "wirebayes.workflows.results",
+    "Calibration": "wirebayes.workflows.results",
+    "Export": "wirebayes.workflows.results",
+    "Reproduction": "wirebayes.workflows.results",
+    "EffectDescription": "wirebayes.workflows.list_effects",
+    "Policy": "wirebayes.inference.policy",
+    "InputError": "wirebayes.errors",
+}
+
+__all__ = ["__version__", *_PLACES]  # noqa: PLE0604 - names of the table
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'wirebayes' has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_PLACES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

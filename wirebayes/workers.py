@@ -1,6 +1,7 @@
 """Independent work on all cores; what comes out does not depend on how many there are."""
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -20,6 +21,24 @@ def one_thread_each() -> None:
 def cores() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def without_script() -> Iterator[None]:
+    """Processes that start within the block do not import the user's script, so it need not guard its top level.
+
+    A new process imports the main module of its parent in case that work was defined there. Ours never is, and a script
+    whose top level calls the package would start itself again in each process.
+    """
+    main = sys.modules["__main__"]
+    known = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
+    for name in known:
+        setattr(main, name, None)
+    try:
+        yield
+    finally:
+        for name, value in known.items():
+            setattr(main, name, value)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import read_experiments, select
-from wirebayes.io.readings import read_protocol, read_readings
+from wirebayes.io.readings import protocol_holds, protocol_table, read_readings
 from wirebayes.model.problem import build
 
 PAPER = Path(__file__).parents[2] / "data" / "paper"
@@ -377,15 +377,15 @@ def test_an_experiment_is_selected_by_name():
 def test_a_protocol_to_predict_has_a_tension_at_most_at_the_first_time(tmp_path):
     path = tmp_path / "p.csv"
     path.write_text("hold,displacement_mm,time_s\n1,1,0\n1,1,30\n")
-    (hold,) = read_protocol(path, 1000.0)
+    (hold,) = protocol_holds(protocol_table(path), 1000.0)
     assert np.isnan(hold.tension_N).all()
     path.write_text("hold,displacement_mm,time_s,tension_N\n1,1,0,2.5\n1,1,30,\n2,2,0,\n")
-    first, second = read_protocol(path, 1000.0)
+    first, second = protocol_holds(protocol_table(path), 1000.0)
     assert first.tension_N[0] == 2.5
     assert np.isnan([first.tension_N[1], second.tension_N[0]]).all()
     path.write_text("hold,displacement_mm,time_s,tension_N\n1,1,0,2.5\n1,1,30,2.4\n")
     with pytest.raises(InputError, match=r"line 3, column 4 \(tension_N\): found 2.4, expected an empty cell after"):
-        read_protocol(path, 1000.0)
+        protocol_holds(protocol_table(path), 1000.0)
 
 
 def test_the_papers_tables_are_all_there():

@@ -1,14 +1,11 @@
 """`wirebayes predict`: the readings a posterior expects of a protocol."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from wirebayes.cli.options import ExperimentName, Seed
-
-if TYPE_CHECKING:
-    from wirebayes.results.store import Stored
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by fit or discover.")]
 ProtocolFile = Annotated[
@@ -44,49 +41,10 @@ def predict(
     training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
     fit's. A first reading in tension_N conditions its hold and those after it.
     """
-    from wirebayes.io.run_folder import check_file, write_csv
-    from wirebayes.prediction.request import read_question
-    from wirebayes.prediction.table import HEADER, table
+    from wirebayes.workflows.predict import predict as run
 
-    stored = find_posterior(folder, experiment, model, own_effects)
-    asked = read_question(protocol, stored, fresh=fresh)
-    check_file(output)
-    write_csv(output, HEADER, table(asked, seed))
-    typer.echo(f"{protocol}: {asked.sentence}", err=True)
-
-
-def find_posterior(
-    folder: Path, experiment: str | None = None, model: str | None = None, own_effects: Path | None = None
-) -> "Stored":
-    """The posterior of an experiment in a folder of fit or discover, or in the folder that holds it itself.
-
-    Raises
-    ------
-    InputError
-        When there is none, several to choose from, or not the one asked for.
-    """
-    from wirebayes.errors import InputError
-    from wirebayes.results.store import experiments_in, load
-
-    if not folder.is_dir():
-        raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")
-    found: dict[str, list[Path]] = {}
-    levels = ("posterior.nc", "*/posterior.nc", "*/*/posterior.nc")
-    for path in sorted(path for level in levels for path in folder.glob(level)):
-        for name in experiments_in(path):
-            found.setdefault(name, []).append(path.parent)
-    if not found:
-        raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")
-    if experiment is None and len(found) > 1:
-        raise InputError(f"{folder}: found {', '.join(sorted(found))}; expected one of them as --experiment")
-    name = experiment or next(iter(found))
-    if name not in found:
-        raise InputError(f"--experiment {name}: not in {folder}, expected one of {', '.join(sorted(found))}")
-    places = {place.name: place for place in found[name]}
-    if model is None:
-        if len(places) == 1:
-            return load(next(iter(places.values())), name, own_effects)
-        model = "final"
-    if model not in places:
-        raise InputError(f"--model {model}: {folder} has no such posterior of {name}; discover writes plain and final")
-    return load(places[model], name, own_effects)
+    predicted = run(
+        folder, protocol, experiment=experiment, model=model, fresh=fresh, own_effects=own_effects, seed=seed,
+        output=output,
+    )  # fmt: skip
+    typer.echo(f"{protocol}: {predicted.attrs['prediction']}", err=True)

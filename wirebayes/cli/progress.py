@@ -28,15 +28,21 @@ def progress() -> Iterator[Report]:
     from rich.console import Console  # rich is loaded only where there is someone to look at it
     from rich.progress import Progress, TaskID, TimeElapsedColumn
 
-    with Progress(*Progress.get_default_columns(), TimeElapsedColumn(), console=Console(stderr=True)) as bars:
-        known: dict[str, TaskID] = {}
+    bars = Progress(*Progress.get_default_columns(), TimeElapsedColumn(), console=Console(stderr=True))
+    known: dict[str, TaskID] = {}
 
-        def report(name: str, done: float, total: float) -> None:
-            if name not in known:
-                known[name] = bars.add_task(name, total=total)
-            bars.update(known[name], completed=done, total=total)
+    def report(name: str, done: float, total: float) -> None:
+        if not known:
+            bars.start()  # not before there is something to show: a command may end without
+        if name not in known:
+            known[name] = bars.add_task(name, total=total)
+        bars.update(known[name], completed=done, total=total)
 
+    try:
         yield report
+    finally:
+        if known:
+            bars.stop()
 
 
 def _silent(name: str, done: float, total: float) -> None:

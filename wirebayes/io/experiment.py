@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.io.readings import LARGEST, STRETCH, Hold, frozen, read_readings, read_text, shown
+from wirebayes.io.readings import LARGEST, STRETCH, Hold, Table, frozen, read_text, readings_of, readings_table, shown
 from wirebayes.io.toml_keys import Keys, read_toml
 from wirebayes.units import nearest
 from wirebayes.wire.protocol import Protocol
@@ -244,6 +244,25 @@ def read_experiments(path: str | Path) -> list[Experiment]:
 
 def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[str, int]) -> Experiment:
     keys.only(_KEYS)
+    experiment = experiment_of(keys, lambda: readings_table(_readings_path(keys)))
+    lines = shared_lines | {parameter: keys.line(f"prior.{parameter}") for parameter in experiment.priors}
+    return replace(experiment, priors=shared | experiment.priors, prior_lines=lines)
+
+
+def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
+    """Check what is said of one test, then its readings.
+
+    Parameters
+    ----------
+    keys : Keys
+        ``name``, ``material``, ``length_mm`` and the optional keys of an experiment file.
+    readings : function that returns a Table
+        Called once the keys before the readings are known to be right.
+
+    Raises
+    ------
+    InputError
+    """
     expected = "a name of letters, digits, '.', '_' and '-' for a folder of results"
     name = keys.string("name", expected)
     if not _NAME.fullmatch(name) or _TAKEN.fullmatch(name):
@@ -264,14 +283,12 @@ def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[
         most = LARGEST["tension_N"]
         expected = f"a step above 0 N, at most {most:.0e} N, or no such key"
         resolution = keys.number("resolution_N", expected, above=0.0, most=most)
-    readings = _readings_path(keys)
-    recorded = read_readings(readings, length)
+    table = readings()
+    recorded = readings_of(table, length)
     if not enough(recorded):
-        raise keys.complain("readings", f"{counted(recorded)} in {readings.name}", ENOUGH)
+        raise keys.complain("readings", f"{counted(recorded)} in {table.path.name}", ENOUGH)
     holds = _with_unrecorded(keys, recorded, length)
-    own = keys.priors()
-    lines = shared_lines | {parameter: keys.line(f"prior.{parameter}") for parameter in own}
-    return Experiment(name, material, length, resolution, holds, keys.source, shared | own, lines)
+    return Experiment(name, material, length, resolution, holds, keys.source, keys.priors())
 
 
 def _readings_path(keys: Keys) -> Path:
@@ -300,9 +317,9 @@ def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float) -> t
     for index, entry in enumerate(entries):
         if not isinstance(entry, dict):
             raise keys.complain(f"unrecorded_holds[{index}]", shown(entry), expected)
-        inner = Keys(keys.source, keys.text, keys.index, entry, keys.name, f"unrecorded_holds[{index}].")
+        inner = replace(keys, table=entry, prefix=f"unrecorded_holds[{index}].")
         inner.only(_HOLD_KEYS)
-        reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table['readings']}"
+        reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table.get('readings', 'the readings')}"
         before = inner.value("before_hold", reach)
         if isinstance(before, bool) or not isinstance(before, int) or not 0 <= before <= numbers[-1]:
             raise inner.complain("before_hold", shown(before), reach)

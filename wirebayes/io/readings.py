@@ -19,6 +19,7 @@ from wirebayes.units import nearest
 
 REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
 OPTIONAL = ("temperature_C",)
+PROTOCOL = REQUIRED[:3], ("tension_N", *OPTIONAL)  # required and optional columns of a protocol to predict
 
 # No bench comes near these: beyond them numbers are typing mistakes, and soon their squares overflow.
 LARGEST = {
@@ -104,21 +105,36 @@ def read_text(path: Path, expected: str = "text") -> str:
 
 
 @dataclass(frozen=True)
-class _Table:
-    """A CSV split into fields; `complain` turns a row and a column into a place a person can find."""
+class Table:
+    """A CSV split into fields; `complain` turns a row and a column into a place a person can find.
+
+    Attributes
+    ----------
+    path : Path
+    header : list of str
+    rows : list of list of str
+    """
 
     path: Path
     header: list[str]
     rows: list[list[str]]
 
+    def place(self, row: int, column: str) -> str:
+        """Where a cell stands; the header where there is no such column."""
+        if column not in self.header:
+            return "line 1, header"
+        return f"line {row + 2}, column {self.header.index(column) + 1} ({column})"
+
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
-        place = f"line {row + 2}, column {self.header.index(column) + 1} ({column})"
-        return InputError(f"{self.path}, {place}: found {found}, expected {expected}")
+        """The error of a cell."""
+        return InputError(f"{self.path}, {self.place(row, column)}: found {found}, expected {expected}")
 
     def cell(self, row: int, column: str) -> str:
+        """What a cell says."""
         return self.rows[row][self.header.index(column)]
 
     def number(self, row: int, column: str) -> float:
+        """A finite number of a size that this column may have."""
         text = self.cell(row, column)
         if not _NUMBER.fullmatch(text):
             raise self.complain(row, column, shown(text) if text else "an empty cell", "a finite decimal number")
@@ -128,13 +144,14 @@ class _Table:
         return value
 
     def whole(self, row: int, column: str) -> int:
+        """A whole number, 0 or more."""
         text = self.cell(row, column)
         if not _WHOLE.fullmatch(text):
             raise self.complain(row, column, shown(text) if text else "an empty cell", "a whole number, 0 or more")
         return int(text)
 
 
-def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> _Table:
+def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> Table:
     known = (*required, *optional)
     expected = ",".join(required) + f" (and optionally {', '.join(optional)})"
     lines = _NEWLINE.split(read_text(path, f"a header of {expected} and a line for each reading"))
@@ -164,7 +181,7 @@ def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) ->
         rows.append(fields)
     if not rows:
         raise InputError(f"{path}, line 2: found no readings, expected at least one")
-    return _Table(path, header, rows)
+    return Table(path, header, rows)
 
 
 def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
@@ -186,14 +203,28 @@ def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
     InputError
         With the file, line, column, what was found and what was expected.
     """
-    table = _read_table(path, REQUIRED, OPTIONAL)
+    return readings_of(readings_table(path), length_mm)
+
+
+def readings_table(path: Path) -> Table:
+    """A readings' CSV split into fields, not checked any further."""
+    return _read_table(path, REQUIRED, OPTIONAL)
+
+
+def readings_of(table: Table, length_mm: float) -> tuple[Hold, ...]:
+    """Check a table of readings, as `read_readings` does."""
     holds = _holds(table, length_mm, [table.number(row, "tension_N") for row in range(len(table.rows))])
     _check_sign(table, holds)
     return holds
 
 
-def read_protocol(path: Path, length_mm: float) -> tuple[Hold, ...]:
-    """Read the CSV of a protocol to predict: the readings' columns, with tensions optional.
+def protocol_table(path: Path) -> Table:
+    """The CSV of a protocol to predict, split into fields: the readings' columns, with tensions optional."""
+    return _read_table(path, *PROTOCOL)
+
+
+def protocol_holds(table: Table, length_mm: float) -> tuple[Hold, ...]:
+    """Check a protocol.
 
     A column `tension_N`, when there is one, is filled at most at the first time of a hold; every other
     reading has NaN.
@@ -203,7 +234,6 @@ def read_protocol(path: Path, length_mm: float) -> tuple[Hold, ...]:
     InputError
         As `read_readings`, and where a tension stands at a later time of its hold.
     """
-    table = _read_table(path, REQUIRED[:3], ("tension_N", *OPTIONAL))
     tension = [np.nan] * len(table.rows)
     if "tension_N" in table.header:
         for row in range(len(table.rows)):
@@ -216,7 +246,7 @@ def read_protocol(path: Path, length_mm: float) -> tuple[Hold, ...]:
     return _holds(table, length_mm, tension)
 
 
-def _holds(table: _Table, length_mm: float, tension: Sequence[float]) -> tuple[Hold, ...]:
+def _holds(table: Table, length_mm: float, tension: Sequence[float]) -> tuple[Hold, ...]:
     rows = range(len(table.rows))
     number = [table.whole(row, "hold") for row in rows]
     displacement = [table.number(row, "displacement_mm") for row in rows]
@@ -296,7 +326,7 @@ def times_run_on(times_s: Sequence[NDArray[np.float64]]) -> float:
     return float(np.exp(sum(lgamma(n + 1) for n in counts) - lgamma(sum(counts) + 1)))
 
 
-def _check_sign(table: _Table, holds: Sequence[Hold]) -> None:
+def _check_sign(table: Table, holds: Sequence[Hold]) -> None:
     """Refuse tensions that are clearly a push: a wire only pulls, and a slack one reads nothing but noise."""
     tension = np.concatenate([hold.tension_N for hold in holds])
     means = np.array([hold.tension_N.mean() for hold in holds])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import protocol_of
-from wirebayes.io.readings import Hold, read_protocol, read_text, shown
+from wirebayes.io.readings import Hold, Table, protocol_holds, protocol_table, shown
 from wirebayes.prediction.predictive import Question
 from wirebayes.results.store import Stored
 from wirebayes.wire.effect import EventEffect
@@ -62,8 +62,13 @@ def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Asked:
     InputError
         With the file, line, column, what was found and what was expected.
     """
+    return asked_of(protocol_table(path), stored, fresh=fresh)
+
+
+def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> Asked:
+    """Check the table of a protocol against what was trained on, as `read_question` does."""
     trained = stored.sample.protocol
-    file = _File(path, read_protocol(path, trained.length_mm))
+    file = _File(table, protocol_holds(table, trained.length_mm))
     file.check_temperature(trained.reference_C is not None)
     if stored.likelihood == "hold":
         file.check_first_readings()
@@ -125,14 +130,12 @@ def _listed(ranges: Sequence[tuple[int, int]]) -> str:
 class _File:
     """The holds of a protocol file, and where each reading stands in it."""
 
-    path: Path
+    table: Table
     holds: tuple[Hold, ...]
 
     def complain(self, hold: int, reading: int, column: str, found: str, expected: str) -> InputError:
-        header = [field.strip() for field in read_text(self.path).splitlines()[0].split(",")]
-        line = 2 + sum(len(h.time_s) for h in self.holds[:hold]) + reading
-        place = f"line {line}, column {header.index(column) + 1} ({column})" if column in header else "line 1, header"
-        return InputError(f"{self.path}, {place}: found {found}, expected {expected}")
+        row = sum(len(h.time_s) for h in self.holds[:hold]) + reading
+        return self.table.complain(row, column, found, expected)
 
     def check_temperature(self, logged: bool) -> None:
         if logged and self.holds[0].temperature_C is None:

@@ -1,8 +1,10 @@
 """Predicted readings as a table: one row for each row of the protocol file."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from wirebayes.inference.fit import seed_of
 from wirebayes.prediction.predictive import predict
@@ -36,3 +38,20 @@ def table(asked: Asked, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
             figures = [here[k, 0] + about.mean(), about.std(ddof=1), *quantiles[:, k]]
             rows.append([stored.sample.name, hold.number, hold.displacement_mm, float(time), *map(float, figures)])
     return rows
+
+
+def dataset(rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any]) -> xr.Dataset:
+    """The rows of `table` with units, along the dimension ``reading``.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+    attributes : mapping
+        Of the dataset; the experiment's name joins them.
+    """
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(HEADER)}
+    experiment = str(columns.pop("experiment")[0])
+    units = {"hold": "1", "displacement_mm": "mm", "time_s": "s"}
+    variables = {name: ("reading", np.array(c), {"units": units.get(name, "N")}) for name, c in columns.items()}
+    coords = {name: variables.pop(name) for name in units}
+    return xr.Dataset(variables, coords, {"experiment": experiment, **attributes})

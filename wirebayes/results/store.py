@@ -217,6 +217,23 @@ def _measured(
     return protocol, np.nan_to_num(readings)
 
 
+def datatree(folder: Path) -> xr.DataTree:
+    """The whole content of a folder's ``posterior.nc``, in memory."""
+    with _opened(folder / "posterior.nc") as tree:
+        loaded: xr.DataTree = tree.load()
+        return loaded
+
+
+def datatrees(folders: Mapping[str, Path]) -> xr.DataTree:
+    """The content of several ``posterior.nc`` in memory, each a branch under its name."""
+    groups = {
+        f"{name}{path}".rstrip("/"): group
+        for name, folder in folders.items()
+        for path, group in datatree(folder).to_dict().items()
+    }
+    return xr.DataTree.from_dict(groups)
+
+
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
     """What was believed before the fit: draws of the prior of one experiment's parameters, each (n,)."""
     path = folder / "posterior.nc"

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -41,20 +42,33 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a UTF-8 text file") from None
+    return parse(str(path), text, robot, tension_sd_N, tilt_sd_rad)
+
+
+def parse(
+    source: str,
+    text: str,
+    robot: Robot,
+    tension_sd_N: float,
+    tilt_sd_rad: float,
+    place: Callable[[int], str] = "line {}".format,
+) -> tuple[Session, Floats]:
+    """The same of the text of a file, which errors call `source`; `place` says where a line stands, counted from 1."""
     lines = csv.reader(io.StringIO(text, newline=""))
     try:
         numbered = [(lines.line_num, row) for row in lines if row]
     except csv.Error as error:
-        raise InputError(f"{path}: line {lines.line_num}: not CSV ({error}); expected cells with commas") from None
+        raise InputError(f"{source}: {place(lines.line_num)}: not CSV ({error}); expected cells with commas") from None
     rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
     wanted = columns(robot, tilted)
     if not rows or rows[0] != wanted:
         found = ",".join(rows[0])[:200] if rows else "nothing"
-        raise InputError(f"{path}: line 1: found {found}; expected the header {','.join(wanted)}")
-    table = np.array([_row(path, line, row, wanted) for line, row in numbered[1:]]).reshape(-1, len(wanted))
+        raise InputError(f"{source}: {place(1)}: found {found}; expected the header {','.join(wanted)}")
+    cells = [_row(f"{source}: {place(line)}", row, wanted) for line, row in numbered[1:]]
+    table = np.array(cells).reshape(-1, len(wanted))
     if not len(table):
-        raise InputError(f"{path}: no holds; expected at least one row")
+        raise InputError(f"{source}: no holds; expected at least one row")
     w = robot.legs
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
     measured = table[:, 8 + w :]
@@ -62,10 +76,10 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
     half = ~read_here & np.isfinite(measured).any(1)
     if half.any():
         raise InputError(
-            f"{path}: line {numbered[int(np.argmax(half)) + 1][0]}: some readings are empty; expected all or none"
+            f"{source}: {place(numbered[int(np.argmax(half)) + 1][0])}: some readings are empty; expected all or none"
         )
     if not read_here.any():
-        raise InputError(f"{path}: no row has tensions; expected at least one")
+        raise InputError(f"{source}: no row has tensions; expected at least one")
     turn = table[:, 4:7] if robot.degrees == 6 else np.tile(robot.home_rotation_rad, (len(table), 1))
     session = Session(
         table[:, 1:4], matrix(turn), joint, table[:, 7], read_here, tension_sd_N, tilt_sd_rad if tilted else None
@@ -79,9 +93,9 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
 _LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
 
 
-def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]:
+def _row(place: str, row: list[str], names: list[str]) -> list[float]:
     if len(row) != len(names):
-        raise InputError(f"{path}: line {line}: found {len(row)} cells; expected {len(names)}")
+        raise InputError(f"{place}: found {len(row)} cells; expected {len(names)}")
     out = []
     for name, cell in zip(names, row, strict=True):
         optional = name.startswith(("tension_", "normal_"))
@@ -100,6 +114,6 @@ def _row(path: Path, line: int, row: list[str], names: list[str]) -> list[float]
         elif name in NORMAL:
             allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
         if not np.isfinite(value) or not allowed:
-            raise InputError(f"{path}: line {line}, column {name}: found {cell[:60]!r}; expected {kind}")
+            raise InputError(f"{place}, column {name}: found {cell[:60]!r}; expected {kind}")
         out.append(value)
     return out

@@ -1,0 +1,184 @@
+"""Tests and protocols that stand in memory: columns of numbers, checked as the reader of files checks its own."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment, experiment_of
+from wirebayes.io.readings import OPTIONAL, PROTOCOL, REQUIRED, Table, shown
+from wirebayes.io.toml_keys import Keys
+from wirebayes.units import nearest
+
+SOURCE = Path("from_arrays")  # stands where the file's name would: in errors and as an experiment's source
+
+
+def from_arrays(
+    hold: Any,
+    displacement_mm: Iterable[float] | None = None,
+    time_s: Iterable[float] | None = None,
+    tension_N: Iterable[float] | None = None,
+    *,
+    length_mm: float,
+    name: str,
+    material: str,
+    temperature_C: Iterable[float] | None = None,
+    resolution_N: float = 0.0,
+    unrecorded_holds: Sequence[Mapping[str, float]] = (),
+) -> Experiment:
+    """One test of one wire from columns in memory.
+
+    The same rules hold as for the files of `read_experiments`.
+
+    Parameters
+    ----------
+    hold : (r,) array of int, or DataFrame, or mapping
+        Number of the hold of each reading; numbers rise and may skip. A table with the columns ``hold``,
+        ``displacement_mm``, ``time_s``, ``tension_N`` and optionally ``temperature_C`` stands for all of them.
+    displacement_mm, time_s, tension_N : (r,) array
+        One value a reading: position in mm, time since the hold began in s, tension in N.
+    length_mm : float
+        Zero-tension length of the sample before the test.
+    name : str
+        Letters, digits, ``.``, ``_`` and ``-``: results are stored under it.
+    material : str
+        Samples of one material may be fitted together.
+    temperature_C : (r,) array, optional
+    resolution_N : float
+        Step to which tensions were rounded; 0 where they were not.
+    unrecorded_holds : sequence of mapping
+        Holds without readings: ``before_hold``, ``displacement_mm`` and ``duration_s`` each.
+
+    Returns
+    -------
+    Experiment
+
+    Raises
+    ------
+    InputError
+        With the row (counted from 0) and the column, or the argument, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import wirebayes as wb
+    >>> test = wb.from_arrays(
+    ...     hold=[1, 1, 1, 2, 2, 2],
+    ...     displacement_mm=[1, 1, 1, 2, 2, 2],
+    ...     time_s=[0, 30, 60, 0, 30, 60],
+    ...     tension_N=[2.12, 1.91, 1.86, 2.50, 2.27, 2.21],
+    ...     length_mm=1200, name="my-wire", material="Dyneema 1 mm", resolution_N=0.01,
+    ... )
+    >>> test.tension().shape
+    (2, 3)
+    """
+    columns: Any = hold
+    if not is_table(hold):
+        given = {"hold": hold, "displacement_mm": displacement_mm, "time_s": time_s, "tension_N": tension_N}
+        columns = {column: values for column, values in given.items() if values is not None}
+    elif any(values is not None for values in (displacement_mm, time_s, tension_N)):
+        raise InputError(f"{SOURCE}: found a table and single columns, expected one or the other")
+    if temperature_C is not None:
+        columns = {column: columns[column] for column in _names(columns)} | {"temperature_C": temperature_C}
+    about = {"name": name, "material": material, "length_mm": length_mm}
+    if resolution_N != 0:
+        about["resolution_N"] = resolution_N
+    if len(unrecorded_holds):
+        about["unrecorded_holds"] = [dict(each) for each in unrecorded_holds]
+    keys = _Arguments(SOURCE, "", None, _plain(about), name if isinstance(name, str) else "")
+    return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL))
+
+
+def protocol_of_columns(columns: Any) -> Table:
+    """The table of a protocol from a DataFrame or a mapping of columns; NaN in ``tension_N`` is an empty cell."""
+    return table_of(columns, Path("protocol"), *PROTOCOL, may_be_empty=("tension_N",))
+
+
+def is_table(value: Any) -> bool:
+    """Whether something is a mapping of columns or a DataFrame."""
+    return isinstance(value, Mapping) or hasattr(value, "columns")
+
+
+def table_of(
+    columns: Any, source: Path, required: Sequence[str], optional: Sequence[str], may_be_empty: Sequence[str] = ()
+) -> Table:
+    """Columns in memory as the table that the readers of files check.
+
+    Parameters
+    ----------
+    columns : DataFrame, or mapping of name to (r,) array
+    source : Path
+        What errors call it.
+    required, optional : sequence of str
+        Names of the columns.
+    may_be_empty : sequence of str
+        Columns in which NaN or None means that there is nothing.
+
+    Raises
+    ------
+    InputError
+        A column is missing or unknown, is not one value a row, or there are no rows.
+    """
+    names = _names(columns)
+    known = (*required, *optional)
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"{source}: found the column {shown(name)}{nearest(str(name), known)}, expected {', '.join(known)}"
+            )
+    for name in required:
+        if name not in names:
+            raise InputError(f"{source}: found no column {name}, expected {', '.join(required)}")
+    header = [name for name in known if name in names]
+    texts: list[list[str]] = []
+    for name in header:
+        values = np.asarray(columns[name], dtype=object)
+        if values.ndim != 1 or (texts and len(values) != len(texts[0])):
+            found = f"an array of shape {values.shape}" if values.ndim != 1 else f"{len(values)} values"
+            expected = f"{len(texts[0])} as in {header[0]}" if texts else "one value for each reading"
+            raise InputError(f"{source}, column {name}: found {found}, expected {expected}")
+        texts.append([_text(value, empty=name in may_be_empty) for value in values])
+    if not texts[0]:
+        raise InputError(f"{source}: found no readings, expected at least one")
+    return _Columns(source, header, [list(row) for row in zip(*texts, strict=True)])
+
+
+@dataclass(frozen=True)
+class _Columns(Table):
+    """A table without lines: its rows are counted from 0, as indices are."""
+
+    def place(self, row: int, column: str) -> str:
+        return f"row {row} (from 0), column {column}" if column in self.header else f"column {column}"
+
+
+class _Arguments(Keys):
+    """Arguments of a call in place of the keys of a file."""
+
+    def complain(self, key: str, found: str, expected: str) -> InputError:
+        place = f", argument {self.prefix}{key}" if self.prefix or key in self.table or found == "nothing" else ""
+        return InputError(f"{self.source}{place}: found {found}, expected {expected}")
+
+
+def _names(columns: Any) -> list[Any]:
+    return list(columns.columns) if hasattr(columns, "columns") else list(columns)
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of numpy's as Python's, so that the same checks hold."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _text(value: Any, *, empty: bool) -> str:
+    """A value as a file would spell it; a whole number without a point, because columns with gaps are floats."""
+    value = value.item() if isinstance(value, np.generic) else value
+    if value is None or str(value) in ("nan", "<NA>", "NaT"):
+        return "" if empty else "nan"
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return value.strip() if isinstance(value, str) else repr(value)

@@ -1,0 +1,126 @@
+"""The zero-tension lengths of a robot's wires, from its own readings."""
+
+import csv
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.arrays import is_table
+from wirebayes.io.run_folder import open_run, plain, write_json
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.self_calibration import session_file
+from wirebayes.robot.self_calibration.answer import answer
+from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.workflows.options import PathLike, above_zero, check_seed, path_of
+from wirebayes.workflows.results import POSTERIOR, Calibration, Place
+from wirebayes.workflows.wires import RobotLike, Wires, configuration, content, draws_of, folder_of, hash_of, robot_of
+
+
+def calibrate(
+    robot: RobotLike,
+    readings: Any,
+    wires: Wires,
+    *,
+    tension_sd: float = 0.02,
+    tilt_sd: float = 1e-3,
+    reference_sd: float = 5.0,
+    specimen_spread: float = 0.05,
+    draws: int = 1000,
+    experiment: str | None = None,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> Calibration:
+    """Estimate the zero-tension lengths of a robot's wires from joint values and tensions, without external sensors.
+
+    Parameters
+    ----------
+    robot : Robot, name of a shipped robot, or path
+    readings : path of a CSV, DataFrame, or mapping of name to (r,) array
+        A row a hold, in order: pose asked for, duration, joint values, and tensions at its end or NaN.
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
+    tension_sd : float
+        Standard error of a tension, N.
+    tilt_sd : float
+        Standard error of the platform's normal, rad.
+    reference_sd : float
+        Standard error of the reference lengths, mm.
+    specimen_spread : float
+        Relative difference between wires of one line.
+    draws : int
+        Posterior draws used, evenly thinned.
+    experiment : str, optional
+        Which one, where several were fitted.
+    own_effects : path, optional
+        A Python file with effects of your own, where the fit used one and is read from a folder.
+    seed : int
+    output : path, optional
+        Folder for the results.
+
+    Returns
+    -------
+    Calibration
+        Its `summary` is the content of ``calibrate.json``.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong, with line and column.
+
+    Examples
+    --------
+    >>> lengths = wb.calibrate("linear-7", "linear-7-session.csv", posterior, draws=200)
+    >>> len(lengths.summary()["with_creep_model"]["length_m"]["mean"])
+    7
+    """
+    own, seed = path_of(own_effects), check_seed(seed)
+    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd))
+    if not 0 <= specimen_spread < 1:
+        raise InputError(f"--specimen-spread: found {specimen_spread:g}; expected a number from 0 to 1")
+    machine = robot_of(robot)
+    if isinstance(readings, str | os.PathLike):
+        session, values = session_file.read(Path(readings), machine, tension_sd, tilt_sd)
+        read = content(Path(readings))
+    else:
+        text = _as_csv(readings, machine)
+        session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, _row)
+        read = hash_of({"readings": text})
+    line = draws_of(wires, draws, experiment, own)
+    options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read)
+    place = Place.at(output)
+    decides = configuration("calibrate", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
+    run = open_run(place.path, decides)
+    if run.state != "done":
+        prior = Prior(line, 1e-3 * reference_sd, specimen_spread)
+        with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
+            found = answer(machine, prior, session, values, seed)
+        write_json(run.directory / "calibrate.json", found)
+        run.finish()
+    return Calibration(place, own, computed=run.state != "done")
+
+
+def _as_csv(columns: Any, robot: Robot) -> str:
+    """Columns in memory, in any order, as the text that the reader checks."""
+    if not is_table(columns):
+        raise InputError(f"readings: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
+    names = list(columns.columns) if hasattr(columns, "columns") else list(columns)
+    wanted = session_file.columns(robot, tilted=session_file.NORMAL[0] in names)
+    names = wanted if sorted(map(str, names)) == sorted(wanted) else names
+    values = [plain(list(columns[name])) for name in names]
+    rows = sorted({len(column) for column in values})
+    if len(rows) > 1:
+        raise InputError(f"readings: found columns of {rows} rows, expected as many in each")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(["" if value is None else value for value in row] for row in zip(*values, strict=True))
+    return text.getvalue()
+
+
+def _row(line: int) -> str:
+    """Where a line of `_as_csv` stands in the columns."""
+    return "columns" if line == 1 else f"row {line - 2} (from 0)"

@@ -1,0 +1,156 @@
+"""What the plain model is missing, added to it where it has a name."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import get_args
+
+from wirebayes import __version__
+from wirebayes.discovery import search
+from wirebayes.discovery.search import Joint, catalogue_without, final_models, investigate
+from wirebayes.discovery.settings import SIMULATIONS, Settings
+from wirebayes.effects import catalogue, source_of
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.run_folder import open_run, read_json, write_json
+from wirebayes.results.jobs import Job, run
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.workers import without_script, workers
+from wirebayes.workflows.options import (
+    PathLike,
+    Progress,
+    Source,
+    check_choice,
+    check_seed,
+    check_train_holds,
+    experiments_of,
+    path_of,
+    silent,
+    words,
+)
+from wirebayes.workflows.results import Findings, Place
+
+
+def discover(
+    source: Source,
+    *,
+    experiment: str | None = None,
+    train_holds: int | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    without: str | Sequence[str] = (),
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+    policy: Policy | None = None,
+    simulations: int | None = None,
+) -> Findings:
+    """Find which physical effect the model is missing.
+
+    The experiments are judged together.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+        What was measured; a path names an experiment file.
+    experiment : str, optional
+        This experiment only.
+    train_holds : int, optional
+        Use the first so many recorded holds only.
+    elastic_law, history
+        Of the plain model, as in `fit`.
+    without : sequence of str
+        Effects to leave out of the catalogue.
+    own_effects : path, optional
+        A Python file with effects of your own, which join the catalogue.
+    seed : int
+    output : path, optional
+        Folder for the results, resumed or refused as by `fit`.
+    progress : function of (name, done, total), optional
+    policy : Policy, optional
+        How many walkers and draws the fits have; what the command uses when left out.
+    simulations : int, optional
+        Refitted data sets behind the p-value; 999 when left out.
+
+    Returns
+    -------
+    Findings
+        ``report`` is the content of ``discovery.json``; ``plain[name]`` and ``final[name]`` are posteriors.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong.
+
+    Examples
+    --------
+    >>> findings = wb.discover(kite.first(5), policy=few, simulations=99)
+    >>> findings.report["experiments"]["kite-1.5m"]["verdict"]
+    'nothing-missing'
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
+    own, left_out = path_of(own_effects), words(without)
+    experiments = experiments_of(source, experiment)
+    if train_holds is not None:
+        experiments = [e.first(train_holds) for e in experiments]
+    kinds = catalogue_without(left_out, catalogue(own))
+    configuration = {
+        "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
+        "without": sorted(left_out), "own_effects": source_of(own),
+        "train_holds": train_holds, "priors": {e.name: e.priors for e in experiments},
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }  # fmt: skip
+    configuration |= {} if policy is None else {"policy": vars(policy)}
+    configuration |= {} if simulations is None else {"simulations": simulations}
+    place = Place.at(output)
+    opened = open_run(place.path, configuration)
+    if opened.state == "done":
+        return Findings(place, own, computed=False)
+    settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
+    with without_script():
+        with workers(prepare=partial(catalogue, own)) as each:
+            found = investigate(experiments, settings, seed, progress or silent, each)
+        jobs = _jobs(found, elastic_law, history, own)
+        run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+    _pictures(found, place.path, own)
+    _posterior_amplitudes(found, place.path)
+    write_json(place.path / "discovery.json", found.report)
+    opened.finish()
+    return Findings(place, own)
+
+
+def _jobs(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
+    """Plain fit of every experiment, and the final ones."""
+    plain = [("plain", Joint((e,))) for block in found.final for e in block.experiments]
+    out = []
+    for kind, model in [*plain, *(("final", m) for m in final_models(found))]:
+        folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
+        keys = tuple(f.key for f in model.effects)
+        provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
+        out.append(Job(folders[0], model.experiments, keys, own_effects, law, history, "chain", 1.0, provenance,
+                       model.near, folders))  # fmt: skip
+    return out
+
+
+def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
+    """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
+    for e in (e for block in found.final for e in block.experiments):
+        parameters = read_json(output / e.name / "final" / "summary.json")["parameters"]
+        for name, amplitude in found.report["experiments"][e.name]["amplitudes"].items():
+            column = next(c for c in parameters if c.startswith(f"{name}."))
+            amplitude |= {key: parameters[column][key] for key in ("mean", "q05", "q95")}
+
+
+def _pictures(found: search.Findings, output: Path, own_effects: Path | None) -> None:
+    """Before and after, hold by hold, and one of each finding."""
+    from wirebayes.report.pictures.discover import (  # matplotlib only where it is needed
+        before_and_after,
+        pictures_of_findings,
+    )
+
+    for e in (e for block in found.final for e in block.experiments):
+        verdict = found.report["experiments"][e.name]
+        before_and_after(output / e.name, verdict, output / f"{e.name}.png", own_effects)
+        pictures_of_findings(output / e.name, verdict, own_effects)

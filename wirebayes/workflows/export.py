@@ -1,0 +1,85 @@
+"""A robot with its wires for other programs."""
+
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import open_run, write_csv, write_text
+from wirebayes.robot.export import files
+from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, path_of, rising_times, text_of
+from wirebayes.workflows.results import POSTERIOR, Export, Place
+from wirebayes.workflows.wires import RobotLike, Wires, configuration, draws_of, folder_of, robot_of
+
+TENSIONS_N = (1.0, 2.0, 4.0, 8.0)
+TIMES_S = (60.0, 600.0, 3600.0, 86400.0)
+
+
+def export(
+    robot: RobotLike,
+    wires: Wires,
+    *,
+    tensions: Numbers = TENSIONS_N,
+    times: Numbers = TIMES_S,
+    draws: int = 1000,
+    experiment: str | None = None,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> Export:
+    """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model.
+
+    Parameters
+    ----------
+    robot : Robot, name of a shipped robot, or path
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
+    tensions : sequence of float
+        Tensions of the creep table, N.
+    times : sequence of float
+        Rising times of the creep table, s.
+    draws : int
+        Posterior draws used, evenly thinned.
+    experiment : str, optional
+        Which one, where several were fitted.
+    own_effects : path, optional
+        A Python file with effects of your own, where the fit used one and is read from a folder.
+    seed : int
+    output : path, optional
+        Folder for the results.
+
+    Returns
+    -------
+    Export
+        ``files`` holds the content of each file by name.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong, or the line cannot carry the robot.
+
+    Examples
+    --------
+    >>> exported = wb.export("hangprinter-4", posterior, draws=100)
+    >>> sorted(exported.files)
+    ['creep-table.csv', 'klipper.cfg', 'reprapfirmware.g', 'robot.xml']
+    """
+    own, seed = path_of(own_effects), check_seed(seed)
+    machine = robot_of(robot)
+    loads, moments = numbers("--tensions", tensions), rising_times(times)
+    if loads.min() <= 0:
+        raise InputError(f"--tensions: found {text_of(tensions)!r}; expected numbers above 0")
+    line = draws_of(wires, draws, experiment, own)
+    contents: dict[str, str] = {}
+    if files.is_hangprinter(machine):
+        contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
+        contents["klipper.cfg"] = files.klipper(machine, line)
+    model = files.mujoco(machine, line)
+    if model is not None:
+        contents["robot.xml"] = model
+    table = files.creep_table(machine, line, loads, moments)
+    place = Place.at(output)
+    options = (experiment, text_of(tensions), text_of(times))
+    posterior = folder_of(wires, experiment) / POSTERIOR
+    run = open_run(place.path, configuration("export", robot, posterior, draws, seed, own, *options))
+    if run.state != "done":
+        write_csv(run.directory / "creep-table.csv", files.TABLE, table)
+        for name, text in contents.items():
+            write_text(run.directory / name, text)
+        run.finish()
+    return Export(place, own, computed=run.state != "done")

@@ -1,0 +1,80 @@
+"""What a command or a function wrote, read back."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, read_json
+from wirebayes.workflows.fit import fits_in
+from wirebayes.workflows.options import PathLike, path_of
+from wirebayes.workflows.results import (
+    POSTERIOR,
+    SUMMARY,
+    Calibration,
+    Comparison,
+    Export,
+    Findings,
+    Place,
+    Pose,
+    Posterior,
+    Reproduction,
+    Result,
+    SimulatedTests,
+)
+
+_KINDS: dict[str, type[Result]] = {
+    "compare": Comparison,
+    "discover": Findings,
+    "pose": Pose,
+    "calibrate": Calibration,
+    "export": Export,
+    "simulate": SimulatedTests,
+    "reproduce": Reproduction,
+}
+
+
+def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
+    """Read back what a command wrote.
+
+    Parameters
+    ----------
+    folder : path
+        The ``--output`` of a command, or a folder with a ``posterior.nc``.
+    own_effects : path, optional
+        The Python file with effects of your own, where the command was given one and draws are computed with.
+
+    Returns
+    -------
+    Posterior, Posteriors, Findings, Comparison, Pose, Calibration, Export, SimulatedTests or Reproduction
+        What the function of the same name returns.
+
+    Raises
+    ------
+    InputError
+        There are no results of ours, or they are not finished.
+
+    Examples
+    --------
+    >>> folder = posterior.save("my-fit")
+    >>> wb.load(folder)
+    Posterior(kite-1.5m, chain hooke saturating, converged)
+    """
+    place, own = Place(Path(folder)), path_of(own_effects)
+    if (place.path / POSTERIOR).is_file():
+        name = str(read_json(place.path / SUMMARY)["experiment"])
+        return Posterior(place, own, computed=False, name=name)
+    absent = f"{place.path}: found no {CONFIGURATION}, expected a folder of results"
+    configuration = read_json(place.path / CONFIGURATION, absent)
+    command = configuration.get("command") if isinstance(configuration, dict) else None
+    if command != "fit" and command not in _KINDS:
+        known = ", ".join(["fit", *_KINDS])
+        raise InputError(f"{place.path / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
+    if not (place.path / COMPLETE).is_file():
+        raise InputError(f"{place.path}: found unfinished results, expected finished ones; run the same command again")
+    if command == "fit":
+        folders = [path.parent.name for path in sorted(place.path.glob(f"*/{POSTERIOR}"))]
+        order: list[str] = list(configuration.get("data_sha256", ()))
+        return fits_in(place, sorted(folders, key=lambda name: order.index(name) if name in order else 0), own)
+    kind: Callable[..., Result] = _KINDS[str(command)]
+    return kind(place, own, computed=False)

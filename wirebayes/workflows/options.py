@@ -1,0 +1,106 @@
+"""What the functions of the public face are given, checked and brought into one form."""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment, read_experiments, select
+from wirebayes.units import nearest
+
+PathLike = str | os.PathLike[str]
+Source = PathLike | Experiment | Sequence[Experiment]
+Progress = Callable[[str, float, float], None]
+Numbers = str | Sequence[float]  # text is what the command line was given: it stands in the configuration
+
+
+def silent(name: str, done: float, total: float) -> None:
+    """Nobody watches the progress."""
+
+
+def path_of(value: PathLike | None) -> Path | None:
+    """A path, where there is one."""
+    return None if value is None else Path(value)
+
+
+def words(value: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Names, of which one may stand alone."""
+    return (value,) if isinstance(value, str) else tuple(value or ())
+
+
+def experiments_of(source: Source, name: str | None = None) -> list[Experiment]:
+    """The experiments of a file, or those given, or the named one of them.
+
+    Raises
+    ------
+    InputError
+        The file is wrong, there is no such experiment, or two have one name.
+    """
+    if isinstance(source, str | os.PathLike):
+        return select(read_experiments(Path(source)), name)
+    experiments = [source] if isinstance(source, Experiment) else list(source)
+    for value in experiments:
+        if not isinstance(value, Experiment):
+            raise InputError(f"source: found {type(value).__name__}, expected the path of a file or Experiments")
+    names = [e.name for e in experiments]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"source: found {', '.join(names) or 'nothing'}, expected experiments of different names")
+    return select(experiments, name)
+
+
+def check_seed(seed: int) -> int:
+    """The seed as a Python integer, 0 or more."""
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed: found {seed!r}, expected a whole number, 0 or more")
+    return int(seed)
+
+
+def check_train_holds(holds: int | None) -> int | None:
+    """How many holds to learn from, as a Python integer."""
+    if holds is not None and (isinstance(holds, bool) or not isinstance(holds, int | np.integer)):
+        raise InputError(f"train_holds: found {holds!r}, expected a whole number of holds or None")
+    return None if holds is None else int(holds)
+
+
+def check_choice(option: str, value: str, known: Sequence[str]) -> None:
+    """Refuse a value that an option does not have."""
+    if value not in known:
+        hint = nearest(value, known) if isinstance(value, str) else ""
+        raise InputError(f"{option}: found {value!r}{hint}, expected {' or '.join(known)}")
+
+
+def text_of(values: Numbers) -> str:
+    """Numbers as the command line spells them."""
+    if isinstance(values, str):
+        return values
+    return ",".join(repr(float(value)).removesuffix(".0") for value in values)
+
+
+def numbers(option: str, values: Numbers, count: int | None = None) -> Any:
+    """Finite numbers, `count` of them where it is given; text has commas between them."""
+    text = text_of(values)
+    try:
+        found = np.array([float(word) for word in text.split(",")])
+    except ValueError:
+        found = np.array([np.nan])
+    if not np.isfinite(found).all() or (count is not None and len(found) != count):
+        raise InputError(f"{option}: found {text!r}; expected {count or 'some'} finite numbers separated by commas")
+    return found
+
+
+def rising_times(values: Numbers) -> Any:
+    """Seconds that rise, from ``times``."""
+    found = numbers("--times", values)
+    if found[0] < 0 or np.any(np.diff(found) <= 0):
+        raise InputError(f"--times: found {text_of(values)!r}; expected rising times from 0 on")
+    return found
+
+
+def above_zero(*options: tuple[str, float]) -> None:
+    """Refuse what is not a finite number above zero."""
+    for name, value in options:
+        if not 0 < value < float("inf"):
+            raise InputError(f"{name}: found {value:g}; expected a finite number above 0")

@@ -1,0 +1,157 @@
+"""The readings that a posterior expects of a protocol."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from wirebayes.errors import InputError
+from wirebayes.io.arrays import is_table, protocol_of_columns
+from wirebayes.io.readings import protocol_table
+from wirebayes.io.run_folder import check_file, write_csv
+from wirebayes.prediction.request import asked_of
+from wirebayes.prediction.table import HEADER, dataset, table
+from wirebayes.results import store
+from wirebayes.results.store import Stored
+from wirebayes.workflows.options import PathLike, check_choice, check_seed, path_of
+from wirebayes.workflows.results import Findings, Posterior, Posteriors
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def predict(
+    posterior: PathLike | Posterior | Posteriors | Findings,
+    protocol: Any,
+    *,
+    experiment: str | None = None,
+    model: Literal["plain", "final"] | None = None,
+    fresh: bool = False,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> "xr.Dataset":
+    """Predict the readings of holds not measured yet.
+
+    Holds of the training are answered as replicates. Holds with later numbers continue the tested sample: they begin
+    when the last trained hold ended and are predicted given all training readings.
+
+    Parameters
+    ----------
+    posterior : Posterior, Findings, or path of a folder written by fit or discover
+    protocol : path of a CSV, DataFrame, or mapping of name to (r,) array
+        Columns ``hold``, ``displacement_mm``, ``time_s``, with ``temperature_C`` where the training data had it, and
+        optionally ``tension_N``: a first reading of a hold, which conditions the prediction, else NaN.
+    experiment : str, optional
+        Which one, where there are several.
+    model : {"plain", "final"}, optional
+        Of findings: the plain model, or the final one, which is the default.
+    fresh : bool
+        The protocol is the whole history of a fresh sample instead.
+    own_effects : path, optional
+        A Python file with effects of your own, where the fit used one and was read from a folder.
+    seed : int
+    output : path, optional
+        A CSV file to write, with a row for each row of the protocol.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``reading``, a row of the protocol each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``,
+        ``q95_N`` with units as attributes. The attribute ``prediction`` says which sample was predicted, given what.
+
+    Raises
+    ------
+    InputError
+        The protocol does not follow from the training, with the row or line and the column; or no such posterior.
+
+    Examples
+    --------
+    >>> protocol = {"hold": [6, 6], "displacement_mm": [6, 6], "time_s": [0, 60]}
+    >>> predicted = wb.predict(posterior, protocol)
+    >>> predicted["mean_N"].dims, predicted["mean_N"].attrs["units"]
+    (('reading',), 'N')
+    >>> bool(predicted["mean_N"][0] > predicted["mean_N"][1])  # the wire creeps
+    True
+    """
+    own = path_of(own_effects)
+    if model is not None:
+        check_choice("model", model, ("plain", "final"))
+    stored = stored_posterior(posterior, experiment, model, own)
+    if is_table(protocol):
+        cells = protocol_of_columns(protocol)
+    elif isinstance(protocol, str | os.PathLike):
+        cells = protocol_table(Path(protocol))
+    else:
+        raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
+    asked = asked_of(cells, stored, fresh=fresh)
+    seed = check_seed(seed)
+    if output is not None:
+        check_file(Path(output))
+    rows = table(asked, seed)
+    if output is not None:
+        write_csv(Path(output), HEADER, rows)
+    return dataset(rows, {"prediction": asked.sentence, "seed": seed})
+
+
+def stored_posterior(
+    posterior: PathLike | Posterior | Posteriors | Findings,
+    experiment: str | None = None,
+    model: str | None = None,
+    own_effects: Path | None = None,
+) -> Stored:
+    """Draws and model of one experiment, from what `predict` is given."""
+    if isinstance(posterior, str | os.PathLike):
+        return find_posterior(Path(posterior), experiment, model, own_effects)
+    if isinstance(posterior, Findings):
+        posteriors: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
+        return one_of(posteriors, experiment).stored()
+    if isinstance(posterior, Posteriors):
+        return one_of(posterior, experiment).stored()
+    if not isinstance(posterior, Posterior):
+        raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
+    return posterior.stored(experiment)
+
+
+def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:
+    """The posterior of the named experiment, or the only one."""
+    if experiment is None and len(posteriors) > 1:
+        raise InputError(f"experiment: found none, expected one of {', '.join(posteriors)}")
+    name = next(iter(posteriors)) if experiment is None else experiment
+    if name not in posteriors:
+        raise InputError(f"experiment: found {name!r}, expected one of {', '.join(posteriors)}")
+    return posteriors[name]
+
+
+def find_posterior(
+    folder: Path, experiment: str | None = None, model: str | None = None, own_effects: Path | None = None
+) -> Stored:
+    """The posterior of an experiment in a folder of fit or discover, or in the folder that holds it itself.
+
+    Raises
+    ------
+    InputError
+        When there is none, several to choose from, or not the one asked for.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")
+    found: dict[str, list[Path]] = {}
+    levels = ("posterior.nc", "*/posterior.nc", "*/*/posterior.nc")
+    for path in sorted(path for level in levels for path in folder.glob(level)):
+        for name in store.experiments_in(path):
+            found.setdefault(name, []).append(path.parent)
+    if not found:
+        raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")
+    if experiment is None and len(found) > 1:
+        raise InputError(f"{folder}: found {', '.join(sorted(found))}; expected one of them as --experiment")
+    name = experiment or next(iter(found))
+    if name not in found:
+        raise InputError(f"--experiment {name}: not in {folder}, expected one of {', '.join(sorted(found))}")
+    places = {place.name: place for place in found[name]}
+    if model is None:
+        if len(places) == 1:
+            return store.load(next(iter(places.values())), name, own_effects)
+        model = "final"
+    if model not in places:
+        raise InputError(f"--model {model}: {folder} has no such posterior of {name}; discover writes plain and final")
+    return store.load(places[model], name, own_effects)

@@ -1,0 +1,45 @@
+"""The paper, with posteriors."""
+
+from pathlib import Path
+
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.workers import without_script
+from wirebayes.workflows.options import PathLike, Progress, check_seed, silent
+from wirebayes.workflows.results import Place, Reproduction
+
+
+def reproduce_paper(
+    output: PathLike, *, seed: int = 0, progress: Progress | None = None, policy: Policy | None = None
+) -> Reproduction:
+    """Everything the paper shows, on its own tables, with posteriors.
+
+    Parameters
+    ----------
+    output : path
+        Folder for the page ``report.html``, the tables, the pictures and a folder for each fit.
+    seed : int
+    progress : function of (name, done, total), optional
+    policy : Policy, optional
+        How many walkers and draws; what the command uses when left out.
+
+    Returns
+    -------
+    Reproduction
+        ``posteriors`` holds every fit; `summary` the rows of each table.
+
+    Raises
+    ------
+    InputError
+        The folder belongs to something else.
+
+    Examples
+    --------
+    >>> paper = wb.reproduce_paper("out/reproduce")  # doctest: +SKIP
+    >>> paper.posteriors["nylon-1.5m/chain"].draws()["k1"].mean()  # doctest: +SKIP
+    """
+    from wirebayes.reproduce.run import reproduce  # matplotlib only where it is needed
+
+    place = Place(Path(output))
+    with without_script():
+        lines = reproduce(place.path, check_seed(seed), progress or silent, policy or DEFAULT)
+    return Reproduction(place, not_converged=tuple(lines))

@@ -1,0 +1,563 @@
+"""What the public functions return: views of folders of results, which say in short what they hold."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
+from wirebayes.results import store
+from wirebayes.results.store import Stored
+from wirebayes.workflows.options import PathLike
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
+_FIGURES = 4  # digits that a short form shows
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder of results; a temporary one lasts as long as anything that was read from it.
+
+    Attributes
+    ----------
+    path : Path
+    temporary : TemporaryDirectory or None
+    """
+
+    path: Path
+    temporary: "TemporaryDirectory[str] | None" = None
+
+    @classmethod
+    def at(cls, output: PathLike | None) -> "Place":
+        """The folder named, or a temporary one."""
+        if output is not None:
+            return cls(Path(output))
+        folder = TemporaryDirectory(prefix="wirebayes-")
+        return cls(Path(folder.name), folder)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result:
+    """What all results have in common.
+
+    Attributes
+    ----------
+    place : Place
+        The folder of the whole command.
+    own_effects : Path or None
+        The user's file of effects, where the command was given one.
+    computed : bool
+        False where the folder held the finished results before.
+    """
+
+    place: Place
+    own_effects: Path | None = None
+    computed: bool = True
+
+    _content: ClassVar[str]  # the file that `summary` reads
+
+    @property
+    def folder(self) -> Path:
+        """Where the results lie; a temporary folder unless ``output`` was given."""
+        return self.place.path
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What the command says on standard error."""
+        return ()
+
+    def summary(self) -> dict[str, Any]:
+        """The results as plain values, as they stand in the JSON file."""
+        path = self.folder / self._content
+        with stored_results(path):
+            return dict(read_json(path))
+
+    def save(self, folder: PathLike) -> Path:
+        """Store the results as the command would have stored them.
+
+        Parameters
+        ----------
+        folder : str or Path
+            A new or empty folder, or one that holds these results already.
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        InputError
+            The folder holds something else, or cannot be written.
+        """
+        target = Path(folder)
+        state = check_run(target, read_json(self.place.path / CONFIGURATION))
+        if state != "done":
+            _copy(self.place.path, target)
+        return target
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self._shortly())})"
+
+    def _shortly(self) -> list[str]:
+        return [str(self.folder)]
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(repr(self))}</p>" + "".join(f"<p>{escape(said)}</p>" for said in self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Posterior(Result):
+    """A posterior: draws of the parameters given the readings, of one experiment or of several fitted together.
+
+    Attributes
+    ----------
+    name : str
+        The experiment, or the material of experiments fitted together.
+    within : str
+        Its folder below the command's.
+    alone : bool
+        Whether it is all that the command stored.
+
+    Examples
+    --------
+    >>> posterior.summary()["converged"]
+    True
+    >>> sorted(posterior.draws())
+    ['B', 'N', 'U', 'k1', 'k2', 'preload', 'sensor_sd', 'setting_sd']
+    >>> posterior.to_datatree()["posterior"]["k1"].attrs["units"]
+    'N'
+    """
+
+    name: str = ""
+    within: str = "."
+    alone: bool = True
+
+    _content: ClassVar[str] = SUMMARY
+
+    @property
+    def folder(self) -> Path:
+        """The folder with ``posterior.nc`` and ``summary.json``."""
+        return self.place.path / self.within
+
+    @cached_property
+    def experiments(self) -> tuple[str, ...]:
+        """Names of the experiments whose parameters it holds."""
+        return store.experiments_in(self.folder / POSTERIOR)
+
+    def draws(self, experiment: str | None = None) -> dict[str, Array]:
+        """Draws of one experiment's parameters.
+
+        Parameters
+        ----------
+        experiment : str, optional
+            Needed where several were fitted together.
+
+        Returns
+        -------
+        dict of name to (n,) array
+        """
+        return self.stored(experiment).draws
+
+    def stored(self, experiment: str | None = None) -> Stored:
+        """Draws, readings and model of one experiment, as the toolkit computes with them."""
+        return store.load(self.folder, experiment, self.own_effects)
+
+    def to_datatree(self) -> "xr.DataTree":
+        """All groups of ``posterior.nc`` in memory, as ArviZ takes them."""
+        return store.datatree(self.folder)
+
+    def save(self, folder: PathLike) -> Path:
+        """Store the posterior, as ``fit`` would where it is all that was fitted, else its two files alone.
+
+        Parameters
+        ----------
+        folder : str or Path
+            A new or empty folder, or one that holds this posterior already.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        InputError
+            The folder holds something else, or cannot be written.
+        """
+        if self.alone and (self.place.path / CONFIGURATION).is_file():
+            return super().save(folder)
+        target = Path(folder)
+        present = sorted(p.name for p in target.iterdir()) if target.is_dir() else []
+        here = (self.folder / POSTERIOR).read_bytes()
+        if present and not (POSTERIOR in present and (target / POSTERIOR).read_bytes() == here):
+            raise InputError(f"{target}: found {present[0]}, expected a new or empty folder")
+        _copy(self.folder, target)
+        return target
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What is odd about the readings, and why the posterior should not be believed, if so."""
+        path, name = self.folder / SUMMARY, self.within if self.within != "." else self.name
+        with stored_results(path):
+            summary = read_json(path)
+            return tuple(f"{name}: {said}" for said in cautions(summary))
+
+    def _shortly(self) -> list[str]:
+        s = self.summary()
+        model = [s["likelihood"], s["elastic_law"], s["history"], *s["effects"]]
+        sure = "converged" if s["converged"] else "NOT CONVERGED"
+        check = s.get("model_check") or {"passed": None}
+        passed = {True: ["model check passed"], False: ["MODEL CHECK FAILED"], None: []}[check["passed"]]
+        return [self.name, " ".join(model), sure, *passed]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, _figure(p["mean"]), _figure(p["sd"]), f"{_figure(p['q05'])} to {_figure(p['q95'])}"]
+            for name, p in self.summary()["parameters"].items()
+        ]
+        return html_table(repr(self), ["parameter", "mean", "sd", "90 % interval"], rows, self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Posteriors(Result, Mapping[str, Posterior]):
+    """The posteriors of several experiments by name.
+
+    Attributes
+    ----------
+    members : dict of name to Posterior
+    """
+
+    members: Mapping[str, Posterior] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Posterior:
+        return self.members[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.members)
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def summary(self) -> dict[str, Any]:
+        """The summary of each, by name."""
+        return {name: posterior.summary() for name, posterior in self.members.items()}
+
+    def to_datatree(self) -> "xr.DataTree":
+        """One tree with a branch for each."""
+        return store.datatrees({name: posterior.folder for name, posterior in self.members.items()})
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """Of all of them."""
+        return tuple(said for posterior in self.members.values() for said in posterior.messages)
+
+    def _shortly(self) -> list[str]:
+        return [repr(posterior) for posterior in self.members.values()]
+
+    def _repr_html_(self) -> str:
+        return "".join(posterior._repr_html_() for posterior in self.members.values())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Findings(Result):
+    """What the plain model is missing in each experiment of a file.
+
+    Examples
+    --------
+    >>> findings.report["experiments"]["kite-1.5m"]["verdict"]
+    'nothing-missing'
+    >>> findings.final["kite-1.5m"].summary()["effects"]
+    []
+    """
+
+    _content: ClassVar[str] = "discovery.json"
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """The content of ``discovery.json``."""
+        return self.summary()
+
+    @cached_property
+    def plain(self) -> dict[str, Posterior]:
+        """Posteriors of the plain model, by experiment."""
+        return self._posteriors("plain")
+
+    @cached_property
+    def final(self) -> dict[str, Posterior]:
+        """Posteriors of the model with what was found missing, by experiment."""
+        return self._posteriors("final")
+
+    def to_datatree(self) -> "xr.DataTree":
+        """One tree with a branch ``NAME/plain`` and ``NAME/final`` for each experiment."""
+        both = [*self.plain.values(), *self.final.values()]
+        return store.datatrees({posterior.within: posterior.folder for posterior in both})
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What is odd about the readings, and which posteriors should not be believed."""
+        plain = [said for p in self.plain.values() for said in p.messages]
+        # the readings are the same, so they are warned of once
+        odd = tuple(f"{p.within}: warning: " for p in self.final.values())
+        return (*plain, *(said for p in self.final.values() for said in p.messages if not said.startswith(odd)))
+
+    def _posteriors(self, model: str) -> dict[str, Posterior]:
+        return {
+            name: Posterior(self.place, self.own_effects, self.computed, name, f"{name}/{model}", alone=False)
+            for name in self.report["experiments"]
+        }
+
+    def _shortly(self) -> list[str]:
+        return [
+            " ".join([f"{name}: {found['verdict']}", ", ".join(found["effects"])]).strip()
+            for name, found in self.report["experiments"].items()
+        ]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, found["verdict"], ", ".join(found["effects"]) or "-", _figure(found["p_global"])]
+            for name, found in self.report["experiments"].items()
+        ]
+        return html_table("What the plain model is missing", ["experiment", "verdict", "effects", "p"], rows)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
+    """Models side by side on readings that their fits have not seen.
+
+    Attributes
+    ----------
+    warnings : tuple of str
+        What is odd about the readings; not known any more of results that were loaded.
+    """
+
+    warnings: tuple[str, ...] = ()
+
+    _content: ClassVar[str] = "comparison.json"
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """Models that could not be judged or did not converge."""
+        return tuple(
+            f"{name}: {row['name']}: {row['failed'] or row['convergence']}"
+            for name, table in self.summary()["experiments"].items()
+            for row in table["models"]
+            if row["failed"] is not None or not row["converged"]
+        )
+
+    def _shortly(self) -> list[str]:
+        return [
+            f"{name}: {len(table['models'])} models, best {table['models'][0]['name']}"
+            for name, table in self.summary()["experiments"].items()
+        ]
+
+    def _repr_html_(self) -> str:
+        tables = []
+        for name, table in self.summary()["experiments"].items():
+            rows = [[row["name"], row["meaning"]] for row in table["models"]]
+            tables.append(html_table(name, ["model", "meaning"], rows))
+        return "".join(tables)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pose(Result):
+    """A pose of a robot on creeping wires: kinematics, drift and pose error with bands."""
+
+    _content: ClassVar[str] = "pose.json"
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """Why there is no answer, or ways in which it leaves what was tested."""
+        found = self.summary()
+        unheld = (found["sentence"],) if "sentence" in found else ()
+        return (*unheld, *(f"warning: {warning}" for warning in found.get("warnings", [])))
+
+    def _shortly(self) -> list[str]:
+        found = self.summary()
+        if not found["feasible"]:
+            return [found["robot"], found["sentence"]]
+        drift = found["drift"][0]
+        middle = drift["distance_mm"]["q50"][-1]
+        return [found["robot"], f"drift {_figure(middle)} mm after {_figure(drift['times_s'][-1])} s"]
+
+    def _repr_html_(self) -> str:
+        found = self.summary()
+        if not found["feasible"]:
+            return super()._repr_html_()
+        drift = found["drift"][0]
+        far = drift["distance_mm"]
+        rows = [
+            [_figure(t), _figure(far["q50"][i]), f"{_figure(far['q05'][i])} to {_figure(far['q95'][i])}"]
+            for i, t in enumerate(drift["times_s"])
+        ]
+        return html_table(repr(self), ["time, s", "drift, mm", "90 % interval"], rows, self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
+    """Zero-tension lengths of a robot's wires, estimated from its own sensors."""
+
+    _content: ClassVar[str] = "calibrate.json"
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """That the lengths should not be used, if so."""
+        models = {"with_creep_model": "the creep model", "by_hooke_alone": "Hooke's law alone"}
+        with stored_results(self.folder / self._content):
+            found = self.summary()
+            astray = [called for key, called in models.items() if not found[key]["converged"]]
+        advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
+        return (f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}",) if astray else ()
+
+    def _shortly(self) -> list[str]:
+        found = self.summary()
+        sure = "converged" if found["with_creep_model"]["converged"] else "NOT CONVERGED"
+        return [found["robot"], f"{found['holds']} holds", sure]
+
+    def _repr_html_(self) -> str:
+        lengths = self.summary()["with_creep_model"]["length_m"]
+        rows = [
+            [str(i + 1), f"{mean:.5f}", f"{low:.5f} to {high:.5f}"]
+            for i, (mean, low, high) in enumerate(zip(lengths["mean"], lengths["q05"], lengths["q95"], strict=True))
+        ]
+        return html_table(repr(self), ["wire", "length, m", "90 % interval"], rows, self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Export(Result):
+    """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model."""
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Content of each file by name."""
+        own = (CONFIGURATION, COMPLETE)
+        paths = sorted(path for path in self.folder.iterdir() if path.is_file() and path.name not in own)
+        return {path.name: path.read_text(encoding="utf-8") for path in paths}
+
+    def summary(self) -> dict[str, Any]:
+        """Names of the files, and the rows of the creep table."""
+        header, *rows = self.files["creep-table.csv"].splitlines()
+        names = header.split(",")
+        table = [dict(zip(names, map(float, row.split(",")), strict=True)) for row in rows]
+        return {"files": list(self.files), "creep_table": table}
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What could not be exported."""
+        out = []
+        if "klipper.cfg" not in self.files:
+            out.append("no firmware settings: they exist for four or five drums with a position-only platform")
+        if "robot.xml" not in self.files:
+            out.append("no robot.xml: no tensions within the bounds hold the platform at its home pose")
+        return tuple(out)
+
+    def _shortly(self) -> list[str]:
+        return list(self.files)
+
+    def _repr_html_(self) -> str:
+        rows = [[_figure(value) for value in row.values()] for row in self.summary()["creep_table"]]
+        return html_table(repr(self), list(self.summary()["creep_table"][0]), rows, self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedTests(Result):
+    """Synthetic tests with known truth."""
+
+    _content: ClassVar[str] = "truth.json"
+
+    @cached_property
+    def experiments(self) -> list[Experiment]:
+        """The tests as `read_experiments` reads them."""
+        return read_experiments(self.folder / "experiments.toml")
+
+    def _shortly(self) -> list[str]:
+        return [e.name for e in self.experiments]
+
+    def _repr_html_(self) -> str:
+        truth = self.summary()["experiments"]
+        rows = [[name, p, _figure(v)] for name, t in truth.items() for p, v in t["parameters"].items()]
+        return html_table(repr(self), ["test", "parameter", "true value"], rows)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reproduction(Result):
+    """The paper's tables and figures, with posteriors.
+
+    Attributes
+    ----------
+    not_converged : tuple of str
+        A line for each such fit.
+    """
+
+    not_converged: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """Rows of each table by its name."""
+        own = (CONFIGURATION, COMPLETE)
+        return {p.stem: read_json(p) for p in sorted(self.folder.glob("*.json")) if p.name not in own}
+
+    @cached_property
+    def posteriors(self) -> dict[str, Posterior]:
+        """Every fit, by its folder below this one."""
+        found = sorted(path.parent for path in self.folder.glob(f"*/*/{POSTERIOR}"))
+        within = [path.relative_to(self.folder).as_posix() for path in found]
+        return {name: Posterior(self.place, None, self.computed, name, name, alone=False) for name in within}
+
+    def to_datatree(self) -> "xr.DataTree":
+        """One tree with a branch for each fit."""
+        return store.datatrees({name: posterior.folder for name, posterior in self.posteriors.items()})
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """Fits that did not converge."""
+        return self.not_converged
+
+    def _shortly(self) -> list[str]:
+        return [str(self.folder / "report.html"), f"{len(self.posteriors)} fits"]
+
+
+def cautions(summary: dict[str, Any]) -> list[str]:
+    """What the ``summary.json`` of a fit says against it."""
+    out = [f"warning: {said}" for said in summary["warnings"]]
+    if not summary["converged"]:
+        out.append(summary["convergence"])
+    check = summary.get("model_check", {})
+    if check.get("passed") is False or check.get("gross_errors"):
+        out.append(check["sentence"])
+    return out
+
+
+def html_table(title: str, header: list[str], rows: list[list[str]], notes: tuple[str, ...] = ()) -> str:
+    """A small table for notebooks."""
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    below = "".join(f"<p>{escape(note)}</p>" for note in notes)
+    return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{body}</table>{below}"
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.{_FIGURES}g}"
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Copy a folder of results, whole files one by one, the mark that it is complete last."""
+    files = [p for p in source.rglob("*") if p.is_file() and not p.name.startswith(".")]
+    files.sort(key=lambda p: (p.name == COMPLETE, p.name != CONFIGURATION, str(p)))
+    try:
+        for path in files:
+            copy = target / path.relative_to(source)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(copy, path.read_bytes())
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}), expected a writable folder") from None

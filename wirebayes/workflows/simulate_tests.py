@@ -1,0 +1,139 @@
+"""Synthetic tests with known truth, as files the other functions read."""
+
+from collections.abc import Mapping, Sequence
+from typing import get_args
+
+from wirebayes import __version__
+from wirebayes.effects import catalogue, source_of
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import check_run, open_run
+from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.workflows.options import Numbers, PathLike, check_choice, check_seed, path_of, text_of, words
+from wirebayes.workflows.results import Place, SimulatedTests
+
+
+def simulate_tests(
+    *,
+    tests: int = 1,
+    lengths: Numbers = (1000.0,),
+    displacements: Numbers = tuple(range(1, 13)),
+    unload: int = 0,
+    times: Numbers = (0.0, 30.0, 60.0, 90.0, 120.0),
+    unrecorded: Sequence[int] = (),
+    temperature: Numbers = (),
+    resolution: float = 0.01,
+    parameters: Mapping[str, float] | None = None,
+    effects: str | Sequence[str] | Mapping[str, float] = (),
+    own_effects: PathLike | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> SimulatedTests:
+    """Simulate tests with known truth.
+
+    Parameters
+    ----------
+    tests : int
+        Number of lines tested, each with its own true parameters.
+    lengths : sequence of float
+        Zero-tension lengths, mm; one sample of each line for each length.
+    displacements : sequence of float
+        One a hold, mm.
+    unload : int
+        Then so many holds back down through the same displacements.
+    times : sequence of float
+        Reading times of a hold, s.
+    unrecorded : sequence of int
+        Holds without readings.
+    temperature : sequence of float
+        Temperatures at evenly spaced moments of the test, °C.
+    resolution : float
+        Rounding of the tensions, N; 0 for none.
+    parameters : mapping of name to value, optional
+        Such as ``{"k1": 700}``; parameters not given are drawn from the prior.
+    effects : mapping of ``NAME.p`` to value, or sequence of ``NAME.p=VALUE`` or ``NAME``
+        Such as ``{"strain_stiffening.c": 12}`` or ``["grip_slip@7.w=0.2"]``; drawn from the prior without a value.
+    own_effects : path, optional
+        A Python file with effects of your own.
+    elastic_law, history
+        As in `fit`.
+    seed : int
+    output : path, optional
+        Folder for the files; a temporary one when left out.
+
+    Returns
+    -------
+    SimulatedTests
+        ``experiments`` are the tests, `summary` is the content of ``truth.json``.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong.
+
+    Examples
+    --------
+    >>> made = wb.simulate_tests(displacements=[1, 2, 3], parameters={"k1": 700}, seed=1)
+    >>> made.experiments[0].tension().shape
+    (3, 5)
+    >>> made.summary()["experiments"]["wire"]["parameters"]["k1"]
+    700.0
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    own, seed = path_of(own_effects), check_seed(seed)
+    chosen = dict(parameters or {})
+    found = {}
+    known = catalogue(own)
+    listed = [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else words(effects)
+    for text in listed:
+        effect, amplitudes = effect_option(text, known)
+        found[effect.key] = effect
+        chosen |= amplitudes
+    path = _numbers("--displacements", displacements)
+    if unload >= len(path):
+        raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} displacements")
+    path += path[-2 : -2 - unload : -1]
+    sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
+    if min(sizes) <= 0 or len(set(sizes)) < len(sizes):
+        raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
+    if min(path) <= -min(sizes):
+        raise InputError(f"--displacements: found {min(path):g}, expected more than -{min(sizes):g} mm, a length")
+    if moments[0] < 0 or any(b <= a for a, b in zip(moments, moments[1:], strict=False)):
+        raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
+    gaps = frozenset(unrecorded)
+    if not gaps <= set(range(1, len(path))):
+        raise InputError(f"--unrecorded: found {max(gaps)}, expected a hold from 1 to {len(path) - 1}")
+    warmth = _numbers("--temperature", temperature) if len(temperature) else []
+    benches = [
+        Bench(_name(tests, sizes, i, length), f"line-{i + 1}", length, resolution, path, moments, gaps, warmth)
+        for i in range(tests)
+        for length in sizes
+    ]
+    truth = Truth(chosen, tuple(found.values()), elastic_law, history)
+    configuration = {
+        "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
+        "displacements_mm": path, "times_s": moments, "unrecorded": sorted(gaps), "temperatures_C": warmth,
+        "resolution_N": resolution, "parameters": chosen, "effects": list(found),
+        "own_effects": source_of(own),
+        "elastic_law": elastic_law, "history": history,
+    }  # fmt: skip
+    place = Place.at(output)
+    if check_run(place.path, configuration) == "new":
+        draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made
+    run = open_run(place.path, configuration)
+    if run.state != "done":
+        write(place.path, benches, truth, seed)
+        run.finish()
+    return SimulatedTests(place, own, computed=run.state != "done")
+
+
+def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str:
+    name = f"wire-{test + 1}" if tests > 1 else "wire"
+    return name if len(lengths) == 1 else f"{name}-{length:g}mm"
+
+
+def _numbers(option: str, values: Numbers) -> list[float]:
+    return [number(option, word) for word in text_of(values).split(",")]

@@ -1,0 +1,148 @@
+"""What a robot is given: a fitted wire, its own description, and the configuration of what is computed."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes import __version__
+from wirebayes.effects import source_of
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import plain
+from wirebayes.results import store
+from wirebayes.results.store import Stored
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
+from wirebayes.workflows.options import PathLike
+from wirebayes.workflows.predict import one_of
+from wirebayes.workflows.results import POSTERIOR, Findings, Posterior, Posteriors
+
+RobotLike = PathLike | Robot
+Wires = PathLike | Posterior | Posteriors | Findings
+
+
+def read_robot(name_or_file: PathLike) -> Robot:
+    """Read a robot from a TOML file, or a shipped one by its name.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        ``linear-7``, for example; `wirebayes.robot.mechanics.schema.shipped` lists the names.
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        There is no such robot, or its file is wrong.
+
+    Examples
+    --------
+    >>> robot = wb.read_robot("linear-7")
+    >>> robot.legs, robot.degrees
+    (7, 6)
+    """
+    return schema.read(os.fspath(name_or_file))
+
+
+def robot_of(robot: RobotLike) -> Robot:
+    """The robot given, or the one read."""
+    return robot if isinstance(robot, Robot) else read_robot(robot)
+
+
+def folder_of(wires: Wires, experiment: str | None = None) -> Path:
+    """The folder with the posterior of a line; of findings, the final one."""
+    if isinstance(wires, Findings):
+        return one_of(wires.final, experiment).folder
+    if isinstance(wires, Posteriors):
+        return one_of(wires, experiment).folder
+    if isinstance(wires, Posterior):
+        return wires.folder
+    if not isinstance(wires, str | os.PathLike):
+        raise InputError(f"wires: found {type(wires).__name__}, expected a Posterior or a folder with a posterior.nc")
+    return Path(wires)
+
+
+def draws_of(
+    wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None
+) -> WireDraws:
+    """Draws of a fitted line as the robot takes them, from what a robot's function is given."""
+    if isinstance(wires, Posteriors | Findings):
+        wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)
+    if isinstance(wires, Posterior):
+        return _usable(wires.stored(experiment), wires.name, count)
+    return read_wires(folder_of(wires), count, experiment, own_effects)
+
+
+def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
+    """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
+    below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
+    if below and not (folder / POSTERIOR).is_file():
+        raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
+    return _usable(store.load(folder, experiment, own_effects), str(folder), count)
+
+
+def _usable(stored: Stored, where: str, count: int) -> WireDraws:
+    """Draws of a posterior that knows the stiffness."""
+    if stored.likelihood == "hold":
+        raise InputError(
+            f"{where}: found a fit with --likelihood hold, which does not determine the stiffness k1; expected one "
+            "with --likelihood chain, for a robot needs k1"
+        )
+    return wire_draws(stored, count)
+
+
+def wire_draws(stored: Stored, count: int) -> WireDraws:
+    """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
+    sample = stored.sample
+    effects = tuple(sample.model.effects)
+    names = [*CORE, *(c for e in material(effects) for c in e.columns())]
+    pick = np.unique(np.linspace(0, len(stored.draws["k1"]) - 1, count).round().astype(int))
+    protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
+    parameters = {name: stored.draws[name][pick] for name in names}
+    if stored.length_exponent is not None:
+        parameters[LENGTH_EXPONENT] = stored.length_exponent[pick]
+    return WireDraws(
+        parameters,
+        protocol.length_mm,
+        sample.model.law,
+        sample.model.history,
+        effects,
+        (float(readings.min()), float(readings.max())),
+        (0.0, float(protocol.duration_s.max())),
+        sample.model.tension_ref_N,
+    )
+
+
+def configuration(
+    command: str, robot: RobotLike, posterior: Path, draws: int, seed: int, own_effects: Path | None, *rest: Any
+) -> dict[str, Any]:
+    """Everything that decides the results; files by their content, not by where they lie."""
+    return {
+        "command": command,
+        "version": __version__,
+        "robot": hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot)),
+        "wires": content(posterior),
+        "own_effects": source_of(own_effects),
+        "draws": draws,
+        "seed": seed,
+        "options": list(rest),
+    }
+
+
+def content(path: Path) -> str:
+    """The hash of a file, or the name where there is none."""
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else str(path)
+
+
+def hash_of(value: Mapping[str, Any]) -> str:
+    """The hash of plain values."""
+    return sha256(json.dumps(plain(value)).encode()).hexdigest()

@@ -1,0 +1,34 @@
+"""One page of a folder of results."""
+
+from pathlib import Path
+
+from wirebayes.workflows.options import PathLike
+from wirebayes.workflows.results import Result
+
+
+def write_report(folder: PathLike | Result) -> Path:
+    """Write one self-contained page from a folder of results.
+
+    Parameters
+    ----------
+    folder : path, or what a function returned
+        The folder of a ``fit``, ``compare``, ``discover``, ``pose``, ``calibrate`` or ``reproduce``.
+
+    Returns
+    -------
+    Path
+        Of ``report.html`` in that folder; a temporary folder goes with the results that lie in it.
+
+    Raises
+    ------
+    InputError
+        The folder is not one that a command of ours has written.
+
+    Examples
+    --------
+    >>> wb.write_report(posterior).name
+    'report.html'
+    """
+    from wirebayes.report.page import write  # matplotlib only where it is needed
+
+    return write(folder.place.path if isinstance(folder, Result) else Path(folder))
