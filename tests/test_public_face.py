@@ -1,19 +1,24 @@
 """`import wirebayes as wb`: light, complete, and without a name that two things share."""
 
+import gc
+import os
 import pkgutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wirebayes as wb
+from wirebayes.cli import main
 from wirebayes.io import paper
 
 FUNCTIONS = {
     "read_experiments", "from_arrays", "fit", "compare", "discover", "predict", "simulate_tests", "load", "read_robot",
     "pose", "calibrate", "export", "list_effects", "write_report", "reproduce_paper",
 }  # fmt: skip
+FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 HEAVY = ("numpy", "scipy", "xarray", "matplotlib", "emcee", "arviz", "arviz_base")
 
 
@@ -122,3 +127,102 @@ def test_a_table_without_a_column_is_refused():
 def test_a_wrong_option_of_fit_is_named(options, said):
     with pytest.raises(wb.InputError, match=said):
         wb.fit(wb.from_arrays(**GOOD, **ABOUT), **options)
+
+
+SCRIPT = """
+import wirebayes as wb
+print("script", flush=True)
+few = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+made = wb.simulate_tests(tests=2, displacements=range(1, 6), times=[0, 30, 60], seed=1)
+fitted = wb.fit(made.experiments, check=False, policy=few)
+print(list(fitted))
+"""
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    """Processes that fit must not run the script again; two fits on two cores start some."""
+    (tmp_path / "script.py").write_text(SCRIPT)
+    pretend = "import os; os.sched_getaffinity = lambda _: {0, 1}"
+    (tmp_path / "sitecustomize.py").write_text(pretend)
+    paths = os.pathsep.join([str(tmp_path), str(Path(wb.__file__).parents[1])])
+    done = subprocess.run(
+        [sys.executable, tmp_path / "script.py"],
+        capture_output=True, text=True, check=False, cwd=tmp_path, env={**os.environ, "PYTHONPATH": paths},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "script\n['wire-1', 'wire-2']\n"
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """A quick fit and a simulated test as functions leave them, and the same of the command line."""
+    folder = tmp_path_factory.mktemp("folders")
+    options = {"displacements": [1, 2, 3, 4, 5, 6], "times": [0, 30, 60], "seed": 3, "parameters": {"k1": 700}}
+    made = wb.simulate_tests(**options, output=folder / "simulated")
+    command = "simulate --displacements 1,2,3,4,5,6 --times 0,30,60 --seed 3 --parameter k1=700 --output"
+    assert main([*command.split(), str(folder / "simulate")]) == 0
+    wb.fit(made.experiments, policy=FEW, check=False, output=folder / "fit")
+    return folder
+
+
+def bytes_of(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_function_writes_what_its_command_writes(folders, tmp_path, capsys):
+    assert bytes_of(folders / "simulated") == bytes_of(folders / "simulate")
+    fit = folders / "fit" / "wire"
+    assert main(["export", "hangprinter-4", "--wires", str(fit), "--draws", "50", "--output", str(tmp_path / "a")]) == 0
+    wb.export("hangprinter-4", wb.load(folders / "fit"), draws=50, output=tmp_path / "b")
+    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b")
+    columns = {"hold": [6, 6, 6, 7, 7], "displacement_mm": [6, 6, 6, 7, 7], "time_s": [0, 30, 60, 0, 200]}
+    rows = zip(*columns.values(), strict=True)
+    (tmp_path / "p.csv").write_text(",".join(columns) + "\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows))
+    assert main(["predict", str(fit), str(tmp_path / "p.csv"), "--output", str(tmp_path / "a.csv")]) == 0
+    predicted = wb.predict(wb.load(fit), columns, output=tmp_path / "b.csv")
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+    assert capsys.readouterr().err == f"{tmp_path / 'p.csv'}: {predicted.attrs['prediction']}\n"
+    assert [predicted[name].attrs["units"] for name in ("mean_N", "time_s", "displacement_mm")] == ["N", "s", "mm"]
+
+
+def test_results_are_saved_and_loaded_again(folders, tmp_path):
+    one = wb.load(folders / "fit")
+    again = wb.load(one.save(tmp_path / "fit"))
+    assert bytes_of(tmp_path / "fit") == bytes_of(folders / "fit")
+    assert repr(again) == repr(one) == "Posterior(wire, chain hooke saturating, converged)"
+    assert again.summary() == one.summary()
+    assert again.to_datatree().identical(one.to_datatree())
+    assert again.save(tmp_path / "fit") == tmp_path / "fit"  # what is there already
+    assert "<td>k1</td>" in one._repr_html_()
+    made = wb.load(folders / "simulated")
+    with pytest.raises(wb.InputError, match="made with another configuration"):
+        made.save(tmp_path / "fit")
+    assert wb.load(folders / "fit" / "wire").draws().keys() == one.draws().keys()
+
+
+def test_a_temporary_folder_goes_with_the_last_result():
+    posterior = wb.simulate_tests(displacements=[1, 2], seed=1)
+    folder = posterior.folder
+    assert folder.is_dir()
+    del posterior
+    gc.collect()
+    assert not folder.exists()
+
+
+def test_unfinished_or_foreign_folders_are_not_loaded(folders, tmp_path):
+    with pytest.raises(wb.InputError, match="found no configuration.json"):
+        wb.load(tmp_path)
+    half = wb.load(folders / "simulated").save(tmp_path / "half")
+    (half / "complete.json").unlink()
+    with pytest.raises(wb.InputError, match="found unfinished results"):
+        wb.load(half)
+
+
+def test_a_protocol_in_memory_is_checked_by_row_and_column(folders):
+    posterior = wb.load(folders / "fit")
+    with pytest.raises(wb.InputError, match=r"^protocol, row 1 \(from 0\), column time_s: found 0, expected a time"):
+        wb.predict(posterior, {"hold": [7, 7], "displacement_mm": [7, 7], "time_s": [0, 0]})
+    with pytest.raises(wb.InputError, match=r"^protocol, row 0 \(from 0\), column displacement_mm: found 2, expect"):
+        wb.predict(posterior, {"hold": [1, 1, 1], "displacement_mm": [2, 2, 2], "time_s": [0, 30, 60]})
+    given = {"hold": [7, 7], "displacement_mm": [7, 7], "time_s": [0, 9], "tension_N": [3.0, np.nan]}
+    assert wb.predict(posterior, given)["mean_N"][0] == 3.0

@@ -2,4 +2,13 @@
 
 
 class InputError(ValueError):
-    """Bad input or usage; its text is the plain line a user reads (exit code 2)."""
+    """Bad input or usage; its text is the plain line a user reads (exit code 2).
+
+    Examples
+    --------
+    >>> wb.fit("experiments.toml", experiment="kite")
+    Traceback (most recent call last):
+    ...
+    wirebayes.errors.InputError: experiments.toml: found no experiment 'kite' (did you mean kite-1.5m?), expected one of
+    roc-line-1m, roc-line-1.71m, nylon-1.5m, kite-1.5m
+    """

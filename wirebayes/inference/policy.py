@@ -30,6 +30,11 @@ class Policy:
         Below this share after burn-in, the learned move gives way to differential evolution alone.
     block, most_steps : int
         Kept steps before the first look at the stop rule, which says how many to add; the most of them.
+
+    Examples
+    --------
+    >>> wb.Policy(ess=1000).walkers
+    128
     """
 
     ensembles: int = 4

@@ -44,6 +44,11 @@ class Experiment:
         ``[prior]`` tables by parameter name, as written: the file's, then the experiment's own over them.
     prior_lines : dict
         The line in `source` on which each of them stands.
+
+    Examples
+    --------
+    >>> kite.first(5).tension().shape
+    (6, 5)
     """
 
     name: str
@@ -219,6 +224,12 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     ------
     InputError
         On anything wrong, with the file, the line and column or the key, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import wirebayes as wb
+    >>> [test.name for test in wb.read_experiments("experiments.toml")]
+    ['roc-line-1m', 'roc-line-1.71m', 'nylon-1.5m', 'kite-1.5m']
     """
     source = Path(path)
     text = read_text(source, "TOML with at least one [[experiment]]")

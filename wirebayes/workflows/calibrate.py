@@ -73,11 +73,13 @@ def calibrate(
 
     Examples
     --------
-    >>> lengths = wb.calibrate("linear-7", "linear-7-session.csv", posterior, draws=200)
+    >>> lengths = wb.calibrate("linear-7", "linear-7-session.csv", posterior, draws=100, output="out/calibrate")
     >>> len(lengths.summary()["with_creep_model"]["length_m"]["mean"])
     7
     """
     own, seed = path_of(own_effects), check_seed(seed)
+    tension_sd, tilt_sd, reference_sd = float(tension_sd), float(tilt_sd), float(reference_sd)
+    specimen_spread = float(specimen_spread)
     above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd))
     if not 0 <= specimen_spread < 1:
         raise InputError(f"--specimen-spread: found {specimen_spread:g}; expected a number from 0 to 1")

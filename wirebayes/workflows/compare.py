@@ -84,8 +84,8 @@ def compare(
 
     Examples
     --------
-    >>> comparison = wb.compare(kite, only="exponential", policy=few)
-    >>> sorted(row["name"] for row in comparison.summary()["experiments"]["kite-1.5m"]["models"])
+    >>> comparison = wb.compare(made.experiments, only="exponential", policy=few, output="out/compare")
+    >>> sorted(row["name"] for row in comparison.summary()["experiments"]["wire"]["models"])
     ['exponential', 'plain']
     """
     planned = plan(

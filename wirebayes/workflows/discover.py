@@ -84,8 +84,8 @@ def discover(
 
     Examples
     --------
-    >>> findings = wb.discover(kite.first(5), policy=few, simulations=99)
-    >>> findings.report["experiments"]["kite-1.5m"]["verdict"]
+    >>> findings = wb.discover(made.experiments, policy=few, simulations=99, output="out/discover")
+    >>> findings.report["experiments"]["wire"]["verdict"]
     'nothing-missing'
     """
     check_choice("elastic_law", elastic_law, get_args(ElasticLaw))

@@ -97,11 +97,13 @@ def fit(
     --------
     >>> import wirebayes as wb
     >>> few = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
-    >>> fitted = wb.fit("experiments.toml", experiment="kite-1.5m", train_holds=5, check=False, policy=few)
-    >>> fitted
+    >>> posterior = wb.fit(
+    ...     "experiments.toml", experiment="kite-1.5m", train_holds=5, check=False, policy=few, output="out/fit"
+    ... )
+    >>> posterior
     Posterior(kite-1.5m, chain hooke saturating, converged)
-    >>> 4000 < fitted.draws()["k1"].mean() < 9000
-    True
+    >>> posterior.draws()["k1"].ndim
+    1
     """
     for option, value, known in (
         ("elastic_law", elastic_law, get_args(ElasticLaw)),

@@ -28,6 +28,11 @@ class EffectDescription:
         What it belongs to, so what else shares its amplitude.
     shows : str
         What it looks like in the readings.
+
+    Examples
+    --------
+    >>> effects["toe"].shows
+    'deficit at low tension only'
     """
 
     name: str

@@ -82,7 +82,7 @@ def pose(
 
     Examples
     --------
-    >>> held = wb.pose("linear-7", posterior, times=[0, 60], draws=40)
+    >>> held = wb.pose("linear-7", posterior, times=[0, 60], draws=40, output="out/pose")
     >>> held.summary()["drift"][0]["times_s"]
     [0.0, 60.0]
     """
@@ -92,6 +92,7 @@ def pose(
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
     moments = rising_times(times)
+    tolerance, tolerance_tilt, specimen_spread = float(tolerance), float(tolerance_tilt), float(specimen_spread)
     above_zero(
         ("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread)
     )

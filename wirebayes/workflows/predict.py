@@ -67,7 +67,7 @@ def predict(
 
     Examples
     --------
-    >>> protocol = {"hold": [6, 6], "displacement_mm": [6, 6], "time_s": [0, 60]}
+    >>> protocol = {"hold": [7, 7], "displacement_mm": [7, 7], "time_s": [0, 60]}
     >>> predicted = wb.predict(posterior, protocol)
     >>> predicted["mean_N"].dims, predicted["mean_N"].attrs["units"]
     (('reading',), 'N')

@@ -1,11 +1,13 @@
 """What the public functions return: views of folders of results, which say in short what they hold."""
 
+import shutil
+import weakref
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -28,24 +30,23 @@ _FIGURES = 4  # digits that a short form shows
 
 @dataclass(frozen=True)
 class Place:
-    """A folder of results; a temporary one lasts as long as anything that was read from it.
+    """A folder of results; a temporary one is removed with the last object that holds it.
 
     Attributes
     ----------
     path : Path
-    temporary : TemporaryDirectory or None
     """
 
     path: Path
-    temporary: "TemporaryDirectory[str] | None" = None
 
     @classmethod
     def at(cls, output: PathLike | None) -> "Place":
         """The folder named, or a temporary one."""
         if output is not None:
             return cls(Path(output))
-        folder = TemporaryDirectory(prefix="wirebayes-")
-        return cls(Path(folder.name), folder)
+        place = cls(Path(mkdtemp(prefix="wirebayes-")))
+        weakref.finalize(place, shutil.rmtree, place.path, ignore_errors=True)
+        return place
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,6 +238,14 @@ class Posteriors(Result, Mapping[str, Posterior]):
     Attributes
     ----------
     members : dict of name to Posterior
+
+    Examples
+    --------
+    >>> both = wb.fit([kite.first(5), made.experiments[0]], check=False, policy=few)
+    >>> list(both)
+    ['kite-1.5m', 'wire']
+    >>> both["wire"]
+    Posterior(wire, chain hooke saturating, converged)
     """
 
     members: Mapping[str, Posterior] = field(default_factory=dict)
@@ -276,9 +285,9 @@ class Findings(Result):
 
     Examples
     --------
-    >>> findings.report["experiments"]["kite-1.5m"]["verdict"]
+    >>> findings.report["experiments"]["wire"]["verdict"]
     'nothing-missing'
-    >>> findings.final["kite-1.5m"].summary()["effects"]
+    >>> findings.final["wire"].summary()["effects"]
     []
     """
 
@@ -340,6 +349,11 @@ class Comparison(Result):
     ----------
     warnings : tuple of str
         What is odd about the readings; not known any more of results that were loaded.
+
+    Examples
+    --------
+    >>> comparison
+    Comparison(wire: 2 models, best plain)
     """
 
     warnings: tuple[str, ...] = ()
@@ -372,7 +386,13 @@ class Comparison(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose(Result):
-    """A pose of a robot on creeping wires: kinematics, drift and pose error with bands."""
+    """A pose of a robot on creeping wires: kinematics, drift and pose error with bands.
+
+    Examples
+    --------
+    >>> held.summary()["feasible"]
+    True
+    """
 
     _content: ClassVar[str] = "pose.json"
 
@@ -406,7 +426,13 @@ class Pose(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Result):
-    """Zero-tension lengths of a robot's wires, estimated from its own sensors."""
+    """Zero-tension lengths of a robot's wires, estimated from its own sensors.
+
+    Examples
+    --------
+    >>> lengths
+    Calibration(linear-7, 9 holds, converged)
+    """
 
     _content: ClassVar[str] = "calibrate.json"
 
@@ -436,7 +462,13 @@ class Calibration(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Export(Result):
-    """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model."""
+    """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.
+
+    Examples
+    --------
+    >>> exported.files["klipper.cfg"].splitlines()[2]
+    '[printer]'
+    """
 
     @property
     def files(self) -> dict[str, str]:
@@ -472,7 +504,13 @@ class Export(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulatedTests(Result):
-    """Synthetic tests with known truth."""
+    """Synthetic tests with known truth.
+
+    Examples
+    --------
+    >>> [test.name for test in made.experiments]
+    ['wire']
+    """
 
     _content: ClassVar[str] = "truth.json"
 
@@ -498,6 +536,12 @@ class Reproduction(Result):
     ----------
     not_converged : tuple of str
         A line for each such fit.
+
+    Examples
+    --------
+    >>> paper = wb.load("out/reproduce")  # doctest: +SKIP
+    >>> paper.posteriors["nylon-1.5m/chain"].summary()["converged"]  # doctest: +SKIP
+    True
     """
 
     not_converged: tuple[str, ...] = ()

@@ -84,7 +84,8 @@ def simulate_tests(
     check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
     check_choice("history", history, get_args(History))
     own, seed = path_of(own_effects), check_seed(seed)
-    chosen = dict(parameters or {})
+    chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
+    resolution = float(resolution)
     found = {}
     known = catalogue(own)
     listed = [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else words(effects)

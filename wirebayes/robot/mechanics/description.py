@@ -68,6 +68,12 @@ class Robot:
         The pose shown when none is asked for.
     lower_m, upper_m : (3,) arrays
         Box in which workspace figures are computed.
+
+    Examples
+    --------
+    >>> robot = wb.read_robot("hangprinter-4")
+    >>> robot.legs, robot.freedom
+    (4, 'position')
     """
 
     name: str

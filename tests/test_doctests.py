@@ -1,0 +1,75 @@
+"""Every public name has an example, all examples run as shown, and all names stand in the reference."""
+
+import doctest
+import inspect
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import wirebayes as wb
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAPER = DOCS.parent / "data" / "paper"
+PUBLIC = [name for name in wb.__all__ if not name.startswith("_")]
+FUNCTIONS = [name for name in PUBLIC if inspect.isfunction(getattr(wb, name))]
+FLAGS = doctest.NORMALIZE_WHITESPACE
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """A folder with the paper's files, and what the page "From Python" leaves there: names that later examples use."""
+    folder = tmp_path_factory.mktemp("doctests")
+    for file in [*PAPER.iterdir(), DOCS / "example" / "linear-7-session.csv"]:
+        shutil.copy(file, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        page = doctest.DocTestParser().get_doctest(
+            (DOCS / "python.rst").read_text(encoding="utf-8"), {}, "python.rst", str(DOCS / "python.rst"), 0
+        )
+        failed = ran(page)
+        yield folder, page.globs, failed
+
+
+def ran(examples: doctest.DocTest) -> list[str]:
+    """What went otherwise than shown."""
+    said: list[str] = []
+    doctest.DocTestRunner(optionflags=FLAGS).run(examples, out=said.append, clear_globs=False)
+    return said
+
+
+def test_the_page_from_python_runs_as_shown(shared):
+    assert not shared[2], "".join(shared[2])
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_the_examples_of_a_docstring_run_as_shown(name, shared):
+    names = dict(shared[1]) | {"wb": wb}
+    value = getattr(wb, name)
+    (examples,) = doctest.DocTestFinder(recurse=False, exclude_empty=False).find(value, name, globs=names)
+    assert examples.examples
+    said = ran(examples)
+    assert not said, "".join(said)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_public_function_is_documented_whole(name):
+    text = inspect.getdoc(getattr(wb, name))
+    parameters = inspect.signature(getattr(wb, name)).parameters
+    for section in [*(["Parameters"] if parameters else []), "Returns", "Raises", "Examples"]:
+        assert f"\n{section}\n{'-' * len(section)}\n" in text, f"{name} has no section {section}"
+    listed = text.split("Parameters\n")[1].split("\nReturns\n")[0] if parameters else ""
+    for parameter in parameters:
+        assert re.search(rf"^(\w+, )*{parameter}\b", listed, re.MULTILINE), f"{name} does not explain {parameter}"
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_public_name_stands_in_the_reference(name):
+    reference = (DOCS / "reference.rst").read_text(encoding="utf-8")
+    assert re.search(rf"^\.\. auto(function|class|exception):: wirebayes\.{name}$", reference, re.MULTILINE)
+
+
+def test_an_example_that_is_wrong_is_found():
+    wrong = doctest.DocTestParser().get_doctest(">>> 1 + 1\n3\n", {}, "wrong", None, 0)
+    assert ran(wrong)
