@@ -11,6 +11,7 @@ import pytest
 
 from wirebayes import __version__
 from wirebayes.cli import COMMANDS, Command, main
+from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 
 DATA = Path(__file__).parent.parent / "data"
@@ -134,3 +135,15 @@ def test_a_progress_bar_on_a_terminal():
     os.close(parent)
     assert "sampling" in shown
     assert "100%" in shown
+
+
+def test_effects_lists_the_catalogue_and_describes_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["effects"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(CATALOGUE)
+    assert main(["effects", "strain_stiffening"]) == 0
+    shown = capsys.readouterr().out
+    assert "k1 s (1 + c s)" in shown and "strain_stiffening.c in 1, neutral value 0" in shown
+    assert main(["effects", "stiffening"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "stiffening" in line and "strain_stiffening" in line

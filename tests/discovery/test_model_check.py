@@ -109,14 +109,20 @@ def test_fit_puts_a_failed_check_first(
     assert cli.main(command) == 0
     summary = json.loads((out / "simulated" / "summary.json").read_text())
     assert next(iter(summary)) == "model_check" and summary["model_check"]["passed"] is False
-    captured = capsys.readouterr().err.strip()
+    said = capsys.readouterr()
+    captured = said.err.strip()
     assert captured == f"simulated: {summary['model_check']['sentence']}"
-    page = (cli.main(["report", str(out)]), (out / "report.html").read_text())[1]
+    assert said.out.startswith("simulated: converged, MODEL CHECK FAILED\n") and "Next: wirebayes discover" in said.out
+    page = (out / "report.html").read_text()
     assert page.index("does not describe the readings") < page.index("What was measured")
     assert "times the longest hold" in page
     for claim in ("the data hold it together", "hardly depends on the prior", "What the readings determine (90"):
         assert claim not in page
-    assert cli.main(command) == 0 and capsys.readouterr().err.strip() == captured  # also when there is nothing to do
+    # Also when there is nothing to do; as JSON, and not at all.
+    assert cli.main([*command, "--json"]) == 0
+    said = capsys.readouterr()
+    assert said.err.strip() == captured and json.loads(said.out) == summary
+    assert cli.main([*command, "--quiet"]) == 0 and capsys.readouterr().out == ""
 
 
 class _Serial:

@@ -56,6 +56,12 @@ COMMANDS = {
         "Predict readings of holds not measured yet.",
         "wirebayes predict out/fit protocol.csv --output predicted.csv",
     ),
+    "effects": Command(
+        "wirebayes.cli.effects",
+        "effects",
+        "List the effects that a model may be missing.",
+        "wirebayes effects strain_stiffening",
+    ),
     "simulate": Command(
         "wirebayes.cli.simulate",
         "simulate",

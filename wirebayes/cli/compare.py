@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from wirebayes.cli.options import (
+    AsJson,
     ElasticLawOption,
     ExperimentFile,
     ExperimentName,
@@ -12,6 +13,7 @@ from wirebayes.cli.options import (
     LikelihoodOption,
     Output,
     OwnEffects,
+    Quiet,
     Seed,
     TrainHolds,
 )
@@ -33,12 +35,15 @@ def compare(
     likelihood: LikelihoodOption = "chain",
     only: Only = None,
     own_effects: OwnEffects = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compare models on readings that their fits have not seen: DIR/comparison.json and pictures.
 
     Every model is judged twice: each hold left out in turn, and the last third of the holds (with --train-holds K, all
     after the K-th, and none of them is used before) predicted from the rest.
     """
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.compare import carry_out, plan
 
@@ -52,3 +57,4 @@ def compare(
         found = carry_out(planned, output, report)
     for line in found.messages if found.computed else ():
         typer.echo(line, err=True)
+    conclude(found, as_json=as_json, quiet=quiet)

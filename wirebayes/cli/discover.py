@@ -6,12 +6,14 @@ from typing import Annotated
 import typer
 
 from wirebayes.cli.options import (
+    AsJson,
     ElasticLawOption,
     ExperimentFile,
     ExperimentName,
     HistoryOption,
     Output,
     OwnEffects,
+    Quiet,
     Seed,
     TrainHolds,
 )
@@ -30,8 +32,11 @@ def discover(
         typer.Option("--without", metavar="EFFECT", help="Leave an effect out of the catalogue; may be repeated."),
     ] = None,
     own_effects: OwnEffects = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.discover import discover as run
 
@@ -42,3 +47,4 @@ def discover(
         )  # fmt: skip
     for line in findings.messages if findings.computed else ():
         print(line, file=sys.stderr)
+    conclude(findings, as_json=as_json, quiet=quiet)

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from wirebayes.cli.options import (
+    AsJson,
     ElasticLawOption,
     ExperimentFile,
     ExperimentName,
@@ -13,6 +14,7 @@ from wirebayes.cli.options import (
     LikelihoodOption,
     Output,
     OwnEffects,
+    Quiet,
     Seed,
     TrainHolds,
 )
@@ -41,8 +43,11 @@ def fit(
         bool,
         typer.Option("--check/--no-check", help="Check each fit against 999 refitted simulations (some 5 to 20 s)."),
     ] = True,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.fit import fit as run
 
@@ -54,3 +59,4 @@ def fit(
         )  # fmt: skip
     for line in fitted.messages:
         print(line, file=sys.stderr)
+    conclude(fitted, as_json=as_json, quiet=quiet)

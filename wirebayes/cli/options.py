@@ -39,3 +39,5 @@ LikelihoodOption = Annotated[
 OwnEffects = Annotated[
     Path | None, typer.Option("--own-effects", metavar="FILE.py", help="A Python file with effects of your own.")
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON instead of a few lines.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing on standard output.")]

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import ExperimentName, Output, OwnEffects, Seed
+from wirebayes.cli.options import AsJson, ExperimentName, Output, OwnEffects, Quiet, Seed
 
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
 Wires = Annotated[Path, typer.Option("--wires", metavar="FOLDER", help="A folder with a posterior.nc.")]
@@ -31,11 +31,14 @@ def pose(
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Kinematics on creeping wires; drift and pose error with uncertainty bands.
 
     Give the final fit of discover as --wires and its plain one as --told to see what the effects are worth.
     """
+    from wirebayes.cli.answer import conclude
     from wirebayes.workflows.pose import pose as run
 
     found = run(
@@ -45,6 +48,7 @@ def pose(
     )  # fmt: skip
     for line in found.messages if found.computed else ():
         typer.echo(line, err=True)
+    conclude(found, as_json=as_json, quiet=quiet)
 
 
 def calibrate(
@@ -66,8 +70,11 @@ def calibrate(
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Estimate every wire's current zero-tension length from joint values and tensions, without external sensors."""
+    from wirebayes.cli.answer import conclude
     from wirebayes.workflows.calibrate import calibrate as run
 
     found = run(
@@ -76,6 +83,7 @@ def calibrate(
     )  # fmt: skip
     for line in found.messages:
         typer.echo(line, err=True)
+    conclude(found, as_json=as_json, quiet=quiet)
 
 
 def export(

@@ -159,9 +159,7 @@ def fits_in(
     return next(iter(members.values())) if alone else Posteriors(place, own_effects, computed, members)
 
 
-def _groups(
-    experiments: Sequence[Experiment], together: str | None, file: Path
-) -> dict[str, tuple[Experiment, ...]]:
+def _groups(experiments: Sequence[Experiment], together: str | None, file: Path) -> dict[str, tuple[Experiment, ...]]:
     """The experiments of each fit, by its folder."""
     if together is None:
         return {e.name: (e,) for e in experiments}

@@ -71,9 +71,7 @@ def folder_of(wires: Wires, experiment: str | None = None) -> Path:
     return Path(wires)
 
 
-def draws_of(
-    wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None
-) -> WireDraws:
+def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
     """Draws of a fitted line as the robot takes them, from what a robot's function is given."""
     if isinstance(wires, Posteriors | Findings):
         wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)

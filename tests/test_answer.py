@@ -1,0 +1,78 @@
+"""The few lines that a command ends with."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wirebayes.cli import answer
+from wirebayes.workflows.results import Calibration, Comparison, Findings, Place, Pose
+
+HELD_OUT = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": 0.05}}
+SLIP = {
+    "verdict": "ambiguous", "effects": ["grip_slip", "toe"], "group": ["grip_slip", "toe", "ageing", "unknown"],
+    "p_global": 0.001, "held_out": HELD_OUT, "next_measurement": "Unload.",
+    "amplitudes": {"grip_slip": {"mean": 0.31, "q05": 0.25, "q95": 0.38, "unit": "mm", "hold": 4}},
+}  # fmt: skip
+CLEAN = {"verdict": "nothing-missing", "effects": [], "group": [], "p_global": 0.4, "held_out": HELD_OUT,
+         "next_measurement": "Hold longer.", "amplitudes": {}}  # fmt: skip
+
+
+def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
+    """A result whose folder holds just this."""
+    (folder / name).write_text(json.dumps(content))
+    return kind(Place(folder))
+
+
+def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 1, "experiments": {"a": SLIP, "b": CLEAN}})
+    assert answer.answer(found) == [
+        "a: ambiguous: grip_slip, toe (p = 0.001)",
+        "  grip_slip at hold 4 0.31 [0.25, 0.38] mm",
+        "  hardly to be told apart on this protocol: ageing",
+        "  held-out holds: rmse 0.25 -> 0.05 N",
+        "b: nothing is missing (p = 0.4)",
+    ]
+    assert answer.next_step(found) == "a: Unload. b: Hold longer."
+
+
+def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:
+    models = [{"name": n, "failed": f} for n, f in (("toe", None), ("plain", None), ("ageing", "no fit"))]
+    found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"a": {"models": models}}})
+    assert answer.answer(found) == ["a: toe predicts left-out holds best, then plain"]
+
+
+def test_a_pose_that_cannot_be_held_says_why(tmp_path: Path) -> None:
+    found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": False, "sentence": "Too heavy."})
+    assert answer.answer(found) == ["r: Too heavy."]
+
+
+def test_a_pose_says_its_drift_for_each_spread(tmp_path: Path) -> None:
+    far = {"q05": [0.0, 0.5], "q50": [0.0, 1.0], "q95": [0.0, 2.0]}
+    drift = [{"specimen_spread": 0.05, "times_s": [0.0, 600.0], "distance_mm": far}]
+    found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": True, "drift": drift})
+    (line,) = answer.answer(found)
+    assert line == "r: after 600 s the platform has drifted by 1 mm [0.5, 2] (specimen spread 5 %)"
+
+
+def test_a_calibration_offers_no_lengths_unless_it_converged(tmp_path: Path) -> None:
+    known = {"converged": True, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
+    good = stored(Calibration, tmp_path, "calibrate.json", {"robot": "r", "with_creep_model": known})
+    assert answer.answer(good) == ["r: zero-tension lengths in m: 1.00000 [0.90000, 1.10000]"]
+    bad = {"robot": "r", "with_creep_model": known | {"converged": False}}
+    assert answer.answer(stored(Calibration, tmp_path, "calibrate.json", bad)) == [
+        "r: not converged, no lengths to use"
+    ]
+
+
+def test_json_is_the_summary_and_quiet_is_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 1, "experiments": {"b": CLEAN}})
+    (tmp_path / "report.html").write_text("")
+    known = Findings(found.place, computed=False)
+    answer.conclude(known, as_json=True)
+    assert json.loads(capsys.readouterr().out) == found.summary()
+    answer.conclude(known, quiet=True)
+    assert capsys.readouterr().out == ""
+    answer.conclude(known)
+    assert f"Results: {tmp_path} (open {tmp_path / 'report.html'})\n" in capsys.readouterr().out

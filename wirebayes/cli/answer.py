@@ -1,0 +1,136 @@
+"""What a command says at its end: the answer in a few lines, where the results lie, and what to do next."""
+
+import json
+from typing import Any
+
+from wirebayes.io.run_folder import plain
+from wirebayes.workflows.results import Calibration, Comparison, Findings, Pose, Posterior, Posteriors, Result
+from wirebayes.workflows.write_report import write_report
+
+PAGE = "report.html"
+_NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that has no name here"}
+
+
+def conclude(result: Result, *, as_json: bool = False, quiet: bool = False) -> None:
+    """Write the page of a command's results and print the answer.
+
+    Parameters
+    ----------
+    result : Result
+    as_json : bool
+        Print the summary as JSON instead.
+    quiet : bool
+        Print nothing.
+    """
+    folder = result.place.path
+    if result.computed or not (folder / PAGE).is_file():
+        write_report(folder)
+    if as_json:
+        print(json.dumps(plain(result.summary()), indent=2, ensure_ascii=False, allow_nan=False))
+    elif not quiet:
+        print("\n".join([*answer(result), f"Results: {folder} (open {folder / PAGE})", f"Next: {next_step(result)}"]))
+
+
+def answer(result: Result) -> list[str]:
+    """The answer, a line or two for each experiment, model or wire."""
+    if isinstance(result, Posteriors):
+        return [line for posterior in result.values() for line in answer(posterior)]
+    found = result.summary()
+    if isinstance(result, Posterior):
+        return _posterior(found)
+    if isinstance(result, Findings):
+        return [line for name, report in found["experiments"].items() for line in _finding(name, report)]
+    if isinstance(result, Comparison):
+        return [_comparison(name, table) for name, table in found["experiments"].items()]
+    if isinstance(result, Pose):
+        return _pose(found)
+    if isinstance(result, Calibration):
+        return _calibration(found)
+    return [repr(result)]
+
+
+def next_step(result: Result) -> str:
+    """What a person would do with this result."""
+    folder = result.place.path
+    if isinstance(result, Posterior | Posteriors):
+        fits = result.values() if isinstance(result, Posteriors) else [result]
+        failed = [f for f in fits if (f.summary().get("model_check") or {}).get("passed") is False]
+        if failed:
+            return "wirebayes discover FILE.toml --output DIR, to find out what the model is missing"
+        return f"wirebayes predict {folder} PROTOCOL.csv --output FILE.csv, or wirebayes pose ROBOT.toml --wires DIR"
+    if isinstance(result, Findings):
+        return " ".join(f"{name}: {r['next_measurement']}" for name, r in result.report["experiments"].items())
+    if isinstance(result, Comparison):
+        return "wirebayes fit FILE.toml with the options of the best model, or wirebayes discover FILE.toml"
+    if isinstance(result, Pose):
+        return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
+    if isinstance(result, Calibration):
+        return f"set the lengths of {folder / 'calibrate.json'} in the controller"
+    return f"read {folder}"
+
+
+def _posterior(summary: dict[str, Any]) -> list[str]:
+    check, derived = summary.get("model_check") or {"passed": None}, summary["derived"]
+    state = "converged" if summary["converged"] else "NOT CONVERGED"
+    passed = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[check["passed"]]
+    names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
+    parameters = ", ".join(f"{name} {_band(summary['parameters'][name])}" for name in names)
+    creep = f"creep after 2 min at {derived['tension_N']:g} N {_band(derived['creep_2min_mm'])} mm"
+    return [f"{summary['experiment']}: {state}, {passed}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
+
+
+_SHOWN = ("k1", "B", "U", "k2", "N")
+
+
+def _effects(summary: dict[str, Any]) -> list[str]:
+    return [key.split("@")[0] for key in summary["effects"]]
+
+
+def _finding(name: str, report: dict[str, Any]) -> list[str]:
+    verdict, effects = report["verdict"], ", ".join(report["effects"])
+    said = f"{_NAMED[verdict]}" if verdict in _NAMED else f"{verdict}: {effects}"
+    lines = [f"{name}: {said} (p = {report['p_global']:.2g})"]
+    for effect, size in report["amplitudes"].items():
+        at = "" if size["hold"] is None else f" at hold {size['hold']}"
+        unit = "" if size["unit"] == "-" else f" {size['unit']}"
+        lines.append(f"  {effect}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
+    like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
+    if like and verdict in ("named", "ambiguous"):
+        lines.append(f"  hardly to be told apart on this protocol: {', '.join(like)}")
+    gain = report["held_out"]
+    if report["effects"] and gain["plain"]["rmse_N"] is not None and gain["final"]["rmse_N"] is not None:
+        lines.append(f"  held-out holds: rmse {gain['plain']['rmse_N']:.3g} -> {gain['final']['rmse_N']:.3g} N")
+    return lines
+
+
+def _comparison(name: str, table: dict[str, Any]) -> str:
+    best, *others = [row["name"] for row in table["models"] if row["failed"] is None] or ["none"]
+    return f"{name}: {best} predicts left-out holds best" + (f", then {', '.join(others[:2])}" if others else "")
+
+
+def _pose(found: dict[str, Any]) -> list[str]:
+    if not found["feasible"]:
+        return [f"{found['robot']}: {found['sentence']}"]
+    lines = []
+    for drift in found["drift"]:
+        far, time = drift["distance_mm"], drift["times_s"][-1]
+        if far["q50"] is not None:
+            lines.append(
+                f"{found['robot']}: after {time:g} s the platform has drifted by {far['q50'][-1]:.3g} mm "
+                f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
+            )
+    return lines or [f"{found['robot']}: no draw of the wires could be solved"]
+
+
+def _calibration(found: dict[str, Any]) -> list[str]:
+    known = found["with_creep_model"]
+    if not known["converged"]:
+        return [f"{found['robot']}: not converged, no lengths to use"]
+    length = known["length_m"]
+    rows = zip(length["mean"], length["q05"], length["q95"], strict=True)
+    told = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
+    return [f"{found['robot']}: zero-tension lengths in m: {told}"]
+
+
+def _band(quantity: dict[str, float] | None) -> str:
+    return "-" if quantity is None else f"{quantity['q50']:.4g} [{quantity['q05']:.4g}, {quantity['q95']:.4g}]"
