@@ -93,9 +93,7 @@ def pose(
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
     moments = rising_times(times)
     tolerance, tolerance_tilt, specimen_spread = float(tolerance), float(tolerance_tilt), float(specimen_spread)
-    above_zero(
-        ("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread)
-    )
+    above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
     other = None if told is None else draws_of(told, draws, experiment, own)
     asked = Question(
         where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed
