@@ -79,6 +79,8 @@ def learn_again(target: Target, state: State, policy: Policy) -> None:
     z = np.concatenate(state.kept_z).reshape(-1, state.positions.shape[1])
     value = np.concatenate(state.kept_log_density).ravel()
     state.frozen, state.again, state.round = False, state.again + 1, policy.rounds - 1
+    if state.overlooked:  # few rounds of many draws: what is overlooked is rare
+        state.round = max(state.round, policy.most_rounds - _FEW_ROUNDS)
     state.kept_z, state.kept_log_density = [], []
     state.kept_evaluations = state.accepted = state.proposed = 0
     hot = z[_resampled((_HOT - 1.0) * value, len(z), state.generator)]
@@ -113,7 +115,7 @@ def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array,
 
 def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
-    most = policy.round_draws
+    most = policy.round_draws * (_TO_FIND_MORE if state.overlooked else 1)
     n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS))
     z = state.proposal.rvs(n, state.generator)
     before = target.evaluations
@@ -193,5 +195,6 @@ _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than
 _GOOD_ACCEPTANCE = 0.25
 _PASSING = 5000  # points for a proposal that only the next round draws from
 _IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are as many draws as asked for; the fewest before
+_TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where the last proposal overlooked places
 _LONGEST_SETTLING = 8
 _MOST_COMPONENTS = 24  # however many modes there are
