@@ -73,3 +73,19 @@ def test_a_public_name_stands_in_the_reference(name):
 def test_an_example_that_is_wrong_is_found():
     wrong = doctest.DocTestParser().get_doctest(">>> 1 + 1\n3\n", {}, "wrong", None, 0)
     assert ran(wrong)
+
+
+def test_findings_and_their_posteriors_are_saved_and_loaded_again(shared, tmp_path):
+    findings = shared[1]["findings"]
+    again = wb.load(findings.save(tmp_path / "all"))
+    assert again.report == findings.report
+    assert (tmp_path / "all" / "discovery.json").read_bytes() == (findings.folder / "discovery.json").read_bytes()
+    one = findings.final["wire"]
+    alone = wb.load(one.save(tmp_path / "one"))
+    assert sorted(path.name for path in (tmp_path / "one").iterdir()) == ["posterior.nc", "summary.json"]
+    assert alone.summary() == one.summary() == again.final["wire"].summary()
+    with pytest.raises(wb.InputError, match="expected a new or empty folder"):
+        findings.plain["wire"].save(tmp_path)
+    protocol = {"hold": [7], "displacement_mm": [7], "time_s": [0]}
+    assert wb.predict(findings, protocol).equals(wb.predict(findings.folder, protocol))
+    assert wb.predict(findings, protocol, model="plain").equals(wb.predict(findings.plain["wire"], protocol))

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 
 import wirebayes as wb
@@ -19,6 +20,7 @@ FUNCTIONS = {
     "pose", "calibrate", "export", "list_effects", "write_report", "reproduce_paper",
 }  # fmt: skip
 FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+DOCS = Path(wb.__file__).parents[1] / "docs"
 HEAVY = ("numpy", "scipy", "xarray", "matplotlib", "emcee", "arviz", "arviz_base")
 
 
@@ -226,3 +228,34 @@ def test_a_protocol_in_memory_is_checked_by_row_and_column(folders):
         wb.predict(posterior, {"hold": [1, 1, 1], "displacement_mm": [2, 2, 2], "time_s": [0, 30, 60]})
     given = {"hold": [7, 7], "displacement_mm": [7, 7], "time_s": [0, 9], "tension_N": [3.0, np.nan]}
     assert wb.predict(posterior, given)["mean_N"][0] == 3.0
+
+
+def test_a_data_frame_is_taken_as_it_is(folders):
+    made = wb.load(folders / "simulated")
+    frame = pandas.read_csv(folders / "simulated" / "wire.csv")
+    (read,) = made.experiments
+    about = {"length_mm": read.length_mm, "name": read.name, "material": read.material, "resolution_N": 0.01}
+    assert wb.from_arrays(frame, **about).data_hash == read.data_hash
+    columns = [frame[name] for name in frame.columns]
+    assert wb.from_arrays(*columns, **about).data_hash == read.data_hash
+    later = pandas.DataFrame({"hold": [7, 7], "displacement_mm": [7.0, 7.0], "time_s": [0, 30]})
+    later["tension_N"] = [None, None]
+    predicted = wb.predict(wb.load(folders / "fit"), later)
+    assert predicted.to_dataframe()["hold"].tolist() == [7, 7]
+    assert predicted.equals(wb.predict(folders / "fit", later.drop(columns="tension_N")))
+
+
+def test_a_session_in_memory_is_checked_by_row_and_column(folders):
+    frame = pandas.read_csv(DOCS / "example" / "linear-7-session.csv")
+    frame.loc[2, "duration_s"] = 0.0
+    said = r"^readings: row 2 \(from 0\), column duration_s: found '0'; expected a number above 0"
+    with pytest.raises(wb.InputError, match=said):
+        wb.calibrate("linear-7", frame, folders / "fit" / "wire")
+    with pytest.raises(wb.InputError, match="^readings: columns: found hold; expected the header hold,x_m"):
+        wb.calibrate("linear-7", {"hold": [1]}, folders / "fit" / "wire")
+
+
+def test_a_folder_of_another_configuration_is_refused(folders):
+    with pytest.raises(wb.InputError, match="made with another configuration: seed is 3 there, 4 here"):
+        wb.simulate_tests(displacements=range(1, 7), times=[0, 30, 60], seed=4, parameters={"k1": 700},
+                          output=folders / "simulated")  # fmt: skip
