@@ -89,3 +89,14 @@ def test_findings_and_their_posteriors_are_saved_and_loaded_again(shared, tmp_pa
     protocol = {"hold": [7], "displacement_mm": [7], "time_s": [0]}
     assert wb.predict(findings, protocol).equals(wb.predict(findings.folder, protocol))
     assert wb.predict(findings, protocol, model="plain").equals(wb.predict(findings.plain["wire"], protocol))
+
+
+@pytest.mark.parametrize("name", ["posterior", "findings", "comparison", "stiffening", "held", "lengths", "exported"])
+def test_a_result_shows_itself_in_a_line_and_in_a_table(name, shared):
+    value = shared[1][name]
+    assert repr(value).startswith(f"{type(value).__name__}(")
+    assert len(repr(value)) < 120
+    shown = value._repr_html_()
+    assert "<table>" in shown
+    assert shown.count("<tr>") >= 2
+    assert isinstance(value.summary(), dict)
