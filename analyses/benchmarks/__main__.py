@@ -14,7 +14,7 @@ import numpy as np
 
 from analyses.benchmarks import asked, gradient, measure, model, plain
 from wirebayes.inference.modes import modes
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
@@ -37,7 +37,7 @@ PEERS = {
 
 def check(problem, seed):
     """Largest difference of the two log likelihoods and log posteriors over draws about the mode."""
-    target, rng = Target(problem), np.random.default_rng(seed)
+    target, rng = LogPosterior(problem), np.random.default_rng(seed)
     found = modes(target, rng)
     z = found.z[0] + rng.normal(size=(20, len(found.z[0]))) @ np.linalg.cholesky(found.covariance[0]).T
     theta = target.coordinates.to_natural(z.copy())

@@ -18,7 +18,7 @@ from analyses.benchmarks.plain import ours
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference import transform
 from wirebayes.inference.fit import fit
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment, Hold
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
@@ -73,7 +73,7 @@ def growth(title, sizes, problems):
 def share_in_likelihood(problem, seed):
     """Share of a fit's processor time within the likelihood, within the target around it, and elsewhere."""
     spent = {"likelihood": 0.0, "target": 0.0}
-    kind, likelihood, target = type(problem), type(problem).log_likelihood, transform.Target.__call__
+    kind, likelihood, target = type(problem), type(problem).log_likelihood, transform.LogPosterior.__call__
 
     def watch(function, key):
         def watched(*given):
@@ -85,13 +85,13 @@ def share_in_likelihood(problem, seed):
 
         return watched
 
-    kind.log_likelihood, Target.__call__ = watch(likelihood, "likelihood"), watch(target, "target")
+    kind.log_likelihood, LogPosterior.__call__ = watch(likelihood, "likelihood"), watch(target, "target")
     try:
         began = time.process_time()
         fit(problem, seed)
         whole = time.process_time() - began
     finally:
-        kind.log_likelihood, Target.__call__ = likelihood, target
+        kind.log_likelihood, LogPosterior.__call__ = likelihood, target
     return {"fit_cpu_s": whole, "likelihood": spent["likelihood"] / whole,
             "coordinates_and_prior": (spent["target"] - spent["likelihood"]) / whole,
             "sampler": 1.0 - spent["target"] / whole}  # fmt: skip

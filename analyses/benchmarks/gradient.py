@@ -9,7 +9,7 @@ import numpy as np
 from analyses.benchmarks import model
 from analyses.benchmarks.measure import Costs, judged, looked_at
 from wirebayes.inference.modes import modes
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 
 jax.config.update("jax_enable_x64", True)
 CHAINS = 4
@@ -62,7 +62,7 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
     import numpyro.distributions as dist
     from numpyro.infer import MCMC, NUTS
 
-    costs, target, terms = Costs(), Target(problem), model.prior_terms(problem)
+    costs, target, terms = Costs(), LogPosterior(problem), model.prior_terms(problem)
     if natural:
         likelihood = model.log_likelihood(jnp, problem)
 
@@ -117,7 +117,7 @@ def blackjax_nuts(problem, seed, seconds, natural=False):
     """blackjax's NUTS on the jitted density: window adaptation with a dense mass matrix, four chains mapped at once."""
     import blackjax
 
-    costs, target = Costs(), Target(problem)
+    costs, target = Costs(), LogPosterior(problem)
     density = _log_parameters(problem) if natural else _log_density(problem, target)
     start = jnp.asarray(_begin(problem, target, costs, seed, CHAINS, natural))
     _compiled.clear()
@@ -161,7 +161,7 @@ def chees(problem, seed, seconds, natural=False, chains=256):
     import blackjax
     import optax
 
-    costs, target = Costs(), Target(problem)
+    costs, target = Costs(), LogPosterior(problem)
     plain = _log_parameters(problem) if natural else _log_density(problem, target)
     start = _begin(problem, target, costs, seed, chains, natural)
     centre, root = start.mean(0), np.linalg.cholesky(np.cov(start.T))
@@ -206,7 +206,7 @@ def nutpie_run(problem, seed, seconds, natural=True):
     import pymc as pm
     import pytensor.tensor as pt
 
-    costs, target, terms = Costs(), Target(problem), model.prior_terms(problem)
+    costs, target, terms = Costs(), LogPosterior(problem), model.prior_terms(problem)
     likelihood = model.log_likelihood(pt, problem)
     with costs.part("compile"):
         with pm.Model() as wire:

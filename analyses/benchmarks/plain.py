@@ -10,12 +10,12 @@ from analyses.benchmarks.measure import Costs, judged, looked_at
 from wirebayes.inference.modes import modes
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import ensemble
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 
 
 def ours(problem, seed, seconds, wanted=20_000):
     """A fit as a user gets it, asked for `wanted` effective draws."""
-    costs, target = Costs(), Target(problem)
+    costs, target = Costs(), LogPosterior(problem)
 
     def watched(function):
         def timed(*given):
@@ -38,7 +38,7 @@ def ours(problem, seed, seconds, wanted=20_000):
 
 def stretch(problem, seed, seconds, natural=True, walkers=128):
     """Plain emcee, four ensembles about the best point (which it is given), vectorised over its walkers."""
-    costs, target = Costs(), Target(problem)
+    costs, target = Costs(), LogPosterior(problem)
     rng = np.random.default_rng(seed)
     log_prior = problem.prior.log_density()
 

@@ -11,7 +11,7 @@ from wirebayes.discovery.continuation import climb, ladders, outward, strengths
 from wirebayes.discovery.linear_scan import Scan, expand, scan
 from wirebayes.discovery.name_evidence import choose
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import read_experiments
 from wirebayes.model.noise import reading_variance
 from wirebayes.simulation.synthetic import Bench, Truth, write
@@ -21,13 +21,13 @@ from wirebayes.wire.staircase import simulate
 STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1, "sensor_sd": 0.02, "setting_sd": 0.01}
 
 
-def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed: int) -> Block:
+def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed: int) -> LaplaceFit:
     write(folder, [Bench()], Truth(STIFF | truth, effects), seed)
     experiments = read_experiments(folder / "experiments.toml")
     return fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
 
 
-def scanned(block: Block, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
+def scanned(block: LaplaceFit, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
     trials, candidates = screening.candidate_probes([block], kinds)
     return trials, candidates, scan(expand(block.target, block.modes.z[:1], trials))
 

@@ -7,14 +7,14 @@ import pytest
 
 from wirebayes.discovery.sharing import _known, _table, informed
 from wirebayes.effects import named
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, write
 
 WIRE = {"U": 0.6, "B": 0.08, "k2": 0.02, "N": 0.7, "preload": 0.5, "sensor_sd": 0.01, "setting_sd": 0.01}
 
 
-def fit(experiments: list[Experiment], effect: str) -> Block:
+def fit(experiments: list[Experiment], effect: str) -> LaplaceFit:
     return fitted(experiments, [named(effect)], "hooke", "saturating", np.random.default_rng(0))
 
 

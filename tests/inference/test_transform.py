@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from wirebayes.effects import named
-from wirebayes.inference.transform import Coordinates, Target
+from wirebayes.inference.transform import LogPosterior, Transformation
 from wirebayes.model.pooling import pooled
 from wirebayes.model.problem import Problem, build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -30,14 +30,14 @@ PROBLEMS = {
 def test_back_and_forth_returns_the_parameters(name):
     problem = PROBLEMS[name]
     theta = problem.prior.rvs(50, np.random.default_rng(0))
-    coordinates = Coordinates(problem)
+    coordinates = Transformation(problem)
     assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_jacobian_is_the_determinant_of_the_map(name):
     problem = PROBLEMS[name]
-    coordinates, d = Coordinates(problem), len(problem.names)
+    coordinates, d = Transformation(problem), len(problem.names)
     theta = problem.prior.rvs(5, np.random.default_rng(1))
     z, step = coordinates.to_sampled(theta), 1e-6
     for row, natural in zip(z, theta, strict=True):
@@ -49,7 +49,7 @@ def test_the_jacobian_is_the_determinant_of_the_map(name):
 
 def test_the_target_is_prior_likelihood_and_volume():
     problem = PROBLEMS["chain"]
-    target = Target(problem)
+    target = LogPosterior(problem)
     theta = problem.prior.rvs(20, np.random.default_rng(2))
     prior = sum(d.logpdf(theta[:, i]) for i, d in enumerate(problem.prior.distributions.values()))
     expected = prior + problem.log_likelihood(theta) + target.coordinates.log_jacobian(theta)
@@ -60,7 +60,7 @@ def test_the_target_is_prior_likelihood_and_volume():
 def test_outside_the_prior_the_density_is_zero():
     made = draw([Bench()], Truth({"k1": 800.0}), seed=2)
     narrow = made.problem.prior.distributions | {"U": stats.uniform(0.4, 0.2)}
-    target = Target(replace(made.problem, prior=replace(made.problem.prior, distributions=narrow)))
+    target = LogPosterior(replace(made.problem, prior=replace(made.problem.prior, distributions=narrow)))
     theta = np.repeat(made.theta, 2, axis=0)
     theta[:, made.problem.names.index("U")] = 0.5, 0.7
     assert np.isfinite(target(target.coordinates.to_sampled(theta))).tolist() == [True, False]
@@ -69,7 +69,7 @@ def test_outside_the_prior_the_density_is_zero():
 def test_amplitudes_with_an_edge_are_standard_normal_under_their_prior():
     problem = PROBLEMS["edges"]
     columns = [problem.names.index(name) for name in ("permanent_creep.psi", "creep_threshold.tau_c")]
-    coordinates = Coordinates(problem)
+    coordinates = Transformation(problem)
     theta = problem.prior.rvs(2000, np.random.default_rng(5))
     z = coordinates.to_sampled(theta)
     for column in columns:
@@ -84,9 +84,9 @@ def test_a_prior_that_allows_negative_values_is_sampled_as_it_is():
     experiment = Bench().experiment()
     experiment.priors["U"] = {"distribution": "normal", "mean": 0.5, "sd": 1.0}
     problem = build([experiment])
-    assert not Coordinates(problem).log_columns[problem.names.index("U")]
+    assert not Transformation(problem).log_columns[problem.names.index("U")]
     theta = problem.prior.rvs(50, np.random.default_rng(0))
-    coordinates = Coordinates(problem)
+    coordinates = Transformation(problem)
     assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9)
 
 
@@ -97,7 +97,7 @@ def test_fixed_parameters_are_not_sampled():
     assert "N" not in problem.names
     theta = problem.prior.rvs(20, np.random.default_rng(0))
     assert (problem.parameters(theta, problem.samples[0])["N"] == 1.0).all()
-    coordinates = Coordinates(problem)
+    coordinates = Transformation(problem)
     assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9)
 
 
@@ -106,7 +106,7 @@ def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates():
     made = draw(
         [Bench(resolution_N=0.0)], Truth({"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.3}), 1
     )
-    coordinates, names = Coordinates(made.problem), made.problem.names
+    coordinates, names = Transformation(made.problem), made.problem.names
     rng, column = np.random.default_rng(0), names.index("B")
     theta = np.repeat(made.theta, 200, axis=0)
     for name, spread in (("U", 0.2), ("k2", 0.5), ("N", 0.2)):
@@ -132,9 +132,9 @@ def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread(
     problem = PROBLEMS["pooled"]
     silent, names = Silent(problem.samples, problem.prior, problem.likelihood), problem.names
     theta = problem.prior.rvs(500, np.random.default_rng(3))
-    z = Coordinates(silent).to_sampled(theta)
+    z = Transformation(silent).to_sampled(theta)
     at = {name: i for i, name in enumerate(names)}
-    seen = Coordinates(problem).to_sampled(theta)
+    seen = Transformation(problem).to_sampled(theta)
     for line, spread, own in problem.prior.pools:
         for name in own:
             deviation = np.log(theta[:, at[name]] / theta[:, at[line]]) / theta[:, at[spread]]
@@ -143,7 +143,7 @@ def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread(
     theta = theta[:2]
     theta[:, at["spread_k1"]], theta[1] = 10.0, theta[0]
     theta[1, at["k1"]] *= 1.1
-    moved = np.diff(Coordinates(problem).to_sampled(theta), axis=0)[0]
+    moved = np.diff(Transformation(problem).to_sampled(theta), axis=0)[0]
     own = [at[name] for name in problem.prior.pools[0][2]]
     assert np.abs(moved[own]).max() < 0.01 < np.abs(np.diff(z[:2], axis=0)[0][own]).max()
     assert np.isfinite(seen).all()

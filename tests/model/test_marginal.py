@@ -11,7 +11,7 @@ from wirebayes.effects import named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
-from wirebayes.model.marginal import Integrated, completed, integrated
+from wirebayes.model.marginal import MarginalisedProblem, completed, integrated
 from wirebayes.model.problem import build
 
 WIRES = {e.name: e for e in paper.experiments()}
@@ -54,7 +54,7 @@ def test_bayes_rule_holds_at_every_completed_draw(effects):
     priors = whole.prior.distributions | {"discrepancy.course1": wide}
     whole = replace(whole, prior=replace(whole.prior, distributions=priors))
     inner = integrated(whole)
-    assert isinstance(inner, Integrated)
+    assert isinstance(inner, MarginalisedProblem)
     theta = likely(inner, 50)
     problem, draws, log_density = completed(inner, theta, np.random.default_rng(1))
     assert problem is whole
@@ -81,7 +81,7 @@ def test_only_what_is_linear_to_the_end_is_integrated_out():
     plain = build([WIRES["roc-line-1m"]], [named("toe")])
     assert integrated(plain) is plain
     before = problem_of("roc-line-1m", "sensor_nonlinearity")
-    assert isinstance(integrated(before), Integrated)
+    assert isinstance(integrated(before), MarginalisedProblem)
     after = build([WIRES["roc-line-1m"]], [named(UNNAMED), named("sensor_nonlinearity")])
     assert integrated(after) is after
     wide = before.prior.distributions | {"discrepancy.level0": stats.uniform(-1.0, 2.0)}

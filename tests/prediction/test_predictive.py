@@ -9,7 +9,7 @@ from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.predictive import Question, predict
+from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.wire.staircase import simulate
 
 TRUTH = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.006, "setting_sd": 0.02}
@@ -20,13 +20,13 @@ def wire(name: str = "roc-line-1m") -> Experiment:
     return next(e for e in experiments() if e.name == name)
 
 
-def question_of(experiment: Experiment, train: int, first: dict[int, float] | None = None) -> Question:
+def question_of(experiment: Experiment, train: int, first: dict[int, float] | None = None) -> PredictionRequest:
     """Trained holds as replicates, the others free or given their first reading (by row)."""
     protocol = experiment.protocol()
     given = np.full(len(protocol.number), np.nan)
     for row, value in (first or {}).items():
         given[row] = value
-    return Question(protocol, len(experiment.train(train).holds), protocol.recorded, given)
+    return PredictionRequest(protocol, len(experiment.train(train).holds), protocol.recorded, given)
 
 
 def rows(values: dict[str, float], problem_names: tuple[str, ...], n: int = DRAWS) -> np.ndarray:
@@ -149,7 +149,7 @@ def test_hold_by_hold_spreads_the_first_readings_own_error() -> None:
     problem = build([experiment], likelihood="hold")
     theta = rows(TRUTH, problem.names, 20000)
     protocol = experiment.protocol()
-    question = Question(protocol, len(protocol.number), protocol.recorded, experiment.tension()[:, 0])
+    question = PredictionRequest(protocol, len(protocol.number), protocol.recorded, experiment.tension()[:, 0])
     drawn = predict(problem, theta, problem.samples[0], question, np.random.default_rng(6))
     assert np.all(drawn[:, 0] == experiment.tension()[:, :1])
     # with no creep left to matter both readings' errors add: slopes by length are nearly equal

@@ -9,7 +9,7 @@ from scipy import stats
 from tests.model.dense import normal
 from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
-from wirebayes.prediction.predictive import Question
+from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.prediction.table import HEADER, table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
@@ -25,7 +25,7 @@ def test_quantiles_are_those_of_the_known_normal() -> None:
     sample, protocol = build([experiment]).samples[0], experiment.protocol()
     stored = Stored({name: np.full(DRAWS, value) for name, value in WIRE.items()}, sample, "chain")
     every = np.ones(3, bool)
-    question = Question(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
+    question = PredictionRequest(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
     asked = SimpleNamespace(stored=stored, question=question, holds=experiment.holds)
     rows = [dict(zip(HEADER, row, strict=True)) for row in table(asked, draws=DRAWS)]  # type: ignore[arg-type]
     r, covariance, hold = normal(protocol, WIRE, Model(), experiment.tension(), 0.02)

@@ -5,7 +5,7 @@ from wirebayes.io.run_folder import plain
 from wirebayes.report.pictures import robot as pictures
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.pose.answer import answer
-from wirebayes.robot.pose.request import Question, band
+from wirebayes.robot.pose.request import PoseRequest, band
 
 TIMES = np.array([0.0, 60.0])
 
@@ -19,7 +19,7 @@ def _line(n, k1, law="hooke"):
 def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
     robot = schema.read("cogiro-desk")
-    asked = Question(robot.home_m, np.eye(3), TIMES)
+    asked = PoseRequest(robot.home_m, np.eye(3), TIMES)
     found = answer(robot, _line(40, 3.0, "modified"), asked)
     content = found.content
     assert not content["feasible"]
@@ -33,7 +33,7 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     robot = schema.read("cogiro-desk")
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
     both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
-    asked = Question(robot.home_m, np.eye(3), TIMES)
+    asked = PoseRequest(robot.home_m, np.eye(3), TIMES)
     found = answer(robot, draws.WireDraws(both, 1000.0, "modified"), asked)
     content = found.content
     assert content["feasible_draws"] == 0.5
@@ -48,7 +48,7 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
 
 def test_one_draw_is_enough():
     robot = schema.read("hangprinter-4")
-    content = answer(robot, _line(1, 5000.0), Question(robot.home_m, np.eye(3), TIMES)).content
+    content = answer(robot, _line(1, 5000.0), PoseRequest(robot.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["solved"] == 1.0
     assert "sentence" in content["variance_shares"]
 
@@ -63,7 +63,7 @@ def test_given_wires_have_no_uncertainty_and_keep_their_leg():
     assert wires.theta["k1"].shape == (6, 20)
     np.testing.assert_array_equal(wires.theta["k1"][0], 5e4)
     np.testing.assert_array_equal(wires.theta["k1"][1], wires.theta["k1"][5])
-    content = answer(mixed, _line(20, 800.0), Question(mixed.home_m, np.eye(3), TIMES)).content
+    content = answer(mixed, _line(20, 800.0), PoseRequest(mixed.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["largest_round_trip_error_m"] < 1e-9
 
 
@@ -84,7 +84,7 @@ def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
     elongation = line.parameters["B"] * (leg / 1.0) ** exponent  # of the leg's own wire at 1 N, mm
     tested = wires.theta["B"][-1] / wires.length_mm[-1] * 1e3 * leg
     np.testing.assert_allclose(tested, elongation, rtol=1e-5)
-    content = answer(robot, told, Question(robot.home_m, np.eye(3), TIMES)).content
+    content = answer(robot, told, PoseRequest(robot.home_m, np.eye(3), TIMES)).content
     assert content["variance_shares"]["shared_draw"][draws.LENGTH_EXPONENT] > 0.1
     assert any("exponent" in text for text in content["warnings"]) or name == "linear-6"
 
@@ -103,7 +103,7 @@ def test_tilt_is_told_against_the_commanded_normal_and_against_the_vertical():
 
     robot = schema.read("cogiro-desk")
     leaning = matrix(np.array([0.05, 0.0, 0.3]))
-    drift = answer(robot, _line(40, 800.0), Question(robot.home_m, leaning, TIMES)).content["drift"][0]
+    drift = answer(robot, _line(40, 800.0), PoseRequest(robot.home_m, leaning, TIMES)).content["drift"][0]
     away = np.degrees(np.arccos(leaning[2, 2]))
     assert drift["tilt_deg"]["q95"][0] < 1e-6
     assert 0 < drift["tilt_deg"]["q50"][1] < 0.5

@@ -9,7 +9,7 @@ from wirebayes.robot.mechanics import draws
 from wirebayes.robot.motion import drift, forward, inverse
 from wirebayes.robot.pose import stability
 from wirebayes.robot.pose.answer import answer
-from wirebayes.robot.pose.request import Question
+from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.robot.proof import proofs
 
 from . import drawn, independent
@@ -223,7 +223,7 @@ def _crept(d):
 
 def test_a_pose_of_seven_wires_is_among_its_own_equilibria_and_named():
     d = drawn.draw("body-7", np.random.default_rng(0), 20, 0.02)
-    content = answer(d.robot, d.line, Question(d.position_m, d.rotation, np.array([0.0, 1.0]))).content
+    content = answer(d.robot, d.line, PoseRequest(d.position_m, d.rotation, np.array([0.0, 1.0]))).content
     own = [p for p in content["equilibria"]["poses"] if p["commanded"]]
     assert len(own) == 1
     assert own[0]["stable"] == content["equilibria"]["commanded_stable"]

@@ -47,7 +47,7 @@ def fitted(tmp_path_factory):
 def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect):
     column, own, strain = EFFECTS[effect]
     out = tmp_path / "out"
-    arguments = ["pose", "cogiro-desk", "--wires", str(fitted[effect]), "--told", str(fitted["plain"])]
+    arguments = ["pose", "cogiro-desk", "--wires", str(fitted[effect]), "--other-fit", str(fitted["plain"])]
     arguments += ["--output", str(out), "--times", "0,60", "--draws", "50"]
     assert main([*arguments, *(["--own-effects", str(own)] if own else [])]) == 0
     said = json.loads((out / "pose.json").read_text())

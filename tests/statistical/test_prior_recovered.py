@@ -7,7 +7,7 @@ from scipy import stats
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.transform import Coordinates
+from wirebayes.inference.transform import Transformation
 from wirebayes.model.pooling import pooled
 from wirebayes.model.problem import Problem, build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -35,7 +35,7 @@ def assert_prior(problem, seed):
     last = done.problem.prior
     draws = done.chains
     z = draws.z[:, -1].reshape(-1, draws.z.shape[-1])  # as good as independent: the last of every walker
-    theta = Coordinates(problem).to_natural(z)
+    theta = Transformation(problem).to_natural(z)
     for i, (name, distribution) in enumerate(last.distributions.items()):
         # a level that all parameters together miss once in a thousand
         assert stats.kstest(theta[:, i], distribution.cdf).pvalue > 1e-4, name

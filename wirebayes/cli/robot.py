@@ -23,9 +23,9 @@ def pose(
     tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Allowed pose error.")] = 0.3,
     tolerance_tilt: Annotated[float, typer.Option("--tolerance-tilt", metavar="DEG", help="Allowed rotation.")] = 0.055,
     spread: Spread = 0.05,
-    told: Annotated[
+    other_fit: Annotated[
         Path | None,
-        typer.Option("--told", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
+        typer.Option("--other-fit", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
     ] = None,
     draws: Draws = 1000,
     experiment: ExperimentName = None,
@@ -36,14 +36,14 @@ def pose(
 ) -> None:
     """Kinematics on creeping wires; drift and pose error with uncertainty bands.
 
-    Give the final fit of discover as --wires and its plain one as --told to see what the effects are worth.
+    Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects are worth.
     """
     from wirebayes.cli.answer import conclude
     from wirebayes.workflows.pose import pose as run
 
     found = run(
         robot, wires, position=position, rotation=rotation, times=times, tolerance=tolerance,
-        tolerance_tilt=tolerance_tilt, specimen_spread=spread, told=told, draws=draws, experiment=experiment,
+        tolerance_tilt=tolerance_tilt, specimen_spread=spread, other_fit=other_fit, draws=draws, experiment=experiment,
         own_effects=own_effects, seed=seed, output=output,
     )  # fmt: skip
     for line in found.messages if found.computed else ():

@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.effects import named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.modes import modes
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Likelihood, Problem, build
@@ -126,7 +126,7 @@ def effects_of(
 def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence[Effect], seed: int) -> Effect:
     evidence = []
     for variant in variants:
-        target = Target(problem_of(candidate, training, [variant]))
+        target = LogPosterior(problem_of(candidate, training, [variant]))
         found = modes(target, np.random.default_rng(seed))
         evidence.append(np.where(found.converged, found.log_evidence, -np.inf).max())
     return variants[int(np.argmax(evidence))]

@@ -31,8 +31,8 @@ from wirebayes.discovery.linear_scan import (
 )
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
-from wirebayes.inference.laplace_fit import Block, column_of
-from wirebayes.inference.transform import Target
+from wirebayes.inference.laplace_fit import LaplaceFit, column_of
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import solve
 from wirebayes.model import noise
 from wirebayes.wire.effect import Effect, EventEffect
@@ -56,7 +56,7 @@ _LEVEL = 0.95  # of chance, above which a name is worth a try
 
 
 @dataclass(frozen=True)
-class Ladder:
+class AmplitudePath:
     """A form of an effect and the amplitudes it is led through, from several starts at once.
 
     Attributes
@@ -83,8 +83,8 @@ class Ladder:
 
 
 def ladders(
-    blocks: Sequence[Block], trials: Sequence[Probe], candidates: Sequence[Candidate], data: Sequence[Scan]
-) -> list[Ladder]:
+    blocks: Sequence[LaplaceFit], trials: Sequence[Probe], candidates: Sequence[Candidate], data: Sequence[Scan]
+) -> list[AmplitudePath]:
     """One ladder for each form that lasts, a start for each trial of its shape constants and each sign.
 
     None for events: they move the level of their hold, which the linear scan sees.
@@ -113,11 +113,11 @@ def ladders(
             probes, first, last = zip(*starts, strict=True)
             widest = float(np.max(np.divide(last, first)))
             rungs = min(1 + int(np.ceil(np.log(widest) / np.log(_APART))), _MOST)
-            out.append(Ladder(probes, np.geomspace(first, last, rungs), here))
+            out.append(AmplitudePath(probes, np.geomspace(first, last, rungs), here))
     return out
 
 
-def _raw(block: Block, probe: Probe) -> float:
+def _raw(block: LaplaceFit, probe: Probe) -> float:
     """Squared length of a unit of the effect in the readings, in standard deviations of one."""
     shapes = forms(block.target, block.modes.z[:1], [probe])
     theta, total = block.target.coordinates.to_natural(block.modes.z[:1]), 0.0
@@ -137,13 +137,13 @@ class Climbed:
     norm: Array
 
 
-def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | None = None) -> Climbed:
+def climb(block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence[Array] | None = None) -> Climbed:
     """Lead an effect through its amplitudes.
 
     Parameters
     ----------
-    block : Block
-    ladder : Ladder
+    block : LaplaceFit
+    ladder : AmplitudePath
     z : (n, d) array
         The plain fits of n data sets, sampled coordinates. The ladder is also begun at the block's sober fit.
     readings : sequence of (H, R, n) arrays, optional
@@ -211,7 +211,7 @@ def climb(block: Block, ladder: Ladder, z: Array, readings: Sequence[Array] | No
     return Climbed(*(np.array(v).reshape(-1, len(z)) for v in zip(*found, strict=True)))
 
 
-def _with_effect(block: Block, ladder: Ladder, places: Sequence[Array]) -> tuple[Target, int, Array]:
+def _with_effect(block: LaplaceFit, ladder: AmplitudePath, places: Sequence[Array]) -> tuple[LogPosterior, int, Array]:
     """The block's density with the effect, its amplitude's column, and its points (places starts n, d) at each start.
 
     `places` (n, d) are points of the density without the effect.
@@ -222,7 +222,7 @@ def _with_effect(block: Block, ladder: Ladder, places: Sequence[Array]) -> tuple
     # A prior that is not felt, in whose standard deviations the column counts.
     wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
     free = problem.prior.distributions | {problem.names[column]: wide}
-    target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
+    target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)))
     theta = []
     for z in places:
         values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))
@@ -293,7 +293,7 @@ def _without_last(x: Tangent) -> Tangent:
 
 
 def _follow(
-    target: Target,
+    target: LogPosterior,
     z: Array,
     readings: Sequence[Array] | None,
     x: Tangent,
@@ -318,7 +318,7 @@ def _follow(
     return np.asarray(trial[best, np.arange(len(z))])
 
 
-def strengths(ways: Sequence[Ladder], climbed: Sequence[Mapping[int, Climbed]]) -> dict[Candidate, Array]:
+def strengths(ways: Sequence[AmplitudePath], climbed: Sequence[Mapping[int, Climbed]]) -> dict[Candidate, Array]:
     """(n,) log Bayes factor of each of the ladders' candidates, with the prior of `screen.log_bayes`."""
     out = {}
     for ladder, each in zip(ways, climbed, strict=True):
@@ -334,7 +334,7 @@ def strengths(ways: Sequence[Ladder], climbed: Sequence[Mapping[int, Climbed]]) 
 
 
 def outward(
-    blocks: Sequence[Block],
+    blocks: Sequence[LaplaceFit],
     trials: Sequence[Probe],
     candidates: Sequence[Candidate],
     data: Sequence[Scan],
@@ -369,7 +369,7 @@ def outward(
     return replace(test, surprises=surprises), {c: float(v[0]) for c, v in found.items()}
 
 
-def _climbs(way: Ladder, blocks: Sequence[Block], plain: Sequence[tuple[Array, Any]]) -> dict[int, Climbed]:
+def _climbs(way: AmplitudePath, blocks: Sequence[LaplaceFit], plain: Sequence[tuple[Array, Any]]) -> dict[int, Climbed]:
     """A ladder climbed on all its blocks, from plain fits and their readings, a block each."""
     return {b: climb(blocks[b], way, *plain[b]) for b in way.blocks}
 
@@ -377,8 +377,8 @@ def _climbs(way: Ladder, blocks: Sequence[Block], plain: Sequence[tuple[Array, A
 def _chance(
     value: float,
     linear: Array,
-    blocks: Sequence[Block],
-    ways: Sequence[Ladder],
+    blocks: Sequence[LaplaceFit],
+    ways: Sequence[AmplitudePath],
     simulated: Sequence[Replicates],
     each: Each,
 ) -> Array:

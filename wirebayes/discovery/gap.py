@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference import rough_draws
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.linear_algebra import log_determinant, solve
 from wirebayes.model import noise
@@ -62,7 +62,7 @@ def held_out(
     experiments: Sequence[Experiment],
     train: Sequence[int],
     effects: Sequence[Effect],
-    block: Block,
+    block: LaplaceFit,
     rng: np.random.Generator,
 ) -> list[HeldOut]:
     """Train a block's samples on their first holds with some effects, predict their other holds freely.
@@ -74,7 +74,7 @@ def held_out(
     train : sequence of int
         Recorded holds to train on, each.
     effects : sequence of Effect
-    block : Block
+    block : LaplaceFit
         Says which laws, and where to look first if it has these effects.
     rng : numpy Generator
     """
@@ -130,7 +130,7 @@ def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:
     return None if excess <= 0 else float(1.0 - (final.squares - final.floor) / excess)
 
 
-def leave_one_hold_out(block: Block, rng: np.random.Generator) -> Array:
+def leave_one_hold_out(block: LaplaceFit, rng: np.random.Generator) -> Array:
     """(H,) log predictive density of each recorded hold of a block from all its others, by importance sampling.
 
     Weights are truncated at the square root of their number; a weight that would need more is a hold that the others
@@ -148,7 +148,7 @@ def leave_one_hold_out(block: Block, rng: np.random.Generator) -> Array:
     return np.asarray(logsumexp(log_weight + values, axis=1))
 
 
-def _draws(block: Block, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:
+def _draws(block: LaplaceFit, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:
     """The problem with all parameters of a block, and n rough draws of its posterior."""
     problem, theta, _ = completed(block.target.problem, rough_draws.draws(block.target, block.modes, rng, n), rng)
     return problem, theta

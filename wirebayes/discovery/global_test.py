@@ -18,7 +18,7 @@ from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.errors import InputError
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import Each
 
@@ -36,7 +36,7 @@ class Gate:
 
     Attributes
     ----------
-    blocks : list of Block
+    blocks : list of LaplaceFit
         Gross errors struck out.
     struck : list of dict
         What was struck out: experiment, hold, reading, log Bayes factor.
@@ -51,7 +51,7 @@ class Gate:
         Log Bayes factors of the effects that were tried from larger amplitudes.
     """
 
-    blocks: list[Block]
+    blocks: list[LaplaceFit]
     struck: list[dict[str, Any]]
     trials: list[Probe]
     candidates: list[Candidate]
@@ -64,7 +64,7 @@ class Gate:
 
 
 def examine(
-    blocks: Sequence[Block],
+    blocks: Sequence[LaplaceFit],
     kinds: Mapping[str, type[Effect]],
     simulations: int,
     rng: np.random.Generator,
@@ -77,7 +77,7 @@ def examine(
 
     Parameters
     ----------
-    blocks : sequence of Block
+    blocks : sequence of LaplaceFit
         Fitted, with whatever effects they have already.
     kinds : mapping of name to effect class
         Which effects the test looks for, beside a smooth discrepancy.
@@ -136,13 +136,13 @@ def is_close(p: float, alpha: float, simulations: int) -> bool:
     return bool(min(binom.cdf(larger, simulations, alpha), binom.sf(larger - 1, simulations, alpha)) > CLOSE)
 
 
-def _simulated(block: Block, trials: list[Probe], n: int, rng: np.random.Generator) -> Replicates:
+def _simulated(block: LaplaceFit, trials: list[Probe], n: int, rng: np.random.Generator) -> Replicates:
     return screening.replicated(block, trials, n, rng, residual_patterns.patterns(block.target.problem)[1])
 
 
 def _strike_gross_errors(
-    block: Block, trials: list[Probe], candidates: list[Candidate], i: int, rng: np.random.Generator
-) -> tuple[Block, list[dict[str, Any]]]:
+    block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: np.random.Generator
+) -> tuple[LaplaceFit, list[dict[str, Any]]]:
     struck: list[dict[str, Any]] = []
     most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))
     while len(struck) < most:

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from wirebayes.discovery.linear_scan import Scan, expand, scan
 from wirebayes.discovery.refit import occam
-from wirebayes.inference.laplace_fit import Block
+from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 
 Array = NDArray[Any]
 MOST = 0.05  # share of readings that may be called gross errors
 
 
-def suspect(block: Block, rival: float) -> tuple[str, int, int, float] | None:
+def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | None:
     """The reading most likely to be a gross error: experiment, hold number, its place in the hold, log Bayes factor.
 
     `rival` is the log Bayes factor of the best effect; a gross error must beat it and chance by a clear margin.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.discovery import smooth_reference
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import eigh, solve
 from wirebayes.model import noise
 from wirebayes.model.problem import Problem
@@ -210,7 +210,7 @@ def joined(scans: Sequence[Scan]) -> Scan:
     )
 
 
-def forms(target: Target, z: Array, trials: Sequence[Probe]) -> list[Array]:
+def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array]:
     """Per sample the (H, R, m) signatures of the probes per unit amplitude, N, at the parameters ``z`` (1, d)."""
     problem, theta = target.problem, target.coordinates.to_natural(z)
     out = []
@@ -222,7 +222,7 @@ def forms(target: Target, z: Array, trials: Sequence[Probe]) -> list[Array]:
 
 
 def expand(
-    target: Target,
+    target: LogPosterior,
     z: Array,
     trials: Sequence[Probe],
     readings: Sequence[Array] | None = None,
@@ -260,7 +260,7 @@ def moving_columns(problem: Problem) -> list[int]:
     return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
 
 
-def tangent(target: Target, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
+def tangent(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
     """Linearise a block by some of its columns, at the rows of `z` (n, d); readings as in `expand`."""
     return _tangent(target, z, list(_points(target, z, readings, moving)), moving)
 
@@ -282,7 +282,7 @@ class _Point:
         return np.asarray((values[mask] / self.sd).T)
 
 
-def _points(target: Target, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Iterator[_Point]:
+def _points(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Iterator[_Point]:
     problem, n = target.problem, len(z)
     both = target.coordinates.to_natural(np.concatenate([z, *_shifted(z, moving, _STEP)]))
     theta = both[:n]
@@ -301,7 +301,7 @@ def _points(target: Target, z: Array, readings: Sequence[Array] | None, moving: 
         yield _Point(line.tension, slopes, sd, ((y - line.tension)[mask] / sd).T, scaled, jac, floor)
 
 
-def _tangent(target: Target, z: Array, points: Sequence[_Point], moving: list[int]) -> Tangent:
+def _tangent(target: LogPosterior, z: Array, points: Sequence[_Point], moving: list[int]) -> Tangent:
     k = _block_diagonal([p.by_setting for p in points])
     beyond = ~(np.abs(k) < _LARGEST).all(axis=(1, 2))  # what the model cannot compute has no tangent
     k[beyond] = 1.0
@@ -436,7 +436,7 @@ def damp(singular: Array, ratio: Array | float) -> Array:
         return np.asarray(ratio * singular**2 / (1.0 + ratio * singular**2))
 
 
-def residuals(target: Target, z: Array, readings: Sequence[Array] | None = None) -> Array:
+def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None = None) -> Array:
     """(n, N) readings less tensions at the rows of `z`, in units of the reading error."""
     theta = target.coordinates.to_natural(z)
     parts = []
@@ -450,13 +450,13 @@ def residuals(target: Target, z: Array, readings: Sequence[Array] | None = None)
     return np.concatenate(parts, axis=1)
 
 
-def prior_density(target: Target, z: Array) -> Array:
+def prior_density(target: LogPosterior, z: Array) -> Array:
     """(n,) log density of the prior in the sampled coordinates."""
     theta = target.coordinates.to_natural(z)
     return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta))
 
 
-def _prior(target: Target, z: Array, moving: list[int]) -> tuple[Array, Array]:
+def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Array]:
     """Gradient and (diagonal, positive) precision of the prior in the sampled coordinates that move the mean."""
     h = 1e-3
     n, p = len(z), len(moving)

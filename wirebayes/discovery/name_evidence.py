@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from wirebayes.discovery.linear_scan import Probe, Scan
 from wirebayes.discovery.refit import Refit, probabilities, refit, smallest_set
 from wirebayes.discovery.screening import Candidate, flexible_log_bayes, log_bayes
-from wirebayes.inference.laplace_fit import Block
+from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import Each
 
@@ -25,7 +25,7 @@ _MOST, _MOST_A_NAME = 16, 3
 
 
 @dataclass(frozen=True)
-class Choice:
+class NameEvidence:
     """Names and their evidence.
 
     Attributes
@@ -59,13 +59,13 @@ class Choice:
 
 
 def choose(
-    blocks: Sequence[Block],
+    blocks: Sequence[LaplaceFit],
     trials: Sequence[Probe],
     candidates: Sequence[Candidate],
     scans: Sequence[Scan],
     further: Mapping[Candidate, float] = {},
     each: Each = map,
-) -> Choice:
+) -> NameEvidence:
     """Evidence of every name, refitted where the scan, or the test from larger effects, gives it a chance.
 
     Refits are independent of each other, and `each` may be a `map` over processes.
@@ -111,7 +111,7 @@ def choose(
         if own:
             winners[name] = max(own.values(), key=lambda r: sum(x.log_bayes for x in r))
     shares = probabilities({n: v for n, v in evidence.items() if n in winners}, unknown, UNKNOWN_WEIGHT)
-    return Choice(evidence, unknown, winners, shares)
+    return NameEvidence(evidence, unknown, winners, shares)
 
 
 def flexible_evidence(scans: Sequence[Scan]) -> float:

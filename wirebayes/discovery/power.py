@@ -10,8 +10,8 @@ from scipy import stats
 
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
 from wirebayes.discovery.refit import LARGEST, occam
-from wirebayes.inference.laplace_fit import Block
-from wirebayes.inference.transform import Target
+from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
@@ -111,7 +111,7 @@ class _Compliance(Effect):
 _ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _DisplacementScale, _Compliance)
 
 
-def not_identifiable(block: Block, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
+def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
     """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show."""
     absorbable = [kind for kind in _ABSORBABLE if not (kind is _Compliance and "fixture_compliance" in possible)]
     trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in absorbable]
@@ -184,7 +184,7 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
     return words, replace(problem, samples=(*problem.samples, more), prior=prior)
 
 
-def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
+def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
     """The plan that tells two candidates apart best, or shows one effect best, by projected signatures."""
     problem = block.target.problem
     trials = list(pair) if pair else [weakest] if weakest else []
@@ -211,14 +211,14 @@ def next_measurement(block: Block, pair: tuple[Probe, Probe] | None, weakest: Pr
     return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
 
 
-def replace_problem(target: Target, problem: Any) -> Target:
+def replace_problem(target: LogPosterior, problem: Any) -> LogPosterior:
     """A target on other holds whose coordinates mean the same."""
-    out = Target(problem)
+    out = LogPosterior(problem)
     out.coordinates.ridges = target.coordinates.ridges
     return out
 
 
-def _separation(target: Target, block: Block, trials: Sequence[Probe]) -> float:
+def _separation(target: LogPosterior, block: LaplaceFit, trials: Sequence[Probe]) -> float:
     """Length of the first signature left when parameters, and the second where there is one, have taken their part."""
     x = expand(target, block.modes.z[:1], trials)
     p = projected(x, float(x.ratio[0]))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from wirebayes.inference.laplace_fit import Block, Pinned
+from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
@@ -51,12 +51,12 @@ def occam(one_sided: bool) -> float:
     return float(0.5 * np.log(2 * np.pi) - np.log(LARGEST if one_sided else 2.0 * LARGEST))
 
 
-def refit(blocks: Sequence[Block], which: Sequence[int], effect: Effect, per_delta: float, guess: float) -> Refit:
+def refit(blocks: Sequence[LaplaceFit], which: Sequence[int], effect: Effect, per_delta: float, guess: float) -> Refit:
     """Refit one effect with one amplitude shared by the blocks `which`.
 
     Parameters
     ----------
-    blocks : sequence of Block
+    blocks : sequence of LaplaceFit
     which : sequence of int
     effect : Effect
     per_delta : float

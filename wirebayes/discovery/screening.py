@@ -14,7 +14,7 @@ from scipy import stats
 
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, probes, scan
 from wirebayes.discovery.refit import occam
-from wirebayes.inference.laplace_fit import Block
+from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import climb, rowwise
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.wire.effect import Effect, EventEffect
@@ -46,7 +46,9 @@ class Candidate:
     shared: bool
 
 
-def candidate_probes(blocks: Sequence[Block], kinds: Mapping[str, type[Effect]]) -> tuple[list[Probe], list[Candidate]]:
+def candidate_probes(
+    blocks: Sequence[LaplaceFit], kinds: Mapping[str, type[Effect]]
+) -> tuple[list[Probe], list[Candidate]]:
     """Every form of every effect that these blocks could show."""
     several = sum(len(b.experiments) for b in blocks) > 1
     trials: list[Probe] = []
@@ -72,7 +74,7 @@ def candidate_probes(blocks: Sequence[Block], kinds: Mapping[str, type[Effect]])
     return trials, candidates
 
 
-def _variants(kind: type[Effect], block: Block, several: bool) -> list[Effect]:
+def _variants(kind: type[Effect], block: LaplaceFit, several: bool) -> list[Effect]:
     if not issubclass(kind, EventEffect):
         return kind.variants([e.protocol() for e in block.experiments])
     taken = {e.key for e in block.effects}
@@ -127,7 +129,7 @@ class Replicates:
 
 
 def replicated(
-    block: Block, trials: Sequence[Probe], n: int, rng: np.random.Generator, columns: Any = None
+    block: LaplaceFit, trials: Sequence[Probe], n: int, rng: np.random.Generator, columns: Any = None
 ) -> Replicates:
     """Scan `n` data sets simulated at the block's fit, each refitted first."""
     z = np.repeat(block.modes.z[:1], n, axis=0)

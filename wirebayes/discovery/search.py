@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wirebayes.discovery import gap, name_evidence, power, residual_patterns, screening
 from wirebayes.discovery.global_test import examine
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand
-from wirebayes.discovery.name_evidence import Choice
+from wirebayes.discovery.name_evidence import NameEvidence
 from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.discovery.sharing import informed
@@ -24,7 +24,7 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import Each
@@ -40,12 +40,12 @@ class Findings:
     ----------
     report : dict
         The content of ``discovery.json``.
-    final : tuple of Block
+    final : tuple of LaplaceFit
         The samples of each material, gross errors struck out, with the effects that were accepted.
     """
 
     report: dict[str, Any]
-    final: tuple[Block, ...]
+    final: tuple[LaplaceFit, ...]
 
 
 def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = CATALOGUE) -> dict[str, type[Effect]]:
@@ -137,7 +137,7 @@ def investigate(
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointModel:
     """What is sampled at once: some experiments with some effects, and where the best parameters are, if known."""
 
     experiments: tuple[Experiment, ...]
@@ -145,7 +145,7 @@ class Joint:
     near: dict[str, float] | None = None
 
 
-def final_models(findings: Findings) -> list[Joint]:
+def final_models(findings: Findings) -> list[JointModel]:
     """The final model of every experiment.
 
     Samples of one material share what they are, and the amplitude of what was added. Where nothing was, each stands for
@@ -155,16 +155,16 @@ def final_models(findings: Findings) -> list[Joint]:
     for block in findings.final:
         reports = [findings.report["experiments"][name] for name in block.names]
         if block.effects:
-            out.append(Joint(block.experiments, block.effects, block.best))
+            out.append(JointModel(block.experiments, block.effects, block.best))
             continue
         for e, report in zip(block.experiments, reports, strict=True):
             flexible = report["verdict"] == "unknown"
             effects = (_discrepancy(e, float(report["residual_rms_N"])),) if flexible else ()
-            out.append(Joint((e,), effects, block.parameters(e.name)))
+            out.append(JointModel((e,), effects, block.parameters(e.name)))
     return out
 
 
-def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
+def _amplitude(final: LaplaceFit, effect: Effect) -> dict[str, Any]:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
     main = effect.amplitudes[0]
     low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
@@ -173,8 +173,8 @@ def _amplitude(final: Block, effect: Effect) -> dict[str, Any]:
 
 
 def _common(
-    verdict: str, choice: Choice | None, affected: list[Accepted], plain: list[Block], final: Block, i: int,
-    p: float,
+    verdict: str, choice: NameEvidence | None, affected: list[Accepted], plain: list[LaplaceFit], final: LaplaceFit,
+    i: int, p: float,
     where: list[dict[str, Any]], alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What the experiments of one block share in the report."""
@@ -202,8 +202,8 @@ def _common(
 
 
 def _outlook(
-    block: Block, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest,
-    settings: Settings, choice: Choice | None, verdict: str, alike: dict[tuple[str, str], float],
+    block: LaplaceFit, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest,
+    settings: Settings, choice: NameEvidence | None, verdict: str, alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What could have been seen, what cannot be, and what to measure next."""
     best_probe: dict[str, int] = {}
@@ -243,7 +243,9 @@ def _outlook(
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
 
 
-def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator, each: Each) -> list[dict[str, Any]]:
+def _held_out(
+    block: LaplaceFit, final: LaplaceFit, verdict: str, rng: np.random.Generator, each: Each
+) -> list[dict[str, Any]]:
     """Plain and final model on the last third of the holds, and by leaving out one hold at a time.
 
     The flexible discrepancy beside them: an effect that predicts worse than a smooth curve does not shrink the gap.
@@ -262,7 +264,7 @@ def _held_out(block: Block, final: Block, verdict: str, rng: np.random.Generator
             for _ in block.experiments
         ]
     asked: list[tuple[Any, ...]] = [(block.experiments, train, (), block)]
-    named, whole = bool(final.effects), list[Block]()
+    named, whole = bool(final.effects), list[LaplaceFit]()
     n = len(train) if named or verdict == "unknown" else 0
     if n:
         first = [e.train(k) for e, k in zip(block.experiments, train, strict=True)]
@@ -308,7 +310,7 @@ def _score(held: gap.HeldOut) -> dict[str, float]:
     return {"rmse_N": held.rmse_N, "elpd": float(held.elpd.sum()), "coverage_90": held.inside}
 
 
-def _unnamed(block: Block, experiment: Experiment, rng: np.random.Generator) -> Discrepancy:
+def _unnamed(block: LaplaceFit, experiment: Experiment, rng: np.random.Generator) -> Discrepancy:
     """A discrepancy as large as what the plain model, fitted to the experiment alone, leaves over in it."""
     plain = fitted([experiment], (), block.law, block.history, rng)
     return _discrepancy(experiment, _left_over(plain, experiment.name))
@@ -319,7 +321,7 @@ def _discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
     return Discrepancy(len(experiment.holds), size_N, float(np.median(durations)) or 1.0)
 
 
-def _left_over(block: Block, name: str) -> float:
+def _left_over(block: LaplaceFit, name: str) -> float:
     """Root mean square of what the best parameters leave over in an experiment's readings, N."""
     sample = block.target.problem.samples[block.names.index(name)]
     line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)

@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.wire.effect import Effect
 
 _CLEAR = 2.0  # standard deviations from its edge from which on a one-sided amplitude is nearly log-normal
 
 
-def informed(blocks: Sequence[Block], effects: Mapping[int, Effect], rng: np.random.Generator) -> list[Block]:
+def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: np.random.Generator) -> list[LaplaceFit]:
     """Blocks refitted, each with the others' knowledge of an amplitude that they share as its prior.
 
     Parameters
     ----------
-    blocks : sequence of Block
+    blocks : sequence of LaplaceFit
     effects : mapping of int to Effect
         The form of the shared effect in each block that has it; blocks without it stay as they are.
     rng : numpy Generator
@@ -39,7 +39,7 @@ def informed(blocks: Sequence[Block], effects: Mapping[int, Effect], rng: np.ran
     return out
 
 
-def _known(block: Block, effect: Effect) -> tuple[float, float]:
+def _known(block: LaplaceFit, effect: Effect) -> tuple[float, float]:
     """Mean and standard deviation of an amplitude, by the normal approximation in sampled coordinates."""
     low, mean, high = block.along(effect, (-1.0, 0.0, 1.0))
     return float(mean), float(0.5 * (high - low))

@@ -7,11 +7,11 @@ import numpy as np
 
 from wirebayes.discovery import gap, name_evidence, screening
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, scan
-from wirebayes.discovery.name_evidence import UNKNOWN_WEIGHT, Choice
+from wirebayes.discovery.name_evidence import UNKNOWN_WEIGHT, NameEvidence
 from wirebayes.discovery.refit import probabilities
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import Settings
-from wirebayes.inference.laplace_fit import Block, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import Each
 
@@ -42,8 +42,8 @@ class Accepted:
 
 
 def decide(
-    plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator, each: Each
-) -> tuple[str, list[Accepted], list[Block], Choice]:
+    plain: list[LaplaceFit], choice: NameEvidence, settings: Settings, rng: np.random.Generator, each: Each
+) -> tuple[str, list[Accepted], list[LaplaceFit], NameEvidence]:
     """Verdict, accepted effects in order, final blocks, and the choice as revised by pairs of effects."""
     choice, added = _with_company(plain, choice, settings, rng, each)
     if choice.best == "unknown":
@@ -70,12 +70,12 @@ def decide(
 class _Added:
     """The blocks with a name in them, and what would come next: None where nothing has a chance."""
 
-    blocks: list[Block]
+    blocks: list[LaplaceFit]
     accepted: Accepted
-    further: Choice | None
+    further: NameEvidence | None
 
 
-def _beside(blocks: list[Block], settings: Settings, each: Each) -> tuple[Choice | None, float]:
+def _beside(blocks: list[LaplaceFit], settings: Settings, each: Each) -> tuple[NameEvidence | None, float]:
     """What could be added to fitted blocks, if anything has a chance, and the flexible reference's evidence."""
     trials, candidates, scans = _scanned(blocks, settings)
     loose = name_evidence.flexible_evidence(scans)
@@ -85,8 +85,8 @@ def _beside(blocks: list[Block], settings: Settings, each: Each) -> tuple[Choice
 
 
 def _with_company(
-    plain: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator, each: Each
-) -> tuple[Choice, dict[str, _Added]]:
+    plain: list[LaplaceFit], choice: NameEvidence, settings: Settings, rng: np.random.Generator, each: Each
+) -> tuple[NameEvidence, dict[str, _Added]]:
     """The likeliest names once more, each together with a second effect, and together with the flexible reference.
 
     The best of the new choice, unless it is *unknown*, is among those added.
@@ -116,7 +116,9 @@ def _with_company(
     return _weighed(replace(choice, log_bayes=evidence, unknown=unknown)), known
 
 
-def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.random.Generator, each: Each) -> Choice:
+def _retested(
+    blocks: list[LaplaceFit], choice: NameEvidence, settings: Settings, rng: np.random.Generator, each: Each
+) -> NameEvidence:
     """The global test again, with what was accepted inside: a name that leaves too much over gives way to *unknown*.
 
     At `_ALPHA_AFTER` both are as likely; below it the odds grow as p to the power -0.8, the density that p has where
@@ -134,21 +136,21 @@ def _retested(blocks: list[Block], choice: Choice, settings: Settings, rng: np.r
     return _weighed(replace(choice, unknown=float(np.logaddexp(choice.unknown, against))))
 
 
-def _scanned(blocks: list[Block], settings: Settings) -> tuple[list[Probe], list[Candidate], list[Scan]]:
+def _scanned(blocks: list[LaplaceFit], settings: Settings) -> tuple[list[Probe], list[Candidate], list[Scan]]:
     """What could be added to fitted blocks, and its linear scan on each."""
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
     return trials, candidates, [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
 
 
-def _weighed(choice: Choice) -> Choice:
+def _weighed(choice: NameEvidence) -> NameEvidence:
     """The probabilities of a choice whose evidence has changed."""
     shares = probabilities({n: choice.log_bayes[n] for n in choice.winners}, choice.unknown, UNKNOWN_WEIGHT)
     return replace(choice, shares=shares)
 
 
 def _add(
-    blocks: list[Block], choice: Choice, name: str, settings: Settings, rng: np.random.Generator
-) -> tuple[list[Block], Accepted]:
+    blocks: list[LaplaceFit], choice: NameEvidence, name: str, settings: Settings, rng: np.random.Generator
+) -> tuple[list[LaplaceFit], Accepted]:
     """The blocks refitted with a name's best form."""
     out, effects = list(blocks), {}
     for b, r in choice.amplitudes(name).items():

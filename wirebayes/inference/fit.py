@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
 from wirebayes.inference.sampler.ensemble import Chains
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.marginal import completed, integrated
 from wirebayes.model.problem import Problem
 
@@ -76,7 +76,7 @@ def fit(
     -------
     Fit
     """
-    target = Target(integrated(problem))
+    target = LogPosterior(integrated(problem))
     walked = target.problem.names
     start = None
     if near is not None and near.keys() >= set(walked):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.inference.modes import Optimum, climb, modes
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.marginal import integrated
 from wirebayes.model.problem import Problem, build
@@ -25,7 +25,7 @@ _AS_HELD = 0.05  # standard deviation of the log of a setting error that is held
 
 
 @dataclass(frozen=True)
-class Block:
+class LaplaceFit:
     """What shares parameters, fitted.
 
     Attributes
@@ -36,7 +36,7 @@ class Block:
         Accepted so far.
     law, history
         See `wirebayes.wire.laws`.
-    target : Target
+    target : LogPosterior
     modes : Optimum
         Distinct modes, best first.
     sober : (k, d) array
@@ -50,7 +50,7 @@ class Block:
     effects: tuple[Effect, ...]
     law: ElasticLaw
     history: History
-    target: Target
+    target: LogPosterior
     modes: Optimum
     sober: Array
     exponent: Any = 1.0
@@ -97,20 +97,22 @@ def fitted(
     rng: np.random.Generator,
     near: Array | None = None,
     exponent: Any = 1.0,
-) -> Block:
+) -> LaplaceFit:
     """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given.
 
     What the readings depend on linearly is integrated out (see `wirebayes.model.marginal`). The `exponent` is that of
     the creep amount's growth with length, or its prior (see `wirebayes.model.problem.build`).
     """
-    target = Target(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
+    target = LogPosterior(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
-    return Block(tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng), exponent)
+    return LaplaceFit(
+        tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng), exponent
+    )
 
 
-def _sober(target: Target, found: Optimum, rng: np.random.Generator) -> Array:
-    """(k, d) places of `Block.sober`."""
+def _sober(target: LogPosterior, found: Optimum, rng: np.random.Generator) -> Array:
+    """(k, d) places of `LaplaceFit.sober`."""
     problem, best = target.problem, target.coordinates.to_natural(found.z[:1])
     if all(
         problem.parameters(best, s)["setting_sd"][0] <= _ABSURD * _typical_step(s.protocol) for s in problem.samples
@@ -118,7 +120,7 @@ def _sober(target: Target, found: Optimum, rng: np.random.Generator) -> Array:
         return np.empty((0, found.z.shape[1]))
     every = problem.prior.distributions
     held = {n: stats.lognorm(_AS_HELD, scale=d.median()) for n, d in every.items() if n.startswith("setting_sd")}
-    bound = Target(replace(problem, prior=replace(problem.prior, distributions=every | held)))
+    bound = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=every | held)))
     return target.coordinates.to_sampled(bound.coordinates.to_natural(modes(bound, rng).z[:1]))
 
 
@@ -135,11 +137,11 @@ class Pinned:
     the evidence puts its own on it, the same for every effect.
     """
 
-    def __init__(self, block: Block, effect: Effect) -> None:
+    def __init__(self, block: LaplaceFit, effect: Effect) -> None:
         problem = block.problem_with(effect)
         self.column = column_of(problem, effect)
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
-        self.target = Target(replace(problem, prior=replace(problem.prior, distributions=free)))
+        self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)))
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:

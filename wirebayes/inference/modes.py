@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.mixture import rows_by_weight, spread_rows
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
@@ -169,7 +169,7 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     return gradient, hessian
 
 
-def modes(target: Target, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
+def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
     """The distinct modes of a posterior, best first (see `search`)."""
     return search(target, rng, extra=extra).modes
 
@@ -195,7 +195,7 @@ class Search:
 
 
 def search(
-    target: Target, rng: np.random.Generator, *, draws: int = 800, starts: int = 8, extra: Array | None = None
+    target: LogPosterior, rng: np.random.Generator, *, draws: int = 800, starts: int = 8, extra: Array | None = None
 ) -> Search:
     """Look for the modes of a posterior: good ones among many prior draws, each climbed.
 
@@ -207,7 +207,7 @@ def search(
 
     Parameters
     ----------
-    target : Target
+    target : LogPosterior
     rng : numpy Generator
     draws : int
         Of the prior.
@@ -240,7 +240,7 @@ def search(
     return Search(found, warm, cold, cold_height)
 
 
-def _sag(target: Target, z: Array, height: Array, found: Optimum) -> Array:
+def _sag(target: LogPosterior, z: Array, height: Array, found: Optimum) -> Array:
     """(n,) how far the density between (n, d) places and a mode seen from there lies below the straight line.
 
     Within one hill it lies above. The best mode is asked first, the others where no one before was seen.
@@ -274,7 +274,7 @@ def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
     return np.asarray((np.einsum("nki,kij,nkj->nk", apart, curvature, apart) <= _ONE_MODE).any(axis=1))
 
 
-def _cooled(target: Target, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Places (n, d) and their log densities (n,), from the density to powers that grow from 0 to 1, all together.
 
     Each step of the power leaves a fifth of the rows effective and moves them by differential evolution: near enough to
@@ -316,6 +316,6 @@ def _next_step(value: Array, most: float) -> float:
     return float(np.exp(low))
 
 
-def rowwise(target: Target, readings: Sequence[Array]) -> Density:
+def rowwise(target: LogPosterior, readings: Sequence[Array]) -> Density:
     """A density whose row r sees the r-th of the replicated readings, per sample (H, R, n)."""
     return lambda points, rows: target(points, [y[..., rows] for y in readings])

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler.ensemble import sample
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 
 Array = NDArray[Any]
 _SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, block=32, most_steps=32)
 
 
-def draws(target: Target, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:
+def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:
     """(n, d) natural parameters from the posterior whose modes are `found`."""
     chains = sample(target, int(rng.integers(2**63)), _SHORT, found=found)
     z = chains.z.reshape(-1, chains.z.shape[-1])

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.model.marginal import Integrated, integrated
+from wirebayes.model.marginal import MarginalisedProblem, integrated
 from wirebayes.model.prior import PooledPrior, Prior
 from wirebayes.model.problem import Problem
 
@@ -85,13 +85,13 @@ def specimens(problem: Problem) -> Specimens | None:
 def _said(problem: Problem, own: list[str], gone: set[str]) -> tuple[Array, Array]:
     """Precision and mean that readings give the logarithms of specimens' values, were these unrelated."""
     from wirebayes.inference.modes import modes
-    from wirebayes.inference.transform import Target  # a target of its own, of a problem without pools
+    from wirebayes.inference.transform import LogPosterior  # a target of its own, of a problem without pools
 
-    whole = problem.whole if isinstance(problem, Integrated) else problem
+    whole = problem.whole if isinstance(problem, MarginalisedProblem) else problem
     prior = whole.prior
     left = {name: d for name, d in prior.distributions.items() if name not in gone}
     unrelated = integrated(replace(whole, prior=Prior(left, prior.fixed, prior.logarithmic - gone)))
-    target, rng = Target(unrelated), np.random.default_rng(0)
+    target, rng = LogPosterior(unrelated), np.random.default_rng(0)
     columns = [unrelated.names.index(name) for name in own]
     before = np.log(unrelated.prior.rvs(_DRAWS, rng)[:, columns])
     best = modes(target, rng)

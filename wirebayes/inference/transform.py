@@ -63,7 +63,7 @@ class _Ridge:
         return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
 
-class Coordinates:
+class Transformation:
     """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``."""
 
     def __init__(self, problem: Problem) -> None:
@@ -183,17 +183,17 @@ def _spread(distribution: Any) -> float:
     return sd if np.isfinite(sd) and sd > 0 else 1.0
 
 
-class Target:
+class LogPosterior:
     """The log posterior density in the sampled coordinates, batched, counting its evaluations."""
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.coordinates = problem, Coordinates(problem)
+        self.problem, self.coordinates = problem, Transformation(problem)
         self.log_prior = problem.prior.log_density()
         self.evaluations = 0
         self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Target, (self.problem,)  # what else there is has closures, which no other process can be sent
+        return LogPosterior, (self.problem,)  # what else there is has closures, which no other process can be sent
 
     def __call__(self, z: Array, readings: Any = None) -> Array:
         """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""

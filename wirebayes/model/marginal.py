@@ -20,7 +20,7 @@ _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class Integrated(Problem):
+class MarginalisedProblem(Problem):
     """A problem with its linear amplitudes integrated out.
 
     Attributes
@@ -103,7 +103,7 @@ def integrated(problem: Problem) -> Problem:
         replace(s, model=replace(s.model, effects=tuple(e for e in s.model.effects if e.key not in last)))
         for s in problem.samples
     )
-    return Integrated(
+    return MarginalisedProblem(
         samples, replace(problem.prior, distributions=left), "chain", problem,
         tuple(np.array(gone)[shows]), tuple(s[..., shows] for s in shapes),
         np.array([p.mean() for p in priors])[shows], np.array([p.std() for p in priors])[shows],
@@ -125,7 +125,7 @@ def completed(problem: Problem, theta: Array, rng: np.random.Generator) -> tuple
     -------
     The problem with all parameters, draws (n, D) of its posterior, and (n,) the log density of what was drawn here.
     """
-    if not isinstance(problem, Integrated):
+    if not isinstance(problem, MarginalisedProblem):
         return problem, theta, np.zeros(len(theta))
     whole = problem.whole.prior
     parts = [problem.drawn(theta[i : i + _ROWS], rng) for i in range(0, len(theta), _ROWS)]

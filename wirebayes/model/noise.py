@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wirebayes.linear_algebra import inv, log_determinant, solve
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Model, Theta, _Walk
+from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
 
 Array = NDArray[Any]
 _LOG_2PI = float(np.log(2.0 * np.pi))
@@ -228,7 +228,7 @@ def hold_courses(
     `first` is (H, n) or (H, 1); None stands for a hold that has no reading.
     """
     n = np.shape(theta["k1"])[0]
-    walk = _Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)
+    walk = Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)
     out: list[tuple[Array, Array, Array] | None] = []
     for j in range(len(protocol.displacement_mm)):
         if not protocol.mask[j].any():

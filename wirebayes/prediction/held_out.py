@@ -15,7 +15,7 @@ from wirebayes.inference.fit import Fit
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import noise
 from wirebayes.prediction.leave_one_hold_out import thinned
-from wirebayes.prediction.predictive import Question, predict
+from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.wire.staircase import linearise
 
 Array = NDArray[Any]
@@ -131,16 +131,16 @@ def held_out(fitted: Fit, experiment: Experiment, rng: np.random.Generator, samp
     past = int(here.protocol.recorded.sum())
     free = None
     if problem.likelihood == "chain":
-        drawn = predict(problem, theta, here, Question(whole, trained, asked, nothing), rng)
+        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, asked, nothing), rng)
         elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, asked)
         free = _scores(drawn, whole.mask & asked[:, None], whole.number, whole.time_s, tension, elpd, together)
         # Each hold given its own first reading alone, as the paper's figures were made.
         for j in np.flatnonzero(asked):
             only = np.arange(len(asked)) == j
-            question = Question(whole, trained, only, np.where(only, tension[:, 0], np.nan))
+            question = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
             drawn[j] = predict(problem, theta, here, question, rng)[j]
     else:
-        drawn = predict(problem, theta, here, Question(whole, trained, asked, tension[:, 0]), rng)
+        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, asked, tension[:, 0]), rng)
         elpd_given = _hold_scores(fitted, experiment, sample, asked)
     later = whole.mask & asked[:, None]
     later[:, 0] = False

@@ -17,14 +17,14 @@ from wirebayes.linear_algebra import eigh, solve
 from wirebayes.model import noise
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Model, Theta, _Walk, linearise
+from wirebayes.wire.staircase import Model, Theta, Walk, linearise
 
 Array = NDArray[np.float64]
 _CHUNK = 500  # draws at a time: bounds the memory of the normal equations
 
 
 @dataclass(frozen=True)
-class Question:
+class PredictionRequest:
     """Which readings are asked for, after which history.
 
     Attributes
@@ -45,7 +45,9 @@ class Question:
     first_N: Array
 
 
-def predict(problem: Problem, theta: Array, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
+def predict(
+    problem: Problem, theta: Array, sample: Sample, question: PredictionRequest, rng: np.random.Generator
+) -> Array:
     """Draws of the asked readings.
 
     Parameters
@@ -56,7 +58,7 @@ def predict(problem: Problem, theta: Array, sample: Sample, question: Question, 
         Posterior draws.
     sample : Sample
         The one of the problem's samples that goes on; its readings are the history.
-    question : Question
+    question : PredictionRequest
     rng : numpy Generator
 
     Returns
@@ -72,7 +74,9 @@ def predict(problem: Problem, theta: Array, sample: Sample, question: Question, 
     return drawn if problem.likelihood == "hold" else _given_first(drawn, question)
 
 
-def _readings(problem: Problem, theta: Array, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
+def _readings(
+    problem: Problem, theta: Array, sample: Sample, question: PredictionRequest, rng: np.random.Generator
+) -> Array:
     own, protocol = problem.parameters(theta, sample), question.protocol
     shape = (*protocol.time_s.shape, len(theta))
     error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution_N
@@ -82,7 +86,7 @@ def _readings(problem: Problem, theta: Array, sample: Sample, question: Question
     return np.where(question.asked[:, None, None], course + error, 0.0)
 
 
-def chain_course(own: Theta, sample: Sample, question: Question, rng: np.random.Generator) -> Array:
+def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: np.random.Generator) -> Array:
     """(H, R, n) readings without sensor error, of trained holds as replicates.
 
     An unknown discrepancy is an effect among the others here: its draws were made given the training readings.
@@ -93,7 +97,7 @@ def chain_course(own: Theta, sample: Sample, question: Question, rng: np.random.
     again = setting.copy()
     if trained:
         setting[:trained] = settings_given_readings(own, sample, rng)
-    walk = _Walk(protocol, own, sample.model)
+    walk = Walk(protocol, own, sample.model)
     creep: Array = np.zeros(n)
     beside: dict[str, Array] = {}
     out = []
@@ -133,7 +137,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
     return drawn
 
 
-def _hold_by_hold(own: Theta, model: Model, question: Question, error: Array) -> Array:
+def _hold_by_hold(own: Theta, model: Model, question: PredictionRequest, error: Array) -> Array:
     """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
     given = question.first_N[:, None] - error[:, 0]
     out = np.zeros_like(error)
@@ -145,7 +149,7 @@ def _hold_by_hold(own: Theta, model: Model, question: Question, error: Array) ->
     return out
 
 
-def _given_first(drawn: Array, question: Question) -> Array:
+def _given_first(drawn: Array, question: PredictionRequest) -> Array:
     """Condition a hold's readings on the first readings given up to it; a replicate on its own alone."""
     given = question.asked & np.isfinite(question.first_N)
     for j in np.flatnonzero(question.asked)[::-1]:

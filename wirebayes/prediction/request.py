@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import protocol_of
 from wirebayes.io.readings import Hold, Table, protocol_holds, protocol_table, shown
-from wirebayes.prediction.predictive import Question
+from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.store import Stored
 from wirebayes.wire.effect import EventEffect
 from wirebayes.wire.protocol import Protocol
@@ -20,14 +20,14 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Asked:
+class ProtocolRequest:
     """A checked protocol file.
 
     Attributes
     ----------
     stored : Stored
         The posterior; for a fresh sample without the one-off events, which happened to the tested one.
-    question : Question
+    question : PredictionRequest
     holds : tuple of Hold
         As the file has them; the asked holds of the question in the same order.
     sentence : str
@@ -35,12 +35,12 @@ class Asked:
     """
 
     stored: Stored
-    question: Question
+    question: PredictionRequest
     holds: tuple[Hold, ...]
     sentence: str
 
 
-def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Asked:
+def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
     """Read a protocol file and check it against what was trained on.
 
     Parameters
@@ -55,7 +55,7 @@ def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Asked:
 
     Returns
     -------
-    Asked
+    ProtocolRequest
 
     Raises
     ------
@@ -65,7 +65,7 @@ def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Asked:
     return asked_of(protocol_table(path), stored, fresh=fresh)
 
 
-def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> Asked:
+def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
     """Check the table of a protocol against what was trained on, as `read_question` does."""
     trained = stored.sample.protocol
     file = _File(table, protocol_holds(table, trained.length_mm))
@@ -76,8 +76,8 @@ def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> Asked:
     if fresh:
         began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
         alone = protocol_of(file.holds, trained.length_mm, began_at)
-        question = Question(alone, 0, np.ones(len(first), bool), first)
-        return Asked(_without_events(stored), question, file.holds, _FRESH)
+        question = PredictionRequest(alone, 0, np.ones(len(first), bool), first)
+        return ProtocolRequest(_without_events(stored), question, file.holds, _FRESH)
     row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     file.check_repeats(trained, row_of)
     repeated = np.array([hold.number in row_of for hold in file.holds])
@@ -89,9 +89,9 @@ def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> Asked:
     after = tuple(h for h, known in zip(file.holds, repeated, strict=True) if not known)
     whole = _joined(trained, protocol_of(after, trained.length_mm, trained.reference_C)) if after else trained
     everything = np.append(asked, np.ones(len(after), bool))
-    question = Question(whole, len(trained.number), everything, np.append(given, first[~repeated]))
+    question = PredictionRequest(whole, len(trained.number), everything, np.append(given, first[~repeated]))
     sentence = _tested(tuple(trained.number[rows]), [int(h.number or 0) for h in after], max(row_of), stored.likelihood)
-    return Asked(stored, question, file.holds, sentence)
+    return ProtocolRequest(stored, question, file.holds, sentence)
 
 
 _FRESH = "predicted as a fresh sample with no history: the protocol is all that ever happened to it"

@@ -8,18 +8,18 @@ import xarray as xr
 
 from wirebayes.inference.fit import seed_of
 from wirebayes.prediction.predictive import predict
-from wirebayes.prediction.request import Asked
+from wirebayes.prediction.request import ProtocolRequest
 
 HEADER = ("experiment", "hold", "displacement_mm", "time_s", "mean_N", "sd_N", "q05_N", "q50_N", "q95_N")
 DRAWS = 4000
 
 
-def table(asked: Asked, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
+def table(asked: ProtocolRequest, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
     """Mean, sd and quantiles of the asked readings, in the file's order.
 
     Parameters
     ----------
-    asked : Asked
+    asked : ProtocolRequest
     seed : int
     draws : int
         Posterior draws used, evenly spread over the stored ones.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.noise import hold_courses
-from wirebayes.prediction.predictive import Question, predict
+from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.results.store import Stored
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
@@ -62,7 +62,7 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
     trained = len(stored.sample.protocol.displacement_mm)
     alone = stored.likelihood == "hold"
     unused = protocol.recorded & (np.arange(len(protocol.displacement_mm)) >= trained)
-    question = Question(protocol, 0 if alone else trained, unused, _first(measured, alone))
+    question = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
     drawn = predict(stored.problem, some(stored.theta), stored.sample, question, rng)
     wanted = protocol.mask & unused[:, None]
     if alone:
@@ -74,7 +74,7 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
 def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator) -> Array:
     """(len(time_s), n) predicted readings of the last hold given its first reading, hold by hold."""
     protocol, first = _last_alone(experiment, time_s)
-    question = Question(protocol, 0, np.array([True]), first)
+    question = PredictionRequest(protocol, 0, np.array([True]), first)
     drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, question, rng)[0]
     return drawn
 

@@ -114,7 +114,7 @@ def identifiability(fitted: Fit) -> list[Taught]:
     return out
 
 
-def told(taught: Sequence[Taught]) -> dict[str, Any]:
+def to_dict(taught: Sequence[Taught]) -> dict[str, Any]:
     """The same as plain values, for JSON."""
     return {
         t.name: {
@@ -190,7 +190,7 @@ class Extrapolation:
         with np.errstate(invalid="ignore"):
             return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """The same as plain values, for JSON, with a sentence for the longest time."""
         bands = {
             name: dict(zip(("q05", "q50", "q95"), getattr(self, name), strict=True))

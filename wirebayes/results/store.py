@@ -24,7 +24,7 @@ from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.results import posterior_checks
-from wirebayes.results.identifiability import extrapolation, identifiability, told
+from wirebayes.results.identifiability import extrapolation, identifiability, to_dict
 from wirebayes.results.stored_check import check
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.fresh import FreshSample
@@ -503,8 +503,8 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
         "warnings": _warnings(fit, sample),
         "parameters": parameters,
         "derived": {"tension_N": tension, **quantities},
-        "identifiability": told(identifiability(fit)),
-        "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).told(),
+        "identifiability": to_dict(identifiability(fit)),
+        "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,
         "autocorrelation_steps": float(chains.autocorrelation_steps.max()),

@@ -90,7 +90,7 @@ def simulate(
     (H, R, n) array, N
     """
     n = np.shape(theta["k1"])[0]
-    walk = _Walk(protocol, theta, model)
+    walk = Walk(protocol, theta, model)
     creep: NDArray[Any] = np.zeros(n)
     beside: dict[str, NDArray[Any]] = {}
     readings = []
@@ -109,7 +109,7 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     """
     n = np.shape(theta["k1"])[0]
     holds, width = protocol.time_s.shape
-    walk = _Walk(protocol, theta, model)
+    walk = Walk(protocol, theta, model)
     shape = (holds, width, n)
     tension, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
     carry_by_setting, carry_by_creep = np.empty((holds, n)), np.empty((holds, n))
@@ -123,7 +123,7 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
 
 
-class _Walk:
+class Walk:
     """One pass along the holds: what all holds share is computed once here."""
 
     def __init__(self, protocol: Protocol, theta: Theta, model: Model) -> None:

@@ -7,7 +7,7 @@ from typing import get_args
 
 from wirebayes import __version__
 from wirebayes.discovery import search
-from wirebayes.discovery.search import Joint, catalogue_without, final_models, investigate
+from wirebayes.discovery.search import JointModel, catalogue_without, final_models, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
@@ -123,7 +123,7 @@ def discover(
 
 def _jobs(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
     """Plain fit of every experiment, and the final ones."""
-    plain = [("plain", Joint((e,))) for block in found.final for e in block.experiments]
+    plain = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
     out = []
     for kind, model in [*plain, *(("final", m) for m in final_models(found))]:
         folders = tuple(f"{e.name}/{kind}" for e in model.experiments)

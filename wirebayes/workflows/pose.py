@@ -5,7 +5,7 @@ import math
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import answer
-from wirebayes.robot.pose.request import Question
+from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.workflows.options import (
     Numbers,
     PathLike,
@@ -32,7 +32,7 @@ def pose(
     tolerance: float = 0.3,
     tolerance_tilt: float = 0.055,
     specimen_spread: float = 0.05,
-    told: Wires | None = None,
+    other_fit: Wires | None = None,
     draws: int = 1000,
     experiment: str | None = None,
     own_effects: PathLike | None = None,
@@ -58,7 +58,7 @@ def pose(
         Allowed rotation, degrees.
     specimen_spread : float
         Relative difference between wires of one line.
-    told : Posterior or path, optional
+    other_fit : Posterior or path, optional
         Another fit of the line, which one more controller uses.
     draws : int
         Posterior draws used, evenly thinned.
@@ -94,14 +94,14 @@ def pose(
     moments = rising_times(times)
     tolerance, tolerance_tilt, specimen_spread = float(tolerance), float(tolerance_tilt), float(specimen_spread)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
-    other = None if told is None else draws_of(told, draws, experiment, own)
-    asked = Question(
+    other = None if other_fit is None else draws_of(other_fit, draws, experiment, own)
+    asked = PoseRequest(
         where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed
     )
     limits = (tolerance, tolerance_tilt, specimen_spread)
     at = (None if values is None else text_of(values) for values in (position, rotation))
-    other_fit = None if told is None else content(folder_of(told, experiment) / POSTERIOR)
-    options = (experiment, *at, text_of(times), *limits, other_fit)
+    other_draws = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
+    options = (experiment, *at, text_of(times), *limits, other_draws)
     place = Place.at(output)
     decides = configuration("pose", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
     run = open_run(place.path, decides)

@@ -21,13 +21,13 @@ from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import State, advance
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 
 Array = NDArray[Any]
 
 
 def begin(
-    target: Target, seed: int, policy: Policy, found: Optimum | None, near: Array | None, rough: Array | None
+    target: LogPosterior, seed: int, policy: Policy, found: Optimum | None, near: Array | None, rough: Array | None
 ) -> State:
     """Search where nothing is known, and learn a first proposal from rough draws (policy: `ensemble`)."""
     spawned = np.random.SeedSequence(seed).spawn(2)
@@ -48,7 +48,7 @@ def begin(
     return state
 
 
-def one_round(target: Target, state: State, policy: Policy) -> None:
+def one_round(target: LogPosterior, state: State, policy: Policy) -> None:
     """Learn from a walk, as long as the proposal is not to be trusted, then from weighted draws of the proposal."""
     state.round += 1
     if state.acceptance < _USEFUL:
@@ -74,7 +74,7 @@ def one_round(target: Target, state: State, policy: Policy) -> None:
         advance(target, state, steps, policy.ensembles)
 
 
-def learn_again(target: Target, state: State, policy: Policy) -> None:
+def learn_again(target: LogPosterior, state: State, policy: Policy) -> None:
     """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before."""
     z = np.concatenate(state.kept_z).reshape(-1, state.positions.shape[1])
     value = np.concatenate(state.kept_log_density).ravel()
@@ -102,7 +102,7 @@ def overlooked(state: State, z: Array, value: Array) -> float:
     return float(max(high, np.quantile(value - state.proposal.log_density(z), 0.99)) - middle)
 
 
-def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
+def _walked(target: LogPosterior, state: State, policy: Policy) -> tuple[Array, Array, Array]:
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
     again = min(state.walks, len(_WARM) - 1)
     state.walks += 1
@@ -113,7 +113,7 @@ def _walked(target: Target, state: State, policy: Policy) -> tuple[Array, Array,
     return state.walk
 
 
-def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, Array]:
+def _drawn(target: LogPosterior, state: State, policy: Policy) -> tuple[Array, Array, Array]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
     most = policy.round_draws * (_TO_FIND_MORE if state.overlooked else 1)
     n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS))
@@ -126,7 +126,7 @@ def _drawn(target: Target, state: State, policy: Policy) -> tuple[Array, Array, 
 
 
 def _fit(
-    target: Target,
+    target: LogPosterior,
     state: State,
     policy: Policy,
     hot: Array,
@@ -164,7 +164,7 @@ def _place(state: State, policy: Policy, z: Array, value: Array, base: Array) ->
     state.positions, state.values = z[np.concatenate(chosen)], value[np.concatenate(chosen)]
 
 
-def _walking(target: Target, policy: Policy) -> int:
+def _walking(target: LogPosterior, policy: Policy) -> int:
     """Walkers in burn-in: few, for the same number of evaluations takes them further."""
     each = min(policy.walkers, max(policy.walkers // 4, 2 * len(target.problem.names) + 2))
     return each * policy.ensembles
@@ -177,7 +177,7 @@ def _resampled(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[n
     return rng.permutation(mixture.rows_by_weight(weight, n, rng))
 
 
-def _finite_draws(target: Target, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:
+def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:
     """Draws of a mixture where the density is above zero, and its logarithm there."""
     drawn, values = np.empty((0, len(target.problem.names))), np.empty(0)
     while len(drawn) < n:

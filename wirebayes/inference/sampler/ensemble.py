@@ -25,7 +25,7 @@ from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import DEFAULT, Policy, describe
 from wirebayes.inference.sampler import burn_in
 from wirebayes.inference.sampler.state import POOL, State, advance
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 
 Array = NDArray[Any]
 
@@ -69,7 +69,7 @@ class Chains:
 
 
 def sample(
-    target: Target,
+    target: LogPosterior,
     seed: int,
     policy: Policy = DEFAULT,
     *,
@@ -83,7 +83,7 @@ def sample(
 
     Parameters
     ----------
-    target : Target
+    target : LogPosterior
     seed : int
     policy : Policy
     checkpoint : Path, optional
@@ -128,7 +128,7 @@ def sample(
     )  # fmt: skip
 
 
-def _kept_block(target: Target, state: State, policy: Policy) -> None:
+def _kept_block(target: LogPosterior, state: State, policy: Policy) -> None:
     sampler, used = advance(target, state, _block_steps(state, policy), policy.ensembles)
     state.kept_z.append(sampler.get_chain())
     state.kept_log_density.append(sampler.get_log_prob())
@@ -154,7 +154,7 @@ def _block_steps(state: State, policy: Policy) -> int:
     return min(wanted, policy.most_steps - kept)
 
 
-def _look(target: Target, state: State, policy: Policy) -> None:
+def _look(target: LogPosterior, state: State, policy: Policy) -> None:
     """Apply the stop rule to the draws kept so far."""
     z = _by_ensemble(state.kept_z, policy)
     steps, d = z.shape[1], z.shape[-1]

@@ -94,7 +94,7 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
     ensembles : int
         Of the same even number of walkers, one after the other.
     straight : Straight, optional
-        Coordinates as they are when left out; then a fifth of the steps is as long as differences are, from mode to
+        Transformation as they are when left out; then a fifth of the steps is as long as differences are, from mode to
         mode.
     """
 

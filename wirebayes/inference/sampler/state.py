@@ -14,7 +14,7 @@ from wirebayes.inference.sampler import checkpoint
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.inference.transform import Target
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.run_folder import stored_results
 
 Array = NDArray[Any]
@@ -130,7 +130,7 @@ def _numbered(arrays: tuple[Array, ...] | None) -> dict[str, Array] | None:
     return None if arrays is None else {str(i): array for i, array in enumerate(arrays)}
 
 
-def advance(target: Target, state: State, steps: int, ensembles: int = 1, power: float = 1.0) -> tuple[Any, int]:
+def advance(target: LogPosterior, state: State, steps: int, ensembles: int = 1, power: float = 1.0) -> tuple[Any, int]:
     """Run the walkers on, on the density to a power; their places and random state are left in `state`.
 
     All ensembles walk side by side: a batch costs little more than one of its parts.

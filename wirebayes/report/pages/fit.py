@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.io.run_folder import read_json
-from wirebayes.prediction.predictive import Question, predict
+from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
     Block,
@@ -185,7 +185,7 @@ def _residuals(stored: Stored) -> Any:
     protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
     alone = stored.likelihood == "hold"
     first = readings[:, 0] if alone else np.full(len(readings), np.nan)
-    question = Question(protocol, 0 if alone else len(readings), protocol.recorded, first)
+    question = PredictionRequest(protocol, 0 if alone else len(readings), protocol.recorded, first)
     rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), _DRAWS)).astype(int)
     replicates = predict(stored.problem, stored.theta[rows], stored.sample, question, np.random.default_rng(0))
     wanted = protocol.mask.copy()

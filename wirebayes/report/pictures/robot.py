@@ -15,7 +15,7 @@ from wirebayes.report.pictures.robot_space import workspace_map
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.answer import Answer
-from wirebayes.robot.pose.request import Question
+from wirebayes.robot.pose.request import PoseRequest
 
 Floats = NDArray[np.float64]
 CONTROLLERS = {
@@ -27,7 +27,7 @@ CONTROLLERS = {
 _COLOURS = (HOLD, CHAIN, "#5d8c4a")
 
 
-def save_pose(folder: Path, robot: Robot, asked: Question, found: Answer) -> None:
+def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> None:
     """Write the pictures that go with ``pose.json``; none when the pose cannot be held."""
     if not found.courses or not found.courses[0.0].found.any():
         return

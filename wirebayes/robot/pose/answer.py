@@ -14,7 +14,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, control, drift, forward, inverse, path
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.pose import controllers, stability, variance_shares
-from wirebayes.robot.pose.request import Question, band
+from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
 
 Floats = NDArray[np.float64]
@@ -40,14 +40,14 @@ class Answer:
     workspace: claim.WorkspaceDrift | None = None
 
 
-def answer(robot: Robot, line: WireDraws, asked: Question, other: WireDraws | None = None) -> Answer:
+def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws | None = None) -> Answer:
     """Inverse and forward kinematics, drift, pose error and where it comes from.
 
     Parameters
     ----------
     robot : Robot
     line : WireDraws
-    asked : Question
+    asked : PoseRequest
     other : WireDraws, optional
         Another fit of the same line, told to one more controller.
 
@@ -186,7 +186,7 @@ def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
     }
 
 
-def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, asked: Question) -> dict[str, Any]:
+def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, asked: PoseRequest) -> dict[str, Any]:
     """Probability, at this pose, of the paper's figures."""
     out: dict[str, Any] = {"time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD))}
     probability = []

@@ -10,7 +10,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
-from wirebayes.robot.pose.request import Question, band
+from wirebayes.robot.pose.request import PoseRequest, band
 
 Floats = NDArray[np.float64]
 HISTORIES_S = (0.0, 3600.0)  # under load before the calibration: new wires, and an hour
@@ -19,7 +19,7 @@ _DRAWS = 300
 
 
 def errors(
-    robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator, other: WireDraws | None = None
+    robot: Robot, line: WireDraws, asked: PoseRequest, rng: np.random.Generator, other: WireDraws | None = None
 ) -> list[dict[str, Any]]:
     """Pose error under controllers told the posterior, and how long each stays within tolerance.
 
@@ -28,7 +28,7 @@ def errors(
     robot : Robot
     line : WireDraws
         What the wires may really be.
-    asked : Question
+    asked : PoseRequest
     rng : numpy Generator
     other : WireDraws, optional
         Another fit of the same line (the plain model beside one with effects), told to a third controller.
@@ -60,7 +60,7 @@ def errors(
 
 
 def between_calibrations(
-    robot: Robot, line: WireDraws, asked: Question, rng: np.random.Generator
+    robot: Robot, line: WireDraws, asked: PoseRequest, rng: np.random.Generator
 ) -> list[dict[str, Any]]:
     """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
 
@@ -87,11 +87,11 @@ def between_calibrations(
     return out
 
 
-def _tolerances(asked: Question) -> dict[str, float]:
+def _tolerances(asked: PoseRequest) -> dict[str, float]:
     return {"tolerance_mm": 1e3 * asked.tolerance_m, "tolerance_deg": float(np.degrees(asked.tolerance_rad))}
 
 
-def _lasts(error: control.PoseError, asked: Question) -> dict[str, Any]:
+def _lasts(error: control.PoseError, asked: PoseRequest) -> dict[str, Any]:
     within = control.longest_interval(error, asked.tolerance_m, asked.tolerance_rad)
     at_end = not np.isfinite(within)
     return {

@@ -13,7 +13,7 @@ QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 
 
 @dataclass(frozen=True)
-class Question:
+class PoseRequest:
     """What is asked.
 
     Attributes
