@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wirebayes.linear_algebra import eigh, inv, solve
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.prediction.predictive import _regressed
 from wirebayes.wire.staircase import Linearised
 
@@ -49,7 +49,7 @@ def test_a_hold_left_out_at_absurd_parameters_is_impossible_and_harms_no_other_d
         by_setting = moves * np.array([0.0, 1.0])[:, None, None]
         carry = np.ones((holds, len(one)))
         line = Linearised(0.0 * moves, by_setting, moves, carry, carry, np.zeros((holds + 1, len(one))))
-        return noise.leave_one_hold_out(line, readings, mask, one, one)
+        return likelihoods.leave_one_hold_out(line, readings, mask, one, one)
 
     both = left_out(slice(0, 2))
     assert np.array_equal(both[:, :1], left_out(slice(0, 1))) and not np.isnan(both).any()

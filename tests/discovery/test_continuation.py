@@ -13,7 +13,7 @@ from wirebayes.discovery.name_evidence import choose
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import read_experiments
-from wirebayes.model.noise import reading_variance
+from wirebayes.model.likelihoods import reading_variance
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import simulate

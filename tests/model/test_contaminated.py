@@ -13,7 +13,7 @@ from tests.wire.protocols import PLAIN, parameters, protocol
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
-from wirebayes.model import contaminated, noise
+from wirebayes.model import contaminated, likelihoods
 from wirebayes.model.contaminated import with_gross_errors
 from wirebayes.model.problem import build, with_readings
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -75,7 +75,7 @@ def test_without_gross_errors_it_is_the_plain_chain():
     p = protocol([2.0, 4.0, 6.0], [[0.0, 40.0, 120.0]] * 3, unrecorded={1})
     y = measured(protocol([2.0, 4.0, 6.0], [[0.0, 40.0, 120.0]] * 3), THETA, {})
     line, one = linearise(p, columns(THETA)), np.ones(1)
-    plain = noise.chain(line, y[..., None], p.mask, one * 1e-4, one * 0.05).log_likelihood
+    plain = likelihoods.chain(line, y[..., None], p.mask, one * 1e-4, one * 0.05).log_likelihood
     assert filtered(p, THETA, y, share=0.0).log_likelihood == pytest.approx(plain, rel=1e-12)
 
 

@@ -7,7 +7,7 @@ from scipy import stats
 from tests.model.dense import columns, log_density, normal
 from tests.simulated import simulated_tests
 from wirebayes.effects import named
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
@@ -26,7 +26,7 @@ def test_rounding_is_part_of_the_error_of_every_reading():
     experiment = simulated_tests([bench], Truth(WIRE), seed=1)[0]
     problem = build([experiment], likelihood="hold")
     sample = problem.samples[0]
-    courses = noise.hold_courses(sample.protocol, columns(WIRE), Model(), sample.readings[:, 0])
+    courses = likelihoods.hold_courses(sample.protocol, columns(WIRE), Model(), sample.readings[:, 0])
     expected = 0.0
     for course, readings in zip(courses, experiment.tension(), strict=True):
         tension, slope, _ = course

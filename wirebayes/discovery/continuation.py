@@ -34,7 +34,7 @@ from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import solve
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import Each
 
@@ -123,7 +123,7 @@ def _raw(block: LaplaceFit, probe: Probe) -> float:
     theta, total = block.target.coordinates.to_natural(block.modes.z[:1]), 0.0
     for sample, shape in zip(block.target.problem.samples, shapes, strict=True):
         own = block.target.problem.parameters(theta, sample)
-        variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
         total += float((shape[sample.protocol.mask] ** 2).sum() / variance[0])
     return total
 

@@ -12,8 +12,8 @@ from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.linear_algebra import log_determinant, solve
-from wirebayes.model import noise
-from wirebayes.model.marginal import completed
+from wirebayes.model import likelihoods
+from wirebayes.model.linear_amplitudes import completed
 from wirebayes.model.problem import Problem, build
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import linearise
@@ -89,11 +89,11 @@ def held_out(
     for sample, model, k in zip(whole.samples, models, train, strict=True):
         own = problem.parameters(theta, problem.samples[len(out)])
         line = linearise(sample.protocol, own, model)
-        variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
         last = np.flatnonzero(sample.protocol.recorded)[k:]
         mask = sample.protocol.mask.copy()
         mask[last] = False
-        free = noise.chain(line, sample.readings, mask, variance, own["setting_sd"])
+        free = likelihoods.chain(line, sample.readings, mask, variance, own["setting_sd"])
         error, floor, elpd, inside = [], [], [], []
         for j in last:
             keep = sample.protocol.mask[j]

@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from wirebayes.discovery import smooth_reference
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import eigh, solve
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import Model, linearise, simulate
@@ -289,14 +289,14 @@ def _points(target: LogPosterior, z: Array, readings: Sequence[Array] | None, mo
     for at, sample in enumerate(problem.samples):
         mask = sample.protocol.mask
         own = problem.parameters(theta, sample)
-        sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
+        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N))
         line = linearise(sample.protocol, own, sample.model)
         y = sample.readings if readings is None else readings[at]
         moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
         moved = moved.reshape(*moved.shape[:2], len(moving) + 1, n)
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
         scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
-        jac = np.moveaxis(noise.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
+        jac = np.moveaxis(likelihoods.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
         floor = np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2
         yield _Point(line.tension, slopes, sd, ((y - line.tension)[mask] / sd).T, scaled, jac, floor)
 
@@ -442,7 +442,7 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
     parts = []
     for at, sample in enumerate(target.problem.samples):
         own = target.problem.parameters(theta, sample)
-        sd = np.sqrt(noise.reading_variance(own["sensor_sd"], sample.resolution_N))
+        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N))
         y = sample.readings if readings is None else readings[at]
         with np.errstate(all="ignore"):
             left = y - simulate(sample.protocol, own, sample.model)

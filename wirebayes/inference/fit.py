@@ -13,7 +13,7 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
 from wirebayes.inference.sampler.ensemble import Chains
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.model.marginal import completed, integrated
+from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
 
 Array = NDArray[Any]

@@ -11,7 +11,7 @@ from scipy import stats
 from wirebayes.inference.modes import Optimum, climb, modes
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.marginal import integrated
+from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem, build
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
@@ -100,8 +100,8 @@ def fitted(
 ) -> LaplaceFit:
     """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given.
 
-    What the readings depend on linearly is integrated out (see `wirebayes.model.marginal`). The `exponent` is that of
-    the creep amount's growth with length, or its prior (see `wirebayes.model.problem.build`).
+    What the readings depend on linearly is integrated out (`wirebayes.model.linear_amplitudes`). The `exponent` is that
+    of the creep amount's growth with length, or its prior (see `wirebayes.model.problem.build`).
     """
     target = LogPosterior(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
     extra = None if near is None else target.coordinates.to_sampled(near[None])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.noise import hold_courses
+from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.prior import wire_defaults
 from wirebayes.model.problem import MATERIAL, Likelihood
 from wirebayes.wire.laws import ElasticLaw, History

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.model.marginal import MarginalisedProblem, integrated
+from wirebayes.model.linear_amplitudes import MarginalisedProblem, integrated
 from wirebayes.model.prior import PooledPrior, Prior
 from wirebayes.model.problem import Problem
 

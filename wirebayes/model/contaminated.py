@@ -16,7 +16,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from wirebayes.errors import InputError
-from wirebayes.model.noise import Filtered
+from wirebayes.model.likelihoods import Filtered
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.wire.staircase import Linearised

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.model.prior import Prior, from_table, wire_defaults
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
@@ -106,14 +106,16 @@ class Problem:
         for i, sample in enumerate(self.samples):
             own = self.parameters(theta, sample)
             y = sample.readings if readings is None else readings[i]
-            variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+            variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
             if self.likelihood == "hold":
                 out.append(
-                    noise.hold_by_hold(sample.protocol, own | {"preload": 0.0 * own["k1"]}, sample.model, y, variance)
+                    likelihoods.hold_by_hold(
+                        sample.protocol, own | {"preload": 0.0 * own["k1"]}, sample.model, y, variance
+                    )
                 )
             else:
                 line = linearise(sample.protocol, own, sample.model)
-                out.append(noise.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
+                out.append(likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
         return out
 
     def log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> Array:
@@ -129,10 +131,10 @@ class Problem:
         out = []
         for sample in self.samples:
             own = self.parameters(theta, sample)
-            variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+            variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
             line = linearise(sample.protocol, own, sample.model)
             out.append(
-                noise.leave_one_hold_out(line, sample.readings, sample.protocol.mask, variance, own["setting_sd"])
+                likelihoods.leave_one_hold_out(line, sample.readings, sample.protocol.mask, variance, own["setting_sd"])
             )
         return out
 
@@ -141,7 +143,7 @@ class Problem:
         own = self.parameters(theta, sample)
         return (
             linearise(sample.protocol, own, sample.model),
-            noise.reading_variance(own["sensor_sd"], sample.resolution_N),
+            likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N),
             own["setting_sd"],
         )
 
@@ -163,7 +165,7 @@ def build(
     effects : sequence of Effect
         Each acts on every sample; its amplitudes are shared as its scope says (an event acts where its hold is).
     law, history, likelihood
-        See `wirebayes.wire.laws` and `wirebayes.model.noise`.
+        See `wirebayes.wire.laws` and `wirebayes.model.likelihoods`.
     length_exponent : float or scipy frozen distribution
         p of B ∝ L0^p among samples of one material: a value, or a prior to learn it.
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.model.noise import hold_courses
+from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.wire.staircase import simulate
 

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from wirebayes.inference.fit import Fit
 from wirebayes.io.experiment import Experiment
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.prediction.leave_one_hold_out import thinned
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.wire.staircase import linearise
@@ -212,15 +212,15 @@ def _chain_scores(
     for start in range(0, len(theta), _CHUNK):
         own = problem.parameters(theta[start : start + _CHUNK], here)
         line = linearise(whole, own, here.model)
-        variance = noise.reading_variance(own["sensor_sd"], here.resolution_N)
+        variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N)
         with np.errstate(all="ignore"):
             for j in np.flatnonzero(asked):
                 for what in ("whole", "first"):
                     mask = whole.mask & ~asked[:, None]
                     mask[j] = whole.mask[j] if what == "whole" else np.arange(mask.shape[1]) == 0
-                    log_p = noise.chain(line, tension, mask, variance, own["setting_sd"]).log_likelihood[j]
+                    log_p = likelihoods.chain(line, tension, mask, variance, own["setting_sd"]).log_likelihood[j]
                     parts.setdefault((int(j), what), []).append(log_p)
-            every = noise.chain(line, tension, whole.mask, variance, own["setting_sd"]).log_likelihood
+            every = likelihoods.chain(line, tension, whole.mask, variance, own["setting_sd"]).log_likelihood
             parts.setdefault((-1, "whole"), []).append(every[asked].sum(axis=0))
     mean = {key: _log_mean(np.concatenate(values)) for key, values in parts.items()}
     each = np.array([mean[int(j), "whole"] for j in np.flatnonzero(asked)])
@@ -232,8 +232,8 @@ def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, asked: NDArra
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["k1"]}
-    variance = noise.reading_variance(own["sensor_sd"], here.resolution_N)
-    log_p = noise.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
+    variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N)
+    log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
     return np.array([_log_mean(log_p[j]) for j in np.flatnonzero(asked)])
 
 

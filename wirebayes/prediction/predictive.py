@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.linear_algebra import eigh, solve
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model, Theta, Walk, linearise
@@ -116,7 +116,7 @@ def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: n
 def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator) -> Array:
     """(H, n) a draw of the setting errors of a sample's holds, unrecorded ones included, given all its readings."""
     line = linearise(sample.protocol, own, sample.model)
-    variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
     holds, _, n = line.tension.shape
     carried = np.zeros((holds, n))
     # Normal equations of eta in units of its own sd; hold by hold, so that the whole Jacobian is never in memory.
@@ -141,7 +141,7 @@ def _hold_by_hold(own: Theta, model: Model, question: PredictionRequest, error: 
     """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
     given = question.first_N[:, None] - error[:, 0]
     out = np.zeros_like(error)
-    for j, course in enumerate(noise.hold_courses(question.protocol, own, model, given)):
+    for j, course in enumerate(likelihoods.hold_courses(question.protocol, own, model, given)):
         if course is not None and question.asked[j]:
             tension, _, valid = course
             out[j] = np.where(valid, tension, 0.0) + error[j]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.noise import hold_courses
+from wirebayes.model.likelihoods import hold_courses
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.results.store import Stored
 from wirebayes.wire.protocol import Protocol

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import HoldContext, Placed, steady_hold
-from wirebayes.wire.elastic import bent, strain_of
 from wirebayes.wire.staircase import Model, Theta
 
 Array = NDArray[Any]

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.results import store
 from wirebayes.wire.staircase import Linearised, linearise
 
@@ -90,7 +90,7 @@ def _walked(stored: store.Stored) -> tuple[Linearised, dict[str, Array]]:
 def _residuals(axis: Axes, stored: store.Stored, held: list[int]) -> None:
     sample = stored.sample
     line, own = _walked(stored)
-    variance = noise.reading_variance(own["sensor_sd"], sample.resolution_N)
+    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
     width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
     drawn = line.tension + np.random.default_rng(1).normal(size=line.tension.shape) * width
     middle = line.tension.mean(axis=2)

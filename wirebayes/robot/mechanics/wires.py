@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.wire import laws
+from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.effect import Effect, HoldContext, Placed, steady_hold
-from wirebayes.wire.elastic import bent, strain_of
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model
 

@@ -11,7 +11,7 @@ from wirebayes.effects import named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
-from wirebayes.model.marginal import MarginalisedProblem, completed, integrated
+from wirebayes.model.linear_amplitudes import MarginalisedProblem, completed, integrated
 from wirebayes.model.problem import build
 
 WIRES = {e.name: e for e in paper.experiments()}

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tests.model.dense import columns, conditional, jacobian, log_density, normal
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import named
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.wire.staircase import Model, linearise, simulate
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
@@ -25,8 +25,8 @@ def measured(p, theta, model=None, seed=0):
 
 def filtered(p, theta, readings, model=None, resolution=0.0):
     line = linearise(p, columns(theta), model or Model())
-    variance = noise.reading_variance(np.array([theta["sensor_sd"]]), resolution)
-    return noise.chain(line, readings[..., None], p.mask, variance, np.array([theta["setting_sd"]]))
+    variance = likelihoods.reading_variance(np.array([theta["sensor_sd"]]), resolution)
+    return likelihoods.chain(line, readings[..., None], p.mask, variance, np.array([theta["setting_sd"]]))
 
 
 noises = st.fixed_dictionaries({"sensor_sd": st.floats(1e-3, 0.1), "setting_sd": st.floats(1e-3, 0.2)})
@@ -91,7 +91,7 @@ def test_dropping_the_carried_creep_is_noticed():
     line = linearise(LOADING, columns(theta))
     line.by_creep[:] = 0.0
     variance, setting = np.array([theta["sensor_sd"] ** 2]), np.array([theta["setting_sd"]])
-    broken = noise.chain(line, y[..., None], LOADING.mask, variance, setting).log_likelihood.sum()
+    broken = likelihoods.chain(line, y[..., None], LOADING.mask, variance, setting).log_likelihood.sum()
     r, covariance, _ = normal(LOADING, theta, Model(), y)
     assert abs(broken - log_density(r, covariance)) > 0.1
 
@@ -103,8 +103,8 @@ def test_leaving_a_hold_out_is_dense_conditioning(p, theta, errors, seed):
     y = measured(p, theta, seed=seed)
     r, covariance, hold = normal(p, theta, Model(), y, 0.01)
     line = linearise(p, columns(theta))
-    variance = noise.reading_variance(np.array([theta["sensor_sd"]]), 0.01)
-    found = noise.leave_one_hold_out(line, y[..., None], p.mask, variance, np.array([theta["setting_sd"]]))[:, 0]
+    variance = likelihoods.reading_variance(np.array([theta["sensor_sd"]]), 0.01)
+    found = likelihoods.leave_one_hold_out(line, y[..., None], p.mask, variance, np.array([theta["setting_sd"]]))[:, 0]
     for j in range(len(found)):
         expected = conditional(r, covariance, hold == j) if p.mask[j].any() else 0.0
         assert found[j] == pytest.approx(expected, rel=1e-6, abs=1e-6)
@@ -112,7 +112,7 @@ def test_leaving_a_hold_out_is_dense_conditioning(p, theta, errors, seed):
 
 def by_hold(p, theta, y, model=None):
     variance = np.array([theta["sensor_sd"] ** 2])
-    return noise.hold_by_hold(p, columns(theta), model or Model(), y[..., None], variance)[:, 0]
+    return likelihoods.hold_by_hold(p, columns(theta), model or Model(), y[..., None], variance)[:, 0]
 
 
 @pytest.mark.parametrize("late", [0.0, 7.0])
@@ -144,7 +144,7 @@ def test_with_an_effect_too_every_hold_is_a_test_of_its_own_through_its_first_re
     model = Model(effects=(named(key),))
     theta = columns(PLAIN | STRONG)
     first = np.linspace(1.0, 6.0, len(LOADING.displacement_mm))[:, None]
-    for j, course in enumerate(noise.hold_courses(LOADING, theta, model, first)):
+    for j, course in enumerate(likelihoods.hold_courses(LOADING, theta, model, first)):
         if course is None:
             continue
         tension, slope, _ = course

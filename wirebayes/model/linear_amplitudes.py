@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.model import noise
+from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.wire.staircase import simulate
 
@@ -74,8 +74,8 @@ class MarginalisedProblem(Problem):
         for i, sample in enumerate(self.samples):
             y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
             line, variance, setting_sd = self.linearised(theta, sample)
-            filtered = noise.chain(line, y, mask, variance, setting_sd)
-            gram, along = noise.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
+            filtered = likelihoods.chain(line, y, mask, variance, setting_sd)
+            gram, along = likelihoods.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
             height = filtered.log_likelihood.sum(axis=0)
             total = total + height
             square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
