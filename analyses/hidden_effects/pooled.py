@@ -10,12 +10,12 @@ import argparse
 import json
 from pathlib import Path
 
-from .targets import LogPosterior, targets
+from .targets import Target, targets
 
 SIGNS = {">= ": "≥ ", "<= ": "≤ ", "delta ": "δ = "}
 
 
-def told(row: LogPosterior, bold: bool = False) -> str:
+def told(row: Target, bold: bool = False) -> str:
     """What was found, as a share or, where no share is wanted, as a number."""
     found = row["found"]
     assert found

@@ -7,19 +7,19 @@ from typing import Any
 
 from .rates import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ratio
 
-LogPosterior = dict[str, Any]
+Target = dict[str, Any]
 ALPHA = 0.04
 
 
-def _row(name: str, wanted: str, found: dict[str, Any] | None, passed: bool | None) -> LogPosterior:
+def _row(name: str, wanted: str, found: dict[str, Any] | None, passed: bool | None) -> Target:
     return {"target": name, "wanted": wanted, "found": found, "passed": passed if found else None}
 
 
-def _at_least(name: str, found: dict[str, Any] | None, wanted: float) -> LogPosterior:
+def _at_least(name: str, found: dict[str, Any] | None, wanted: float) -> Target:
     return _row(name, f">= {100 * wanted:.0f} %", found, found is not None and found["value"] >= wanted)
 
 
-def targets(rows: list[Row]) -> list[LogPosterior]:
+def targets(rows: list[Row]) -> list[Target]:
     """All rows that simulated cases can decide.
 
     Parameters
@@ -55,7 +55,7 @@ def targets(rows: list[Row]) -> list[LogPosterior]:
     return table
 
 
-def _most(name: str, rows: list[Row]) -> LogPosterior:
+def _most(name: str, rows: list[Row]) -> Target:
     """The mean power of a test that knows the noise and the effect, and looks at what a refit of the model leaves."""
     if not rows:
         return _row(name, "no more, in %", None, None)
@@ -64,13 +64,13 @@ def _most(name: str, rows: list[Row]) -> LogPosterior:
     return _row(name, "no more, in %", {"value": power, "n": len(rows), "low": power, "high": power}, None)
 
 
-def _false_alarms(clean: list[Row]) -> LogPosterior:
+def _false_alarms(clean: list[Row]) -> Target:
     found = rate(r["any_alarm"] for r in clean)
     passed = found is not None and found["high"] <= 0.08 and found["n"] >= 600
     return _row("false alarms on clean files", "upper bound <= 8 %, n >= 600", found, passed)
 
 
-def _clean_held_out(clean: list[Row]) -> list[LogPosterior]:
+def _clean_held_out(clean: list[Row]) -> list[Target]:
     found = pooled(clean, rmse_ratio)
     ratios = [(r["held_out"]["final"] / r["held_out"]["plain"]) ** 0.5 for r in clean if r["held_out"]]
     worst = {"value": max(ratios), "n": len(ratios), "low": max(ratios), "high": max(ratios)} if ratios else None
@@ -85,7 +85,7 @@ def _clean_held_out(clean: list[Row]) -> list[LogPosterior]:
     ]
 
 
-def _set_size(seen: list[Row]) -> LogPosterior:
+def _set_size(seen: list[Row]) -> Target:
     sizes = [(r["set_size"], r["optimal"]["set_size"]) for r in seen if "set_size" in r["optimal"]]
     if not sizes:
         return _row("size of the 90 % set above the optimal", "<= 1", None, None)

@@ -11,7 +11,7 @@ from wirebayes.effects import named
 from wirebayes.io.paper import experiments
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import build
-from wirebayes.results.identifiability import SENSITIVE, extrapolation, identifiability, sensitivity, told
+from wirebayes.results.identifiability import SENSITIVE, extrapolation, identifiability, sensitivity, to_dict
 
 
 def normal_model(noise: dict[str, float], draws: int = 4000, total: float | None = None) -> Any:
@@ -47,7 +47,7 @@ def test_a_sum_alone_is_a_ridge() -> None:
     # the sum is known, the difference has the prior's variance: correlation (0.0025 - 2) / (0.0025 + 2) nearly
     assert taught[0].ridges["b"] < -0.98
     assert "correlated with b" in taught[0].sentence
-    assert set(told(taught)) == {"a", "b"}
+    assert set(to_dict(taught)) == {"a", "b"}
 
 
 def test_sensitivity_is_zero_for_a_flat_component_and_grows_with_its_part() -> None:
@@ -72,10 +72,10 @@ def test_extrapolation_says_whose_work_the_band_is() -> None:
     problem = build([experiments()[0]])
     rows = problem.prior.rvs(4000, np.random.default_rng(3))
     rows[:, problem.names.index("k1")] = 700.0
-    whole = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0).told()  # type: ignore[arg-type]
+    whole = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0).to_dict()  # type: ignore[arg-type]
     assert ": it depends on the prior" in whole["sentence"] and "24 h at 2 N" in whole["sentence"]
     taught = rows * np.exp(0.02 * np.random.default_rng(4).normal(size=rows.shape)) / rows * rows[:1]
-    known = extrapolation(SimpleNamespace(problem=problem, flat=taught), 2.0).told()  # type: ignore[arg-type]
+    known = extrapolation(SimpleNamespace(problem=problem, flat=taught), 2.0).to_dict()  # type: ignore[arg-type]
     assert "hardly depends on the prior" in known["sentence"] and known["prior_share"][-1] < 0.05
 
 
@@ -85,4 +85,4 @@ def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
     rows[:200, problem.names.index("creep_threshold.tau_c")] = 2.5
     band = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0)  # type: ignore[arg-type]
     assert (band.posterior_mm[0] == 0.0).all()
-    assert "do not creep at this tension" in band.told()["sentence"]
+    assert "do not creep at this tension" in band.to_dict()["sentence"]
