@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from wirebayes.discovery import refit, screening
-from wirebayes.discovery.continuation import climb, ladders, outward, strengths
+from wirebayes.discovery import continuation, refit, screening
+from wirebayes.discovery.continuation import Continuation, climb, ladders, strengths
 from wirebayes.discovery.linear_scan import Scan, expand, scan
 from wirebayes.discovery.name_evidence import choose
 from wirebayes.effects import CATALOGUE, named
@@ -17,6 +19,8 @@ from wirebayes.model.likelihoods import reading_variance
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import simulate
+
+Array = NDArray[Any]
 
 STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1, "sensor_sd": 0.02, "setting_sd": 0.01}
 
@@ -89,9 +93,33 @@ def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path:
     trials, candidates, data = scanned(block, kinds)
     drawn = screening.replicated(block, trials, 199, np.random.default_rng(1))
     near = screening.global_test(candidates, [data], [drawn.scan])
-    far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
+    larger = Continuation([block], trials, candidates, [data])
+    far, log_bayes = larger.test([drawn], near), larger.log_bayes
     assert far.surprises["creep_threshold"] > near.surprises["creep_threshold"] + 1.0
     assert far.p == pytest.approx(1 / 200) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
+
+
+def test_simulations_that_come_later_are_climbed_and_the_others_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block = block_of(tmp_path, {"strain_stiffening.c": 12.0}, [named("strain_stiffening")], 1)
+    trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
+    drawn = [screening.replicated(block, trials, 40, np.random.default_rng(i)) for i in (0, 1)]
+    both = screening.joined_replicates(drawn)
+    rows: list[int] = []
+
+    def counted(block: LaplaceFit, way: continuation.AmplitudePath, z: Array, *readings: Any) -> continuation.Climbed:
+        rows.append(len(z))
+        return climb(block, way, z, *readings)
+
+    monkeypatch.setattr(continuation, "climb", counted)
+    larger = Continuation([block], trials, candidates, [data])
+    for simulated in (drawn[0], both):
+        found = larger.test([simulated], screening.global_test(candidates, [data], [simulated.scan]))
+    assert rows == [1, 40, 40]
+    anew = Continuation([block], trials, candidates, [data])
+    again = anew.test([both], screening.global_test(candidates, [data], [both.scan]))
+    assert found.surprises == again.surprises and anew.log_bayes == larger.log_bayes
 
 
 def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(tmp_path: Path) -> None:
@@ -108,7 +136,8 @@ def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(
     trials, candidates, data = scanned(block, kinds)
     drawn = screening.replicated(block, trials, 99, np.random.default_rng(1))
     near = screening.global_test(candidates, [data], [drawn.scan])
-    far, log_bayes = outward([block], trials, candidates, [data], [drawn], near)
+    larger = Continuation([block], trials, candidates, [data])
+    far, log_bayes = larger.test([drawn], near), larger.log_bayes
     assert near.p > 0.04 and far.p == pytest.approx(0.01)
     chosen = choose([block], trials, candidates, [data], log_bayes)
     assert chosen.best == "clamp_transient"

@@ -333,60 +333,70 @@ def strengths(ways: Sequence[AmplitudePath], climbed: Sequence[Mapping[int, Clim
     return out
 
 
-def outward(
-    blocks: Sequence[LaplaceFit],
-    trials: Sequence[Probe],
-    candidates: Sequence[Candidate],
-    data: Sequence[Scan],
-    simulated: Sequence[Replicates],
-    test: GlobalTest,
-    each: Each = map,
-) -> tuple[GlobalTest, dict[Candidate, float]]:
+class Continuation:
     """The global test with every effect led up its ladder, in the data and in the simulations alike.
 
-    Only names that come above the linear scan's own level are tried in the simulations: others do not decide. How often
-    the most surprising of all names is that surprising is known from the linear scan of the same simulations.
+    The test may be asked again with more simulations: what has been climbed is kept.
 
-    Returns
-    -------
-    The test, and the log Bayes factor of every candidate that has a ladder.
+    Parameters
+    ----------
+    blocks, trials, candidates, data
+        See `ladders`.
+    each : function, optional
+        The built-in `map`, or one over processes.
     """
-    ways = ladders(blocks, trials, candidates, data)
-    own = [(b.modes.z[:1], None) for b in blocks]
-    found = strengths(ways, list(each(_climbs, ways, repeat(blocks), repeat(own))))
-    linear = by_name(candidates, data)
-    value = {c.name: float(linear[c.name][0]) for c in found}
-    for c, strength in found.items():
-        value[c.name] = max(value[c.name], float(strength[0]))
-    lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in value.items()}
-    surprises = dict(test.surprises)
-    for name in sorted((n for n in lead if lead[n] > 0), key=lambda n: -lead[n])[:_TRIED]:
-        own_ways = [way for way in ways if way.effect.name == name]
-        chance = _chance(value[name], test.chance[name], blocks, own_ways, simulated, each)
-        surprises[name] = surprise(value[name], chance)
-        if surprises[name] > test.null.max():
-            break
-    return replace(test, surprises=surprises), {c: float(v[0]) for c, v in found.items()}
+
+    def __init__(
+        self,
+        blocks: Sequence[LaplaceFit],
+        trials: Sequence[Probe],
+        candidates: Sequence[Candidate],
+        data: Sequence[Scan],
+        each: Each = map,
+    ) -> None:
+        self._blocks, self._each = blocks, each
+        self._ways = ladders(blocks, trials, candidates, data)
+        found = self._strengths(self._ways, [(b.modes.z[:1], None) for b in blocks])
+        self.log_bayes = {c: float(v[0]) for c, v in found.items()}  # of every candidate that has a ladder
+        linear = by_name(candidates, data)
+        self._values = {c.name: float(linear[c.name][0]) for c in found}
+        for c, value in self.log_bayes.items():
+            self._values[c.name] = max(self._values[c.name], value)
+        self._known: dict[tuple[str, int, int], Array] = {}
+
+    def test(self, simulated: Sequence[Replicates], test: GlobalTest) -> GlobalTest:
+        """The linear global test with what the ladders add to the data and to these simulations, a block each.
+
+        Only names that come above the linear scan's own level are tried in the simulations: others do not decide. How
+        often the most surprising of all names is that surprising is known from the linear scan of the same simulations.
+        Simulations are those of an earlier call, and more.
+        """
+        values = self._values
+        lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in values.items()}
+        surprises = dict(test.surprises)
+        for name in sorted((n for n in lead if lead[n] > 0), key=lambda n: -lead[n])[:_TRIED]:
+            surprises[name] = surprise(values[name], self._chance(name, test.chance[name], simulated))
+            if surprises[name] > test.null.max():
+                break
+        return replace(test, surprises=surprises)
+
+    def _chance(self, name: str, linear: Array, simulated: Sequence[Replicates]) -> Array:
+        """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more than it takes."""
+        out = np.empty(0)
+        while len(out) < len(linear) and (out >= self._values[name]).sum() < _ENOUGH:
+            first, last = len(out), min(len(out) + (_ROWS if len(out) else _FIRST_ROWS), len(linear))
+            if (name, first, last) not in self._known:
+                rows = slice(first, last)
+                ways = [way for way in self._ways if way.effect.name == name]
+                climbed = self._strengths(ways, [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated])
+                self._known[name, first, last] = np.max(list(climbed.values()), axis=0)
+            out = np.append(out, np.maximum(linear[first:last], self._known[name, first, last]))
+        return out
+
+    def _strengths(self, ways: Sequence[AmplitudePath], plain: Sequence[tuple[Array, Any]]) -> dict[Candidate, Array]:
+        return strengths(ways, list(self._each(_climbs, ways, repeat(self._blocks), repeat(plain))))
 
 
 def _climbs(way: AmplitudePath, blocks: Sequence[LaplaceFit], plain: Sequence[tuple[Array, Any]]) -> dict[int, Climbed]:
     """A ladder climbed on all its blocks, from plain fits and their readings, a block each."""
     return {b: climb(blocks[b], way, *plain[b]) for b in way.blocks}
-
-
-def _chance(
-    value: float,
-    linear: Array,
-    blocks: Sequence[LaplaceFit],
-    ways: Sequence[AmplitudePath],
-    simulated: Sequence[Replicates],
-    each: Each,
-) -> Array:
-    """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more of them than it takes."""
-    out = np.empty(0)
-    while len(out) < len(linear) and (out >= value).sum() < _ENOUGH:
-        rows = slice(len(out), len(out) + (_ROWS if len(out) else _FIRST_ROWS))
-        part = [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated]
-        climbed = strengths(ways, list(each(_climbs, ways, repeat(blocks), repeat(part))))
-        out = np.append(out, np.max([linear[rows], *climbed.values()], axis=0))
-    return out

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import binom
 
 from wirebayes.discovery import gross_errors, residual_patterns, screening
-from wirebayes.discovery.continuation import outward
+from wirebayes.discovery.continuation import Continuation
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates
 from wirebayes.discovery.settings import ALPHA
@@ -111,6 +111,7 @@ def examine(
         data.append(scan(x))
         patterns.append(listed)
     simulated: list[Replicates] = []
+    larger: Continuation | None = None
     while True:
         report("simulations", len(simulated), len(blocks))
         n = len(simulated[0].z) if simulated else simulations  # as many again each time
@@ -119,14 +120,16 @@ def examine(
         simulated = [screening.joined_replicates(parts) for parts in pairs]
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
-        further: dict[Candidate, float] = {}
-        if test.p > max(PLAIN_TO_SEE, 1.0 / (1 + simulations)):
+        beyond_linear = test.p > max(PLAIN_TO_SEE, 1.0 / (1 + simulations))
+        if beyond_linear:
             report("larger effects", 0, 1)
-            test, further = outward(blocks, trials, candidates, data, simulated, test, each)
+            larger = larger or Continuation(blocks, trials, candidates, data, each)
+            test = larger.test(simulated, test)
             report("larger effects", 1, 1)
         if len(test.null) >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
             break
     report("simulations", len(blocks), len(blocks))
+    further = larger.log_bayes if larger is not None and beyond_linear else {}
     return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test, further)
 
 
