@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.discover import discover as discover
     from wirebayes.workflows.export import export as export
     from wirebayes.workflows.fit import fit as fit
+    from wirebayes.workflows.import_bench import import_bench as import_bench
     from wirebayes.workflows.list_effects import EffectDescription as EffectDescription
     from wirebayes.workflows.list_effects import list_effects as list_effects
     from wirebayes.workflows.load import load as load
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.results import Comparison as Comparison
     from wirebayes.workflows.results import Export as Export
     from wirebayes.workflows.results import Findings as Findings
+    from wirebayes.workflows.results import ImportedTests as ImportedTests
     from wirebayes.workflows.results import Pose as Pose
     from wirebayes.workflows.results import Posterior as Posterior
     from wirebayes.workflows.results import Posteriors as Posteriors
@@ -43,6 +45,7 @@ __version__ = "0.1.0"
 _PLACES = {
     "read_experiments": "wirebayes.io.experiment",
     "from_arrays": "wirebayes.io.arrays",
+    "import_bench": "wirebayes.workflows.import_bench",
     "fit": "wirebayes.workflows.fit",
     "compare": "wirebayes.workflows.compare",
     "discover": "wirebayes.workflows.discover",
@@ -61,6 +64,7 @@ _PLACES = {
     "Posteriors": "wirebayes.workflows.results",
     "Findings": "wirebayes.workflows.results",
     "Comparison": "wirebayes.workflows.results",
+    "ImportedTests": "wirebayes.workflows.results",
     "SimulatedTests": "wirebayes.workflows.results",
     "Robot": "wirebayes.robot.mechanics.description",
     "Pose": "wirebayes.workflows.results",

@@ -32,6 +32,12 @@ COMMANDS = {
         "Reproduce the paper from its own tables, with posteriors.",
         "wirebayes reproduce --output out/reproduce",
     ),
+    "import": Command(
+        "wirebayes.cli.import_bench",
+        "import_bench",
+        "Turn what benches write (CSV, xlsx) into experiment files.",
+        'wirebayes import raw.csv --output wire --length-mm 1200 --map "Kraft [N]=tension"',
+    ),
     "fit": Command(
         "wirebayes.cli.fit",
         "fit",

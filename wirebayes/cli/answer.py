@@ -4,7 +4,16 @@ import json
 from typing import Any
 
 from wirebayes.io.run_folder import plain
-from wirebayes.workflows.results import Calibration, Comparison, Findings, Pose, Posterior, Posteriors, Result
+from wirebayes.workflows.results import (
+    Calibration,
+    Comparison,
+    Findings,
+    ImportedTests,
+    Pose,
+    Posterior,
+    Posteriors,
+    Result,
+)
 from wirebayes.workflows.write_report import write_report
 
 PAGE = "report.html"
@@ -25,10 +34,17 @@ def conclude(result: Result, *, as_json: bool = False, quiet: bool = False) -> N
     folder = result.place.path
     if result.computed or not (folder / PAGE).is_file():
         write_report(folder)
+    print_answer(result, as_json=as_json, quiet=quiet)
+
+
+def print_answer(result: Result, *, as_json: bool = False, quiet: bool = False) -> None:
+    """Print the answer of a command, as `conclude` does; for results without a page of their own, too."""
+    folder = result.place.path
     if as_json:
         print(json.dumps(plain(result.summary()), indent=2, ensure_ascii=False, allow_nan=False))
     elif not quiet:
-        print("\n".join([*answer(result), f"Results: {folder} (open {folder / PAGE})", f"Next: {next_step(result)}"]))
+        look = f" (open {folder / PAGE})" if (folder / PAGE).is_file() else ""
+        print("\n".join([*answer(result), f"Results: {folder}{look}", f"Next: {next_step(result)}"]))
 
 
 def answer(result: Result) -> list[str]:
@@ -46,6 +62,8 @@ def answer(result: Result) -> list[str]:
         return _pose(found)
     if isinstance(result, Calibration):
         return _calibration(found)
+    if isinstance(result, ImportedTests):
+        return [line for name, test in found["experiments"].items() for line in _imported(name, test)]
     return [repr(result)]
 
 
@@ -66,6 +84,10 @@ def next_step(result: Result) -> str:
         return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
     if isinstance(result, Calibration):
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"
+    if isinstance(result, ImportedTests):
+        names = list(result.summary()["experiments"])
+        file = names[0] if len(names) == 1 else "experiments"
+        return f"look at {folder / names[0]}.png, then wirebayes fit {folder / file}.toml"
     return f"read {folder}"
 
 
@@ -101,6 +123,14 @@ def _finding(name: str, report: dict[str, Any]) -> list[str]:
     if report["effects"] and gain["plain"]["rmse_N"] is not None and gain["final"]["rmse_N"] is not None:
         lines.append(f"  held-out holds: rmse {gain['plain']['rmse_N']:.3g} -> {gain['final']['rmse_N']:.3g} N")
     return lines
+
+
+def _imported(name: str, test: dict[str, Any]) -> list[str]:
+    sample = f"{test['length_mm']:g} mm of {test['material']}"
+    return [
+        f"{name}: {test['holds']} holds, {test['readings']} readings, {sample}",
+        *(f"  {note}" for note in test["notes"]),
+    ]
 
 
 def _comparison(name: str, table: dict[str, Any]) -> str:

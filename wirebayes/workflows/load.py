@@ -15,6 +15,7 @@ from wirebayes.workflows.results import (
     Comparison,
     Export,
     Findings,
+    ImportedTests,
     Place,
     Pose,
     Posterior,
@@ -30,6 +31,7 @@ _KINDS: dict[str, type[Result]] = {
     "calibrate": Calibration,
     "export": Export,
     "simulate": SimulatedTests,
+    "import": ImportedTests,
     "reproduce": Reproduction,
 }
 
@@ -46,7 +48,7 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
 
     Returns
     -------
-    Posterior, Posteriors, Findings, Comparison, Pose, Calibration, Export, SimulatedTests or Reproduction
+    Posterior, Posteriors, Findings, Comparison, Pose, Calibration, Export, SimulatedTests, ImportedTests, Reproduction
         What the function of the same name returns.
 
     Raises

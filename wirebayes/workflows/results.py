@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
+IMPORTED = "import.json"
 _FIGURES = 4  # digits that a short form shows
 
 
@@ -526,6 +527,40 @@ class SimulatedTests(Result):
         truth = self.summary()["experiments"]
         rows = [[name, p, _figure(v)] for name, t in truth.items() for p, v in t["parameters"].items()]
         return html_table(repr(self), ["test", "parameter", "true value"], rows)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedTests(Result):
+    """Experiments out of raw files of a bench.
+
+    Examples
+    --------
+    >>> imported.summary()["experiments"]["bench"]["notes"][0]
+    "semicolons between cells, decimal comma; displacement from 'Weg [mm]', time from 'Zeit [s]' and tension from
+    'Kraft [N]'"
+    """
+
+    _content: ClassVar[str] = IMPORTED
+
+    @cached_property
+    def experiments(self) -> list[Experiment]:
+        """The tests as `read_experiments` reads the files that were written."""
+        return [e for name in self.summary()["experiments"] for e in read_experiments(self.folder / f"{name}.toml")]
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What is odd about the readings."""
+        return tuple(
+            f"warning: {said}" for found in self.summary()["experiments"].values() for said in found["warnings"]
+        )
+
+    def _shortly(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [f"{name}: {each['holds']} holds, {each['readings']} readings" for name, each in found.items()]
+
+    def _repr_html_(self) -> str:
+        rows = [[name, note] for name, each in self.summary()["experiments"].items() for note in each["notes"]]
+        return html_table(repr(self), ["experiment", "what was understood"], rows, self.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,87 @@
+"""``wirebayes import``: what benches write, turned into experiment files."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from wirebayes.cli.options import AsJson, Output, Quiet, Seed
+
+if TYPE_CHECKING:
+    from wirebayes.io.bench.undecided import Undecided
+
+
+def import_bench(
+    raw: Annotated[
+        list[Path],
+        typer.Argument(metavar="RAW…", help="Files of a bench: text with columns or xlsx; one experiment each."),
+    ],
+    output: Output,
+    length_mm: Annotated[
+        float, typer.Option("--length-mm", metavar="L", help="Zero-tension length of the sample before the test.")
+    ],
+    material: Annotated[
+        str | None,
+        typer.Option("--material", metavar="M", help="Samples of one material may be fitted together; default: N."),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option("--name", metavar="N", help="With one file only; else each file gives its own name."),
+    ] = None,
+    mapping: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="HEADER=COLUMN",
+            help="COLUMN is hold, displacement, time, tension, temperature or ignore; the unit is read from HEADER, or "
+            "given: 'Kraft=tension [N]' (a minus turns the sign: [-N]). May be repeated.",
+        ),
+    ] = None,
+    decimal: Annotated[
+        Literal["point", "comma"] | None, typer.Option("--decimal", help="The decimal sign, where it is not evident.")
+    ] = None,
+    time_since: Annotated[
+        Literal["hold", "test"] | None,
+        typer.Option("--time-since", help="What times count from, where it is not evident."),
+    ] = None,
+    sheet: Annotated[
+        str | None, typer.Option("--sheet", metavar="NAME", help="Of a workbook with readings in several sheets.")
+    ] = None,
+    zero_mm: Annotated[
+        float | None,
+        typer.Option("--zero-mm", metavar="MM", help="Displacement at which the wire has its zero-tension length."),
+    ] = None,
+    seed: Seed = 0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Turn what benches write into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.png to look at.
+
+    Each file is one experiment, named N after it; several also stand together in DIR/experiments.toml. Delimiter,
+    decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and continuous
+    recordings are cut into holds. What can be read in two ways is asked on a terminal and refused elsewhere.
+    """
+    from wirebayes.cli.answer import print_answer
+    from wirebayes.workflows.import_bench import import_bench as run
+
+    imported = run(
+        raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
+        time_since=time_since, sheet=sheet, zero_mm=zero_mm, output=output,
+        ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
+    )  # fmt: skip
+    for line in imported.messages:
+        print(line, file=sys.stderr)
+    print_answer(imported, as_json=as_json, quiet=quiet)
+
+
+def _ask(question: "Undecided") -> str:
+    """Ask a person on the terminal; the number chosen is the answer's."""
+    options = list(question.answers)
+    typer.echo(f"{question.found}. Please say {question.question}:", err=True)
+    for i, (option, meaning) in enumerate(question.answers.items(), start=1):
+        typer.echo(f"  {i}  {meaning}  ({option})", err=True)
+    while True:
+        number = typer.prompt("Number", type=int, err=True)
+        if 1 <= number <= len(options):
+            return options[number - 1]

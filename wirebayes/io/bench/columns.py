@@ -1,0 +1,261 @@
+"""Which column is which: by the words of several languages, by its unit, or by what the user says."""
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.clock import has_moments
+from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, unit_of
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.undecided import Undecided, listed
+from wirebayes.units import nearest
+
+IGNORE = "ignore"
+_NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
+
+# Words of English, German, French, Spanish, Italian, Portuguese, Dutch, Japanese and Chinese, without accents.
+_WORDS: dict[Role, tuple[str, ...]] = {
+    "hold": (
+        "hold", "step", "stage", "segment", "cycle", "stufe", "schritt", "haltestufe", "palier", "etape", "pas",
+        "escalon", "paso", "passo", "gradino", "stap", "degrau", "段階",
+    ),
+    "displacement": (
+        "displacement", "extension", "elongation", "position", "stroke", "crosshead", "travel", "stretch", "weg",
+        "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
+        "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
+        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp",
+        "変位", "伸び", "位移", "伸长",
+    ),
+    "time": (
+        "time", "elapsed", "seconds", "timestamp", "clock", "zeit", "uhrzeit", "zeitpunkt", "temps", "duree", "heure",
+        "tiempo", "tempo", "hora", "tijd", "時間", "时间",
+    ),
+    "tension": (
+        "tension", "force", "load", "loadcell", "pull", "kraft", "last", "zugkraft", "spannkraft", "effort", "charge",
+        "fuerza", "carga", "forza", "carico", "tensione", "tracao", "forca", "kracht", "trekkracht",
+        "荷重", "張力", "力", "拉力", "载荷", "张力",
+    ),
+    "temperature": (
+        "temperature", "temp", "temperatur", "temperatura", "temperatuur", "raumtemperatur", "温度",
+    ),
+}  # fmt: skip
+_LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit only
+    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t",), "tension": ("f", "t"), "temperature": ("t", "ϑ"),
+}  # fmt: skip
+_COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
+_BRACKET = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
+_TAILS = (r"(.+?)\s*/\s*(\S+)$", r"(.+),\s*(\S+)$", r"(.+?)\s+in\s+(\S+)$", r"(.+)[_\s]+(\S+)$")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column that is read.
+
+    Attributes
+    ----------
+    role : str
+    index : int
+        From 0.
+    header : str
+    unit : Unit or None
+        None for hold numbers and clocks.
+    """
+
+    role: Role
+    index: int
+    header: str
+    unit: Unit | None
+
+
+def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
+    """The columns that are read.
+
+    Parameters
+    ----------
+    table : RawTable
+    mapping : sequence of str
+        What the user says: ``HEADER=COLUMN`` or ``HEADER=COLUMN [UNIT]``; ``HEADER=ignore`` leaves a column out.
+
+    Raises
+    ------
+    InputError
+        A mapping names no column, a needed column is missing or in a unit of another quantity; `Undecided` where two
+        columns could be it, or its unit is not said.
+    """
+    said = _said(table, mapping)
+    taken = {index for index, _, _ in said}
+    roles: dict[Role, Column] = {}
+    for index, role, unit in said:
+        if role == IGNORE:
+            continue
+        known: Role = role  # type: ignore[assignment]
+        if known in roles:
+            found = f"{roles[known].header} and {table.header[index]} both as {known}"
+            raise InputError(f"--map: found {found}, expected one column for it")
+        roles[known] = _column(table, index, known, unit)
+    free = [i for i, name in enumerate(table.header) if name and i not in taken]
+    for role in ROLES:
+        if role not in roles:
+            likely = [i for i in free if _may_be(table, i, role)]
+            if len(likely) > 1:
+                raise _several(table, likely, role)
+            if likely:
+                roles[role] = _column(table, likely[0], role, None)
+    for role in _NEEDED:
+        if role not in roles:
+            raise _missing(table, free, role)
+    return roles
+
+
+def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
+    """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_`` or a space."""
+    bracket = _BRACKET.match(header)
+    if bracket and unit_of(bracket[2], role):
+        return bracket[1], unit_of(bracket[2], role)
+    for pattern in _TAILS:
+        tail = re.match(pattern, header)
+        if tail and unit_of(tail[2], role):
+            return tail[1], unit_of(tail[2], role)
+    return header, None
+
+
+def _said(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]:
+    """Column, role and unit of each thing the user says; of this file's header what it has."""
+    out = []
+    for text in mapping:
+        header, equals, rest = text.rpartition("=")
+        role, _, unit = rest.strip().partition(" ")
+        header, unit = header.strip(), unit.strip("[]() ")
+        names = [*ROLES, IGNORE]
+        if not equals or role not in names or (unit and role in (IGNORE, "hold")):
+            hint = nearest(role, names) if equals else ""
+            expected = f"HEADER=COLUMN or HEADER=COLUMN [UNIT], COLUMN one of {', '.join(names)}"
+            raise InputError(f"--map: found {text!r}{hint}, expected {expected}")
+        index, unit_in_header = _named(table, header, role)
+        out.append((index, role, unit or unit_in_header))
+    return out
+
+
+def _named(table: RawTable, header: str, role: str) -> tuple[int, str]:
+    """The column of a header as the user writes it, perhaps with the unit that the file leaves out."""
+    if header in table.header:
+        return table.header.index(header), ""
+    if role in UNITS:
+        bare, unit = name_and_unit(header, role)
+        if unit and bare in table.header:
+            return table.header.index(bare), unit.text
+    names = [name for name in table.header if name]
+    found = f"no column {header!r}{nearest(header, names)}"
+    raise InputError(f"{table.sheet.path}, line {table.header_line}: found {found}, expected one of {', '.join(names)}")
+
+
+def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Column:
+    header = table.header[index]
+    if role == "hold":
+        return Column(role, index, header, None)
+    moments = role == "time" and has_moments(table, index)
+    _, from_header = name_and_unit(header, role)
+    row_text = table.units[index]
+    from_row = unit_of(row_text, role) if row_text else None
+    if stated:
+        unit = unit_of(stated, role)
+        if unit is None:
+            raise InputError(f"--map: found the unit {stated!r} for {header}, expected one of {role}{_units(role)}")
+        return Column(role, index, header, unit)
+    if row_text not in ("", "-", "–", "1") and from_row is None and not moments:
+        raise table.complain(table.header_line + 1, index, f"the unit {row_text!r}", f"one of {role}{_units(role)}")
+    if from_header and from_row and (from_header.factor, from_header.offset) != (from_row.factor, from_row.offset):
+        found = f"the units {from_header.text} in the header and {from_row.text} under it"
+        raise table.complain(table.header_line, index, found, "one unit")
+    unit = from_row or from_header
+    if unit is None and not moments:
+        bracket = _BRACKET.match(header)
+        if bracket and bracket[2] and not bracket[2].isdigit():
+            raise table.complain(
+                table.header_line, index, f"the unit {bracket[2]!r}", f"one of {role}{_units(role)}; or --map "
+                f'"{header}={role} [{UNITS[role]}]" if that is what it means'
+            )  # fmt: skip
+        raise Undecided(
+            f"{table.sheet.path}, {table.place(table.header_line, index)}: found no unit",
+            f"the unit of {role}",
+            {f"--map {header}={role} [{name}]": name for name in COMMON[role]},
+        )
+    return Column(role, index, header, unit)
+
+
+def _units(role: Role) -> str:
+    return f" ({listed(COMMON[role], 'or')})"
+
+
+def _may_be(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a header's words and unit fit a quantity."""
+    header = table.header[index]
+    row_unit = table.units[index]
+    units: dict[Role, Unit] = {}
+    for other in ROLES:
+        found = (unit_of(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
+        if found:
+            units[other] = found
+    if role == "hold":
+        return not units and _speaks_of(header, role)
+    name = name_and_unit(header, role)[0] if role in units else header
+    if units and role not in units:
+        return False
+    if not units and any(_speaks_of(header, other) for other in ROLES if other != role) and role != "time":
+        return _best(header) == role
+    return _speaks_of(name, role) or (role in units and _plain(name) in _LETTERS.get(role, ()))
+
+
+def _best(header: str) -> Role | None:
+    """Of a header that speaks of several quantities the one named last, as languages put it: step time, load time."""
+    words = re.findall(r"[^\W\d_]+", _plain(header))
+    for word in reversed(words):
+        for role in ROLES:
+            if _is_word(word, role):
+                return role
+    return None
+
+
+def _speaks_of(text: str, role: Role) -> bool:
+    return any(_is_word(word, role) for word in re.findall(r"[^\W\d_]+", _plain(text)))
+
+
+def _is_word(word: str, role: Role) -> bool:
+    known = _WORDS[role]
+    if word in known or (word.endswith("s") and word[:-1] in known):
+        return True
+    if any(word in words for words in _WORDS.values()):
+        return False
+    return any(len(w) >= _COMPOUND and word.endswith(w) for w in known) or any(
+        len(w) > _COMPOUND + 1 and word.startswith(w) for w in known
+    )
+
+
+def _plain(text: str) -> str:
+    """Small letters without accents."""
+    apart = unicodedata.normalize("NFKD", text.casefold().replace("ß", "ss"))
+    joined = "".join(c for c in apart if not unicodedata.combining(c) or c == "\u3099")
+    return unicodedata.normalize("NFC", joined).strip(" .:_#")
+
+
+def _several(table: RawTable, likely: Sequence[int], role: Role) -> InputError:
+    names = [table.header[i] for i in likely]
+    return Undecided(
+        f"{table.sheet.path}, line {table.header_line}: found {listed(names)}, each of which may be the {role}",
+        "which one to read",
+        {f"--map {name}={role}": name for name in names},
+    )
+
+
+def _missing(table: RawTable, free: Sequence[int], role: Role) -> InputError:
+    for index in free:
+        if _best(table.header[index]) == role:
+            _column(table, index, role, None)  # its unit is another quantity's, which is said
+    names = [name for name in table.header if name]
+    unit = UNITS[role]
+    return InputError(
+        f"{table.sheet.path}, line {table.header_line}: found no column of {role} among {', '.join(names)}, expected "
+        f'one; say which with --map "HEADER={role}" (or "HEADER={role} [{unit}]" where the header has no unit)'
+    )

@@ -1,0 +1,359 @@
+"""A raw file of a bench as the experiment that it holds, with everything that was understood on the way."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench import clock, workbook
+from wirebayes.io.bench.columns import Column, understand
+from wirebayes.io.bench.decode import decode, read_raw
+from wirebayes.io.bench.delimited import sheet_of_text
+from wirebayes.io.bench.holds import Cut, Readings, cut
+from wirebayes.io.bench.numerals import decimal_sign, plain_number
+from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.resolution import evident_step
+from wirebayes.io.bench.sheet import Sheet, is_number, is_value
+from wirebayes.io.bench.table import RawTable, find_table
+from wirebayes.io.bench.thinning import MOST, thinned
+from wirebayes.io.bench.undecided import Choices, Decimal, Undecided, listed
+from wirebayes.io.experiment import Experiment, experiment_of
+from wirebayes.io.readings import OPTIONAL, REQUIRED, Table
+from wirebayes.io.toml_keys import Keys
+
+Floats = NDArray[np.float64]
+_COLUMN_ROLES: dict[str, Role] = {
+    "hold": "hold", "displacement_mm": "displacement", "time_s": "time", "tension_N": "tension",
+    "temperature_C": "temperature",
+}  # fmt: skip
+FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
+FAR_STEPS = 2.0  # and this many times the range of the test
+
+
+@dataclass(frozen=True)
+class About:
+    """What a user says of the sample.
+
+    Attributes
+    ----------
+    name, material : str
+    length_mm : float
+    """
+
+    name: str
+    material: str
+    length_mm: float
+
+
+@dataclass(frozen=True)
+class Converted:
+    """An experiment out of a raw file.
+
+    Attributes
+    ----------
+    experiment : Experiment
+    rows : list of list
+        Of the readings' CSV, in the order of `header`.
+    header : tuple of str
+    notes : list of str
+        What was understood and done, in sentences.
+    recording : Recording or None
+        Everything that was recorded, where the file counts time from the beginning of the test.
+    """
+
+    experiment: Experiment
+    rows: list[list[Any]]
+    header: tuple[str, ...]
+    notes: list[str]
+    recording: "Recording | None"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A whole test as it was recorded, moves included.
+
+    Attributes
+    ----------
+    time_s, displacement_mm, tension_N : (r,) array
+        Time since the first reading.
+    start_s : (H,) array
+        When each hold begins.
+    """
+
+    time_s: Floats
+    displacement_mm: Floats
+    tension_N: Floats
+    start_s: Floats
+
+
+def convert(path: Path, about: About, choices: Choices) -> Converted:
+    """Read a raw file.
+
+    Parameters
+    ----------
+    path : Path
+        Text with columns, or an xlsx workbook.
+    about : About
+    choices : Choices
+
+    Raises
+    ------
+    InputError
+        With file, line and column; `Undecided` where the file can be read in several ways.
+    """
+    table = find_table(_sheet(path, choices))
+    columns = understand(table, choices.mapping)
+    table, notes = _complete(table, columns)
+    decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
+    notes = [_read_as(table, columns, decimal), *notes]
+    texts = {role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
+             and not (role == "time" and clock.has_moments(table, column.index))}  # fmt: skip
+    values = {role: _converted(columns[role], text) for role, text in texts.items()}
+    of_day = False
+    if "time" not in values:
+        values["time"], of_day = clock.seconds(table, columns["time"].index, columns["time"].unit)
+    values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
+
+    def complain(row: int, role: str, found: str, expected: str) -> InputError:
+        return table.complain(table.rows[row].line, columns[role].index, found, expected)  # type: ignore[index]
+
+    hold, told = _hold_numbers(table, columns.get("hold"), decimal)
+    step = evident_step(texts["displacement"]) or 0.0
+    unit = columns["displacement"].unit
+    readings = Readings(
+        values["displacement"], values["time"], hold, of_day, step * abs(unit.factor if unit else 1.0),
+        columns["time"].header, complain,
+    )  # fmt: skip
+    holds = cut(readings, choices.time_since)
+    holds, thin = _thin(holds)
+    notes += told + holds.notes + thin + _missing_holds(holds)
+    resolution = _resolution(columns["tension"], texts["tension"])
+    if resolution:
+        notes.append(f"tensions are written in steps of {resolution:g} N: that is their resolution")
+    header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
+    rows: list[list[Any]] = []
+    origin: list[int] = []
+    for of_hold, number, level, times in zip(
+        holds.rows, holds.number, holds.displacement_mm, holds.time_s, strict=True
+    ):
+        for row, time in zip(of_hold, times, strict=True):
+            line = [number, level, _tidy(time), float(values["tension"][row])]
+            rows.append(line if "temperature" not in values else [*line, float(values["temperature"][row])])
+            origin.append(int(row))
+    experiment = _experiment(table, columns, header, rows, origin, about, resolution)
+    recording = None
+    if holds.of_test:
+        since = values["time"] - values["time"][0]
+        starts = np.array([since[of_hold[0]] for of_hold in holds.rows])
+        recording = Recording(since, values["displacement"], values["tension"], starts)
+    return Converted(experiment, rows, header, notes, recording)
+
+
+def _sheet(path: Path, choices: Choices) -> Sheet:
+    raw = read_raw(path)
+    if raw.startswith(workbook.SIGNATURE):
+        return workbook.sheet_of_workbook(path, raw, choices.sheet)
+    if raw.startswith(workbook.OLD_EXCEL):
+        raise InputError(f"{path}: found a workbook of Excel 2003 or older, expected xlsx or text; save it as xlsx")
+    if choices.sheet is not None:
+        raise InputError(f"{path}: found a text file, expected a workbook for --sheet {choices.sheet}")
+    return sheet_of_text(path, decode(path, raw))
+
+
+def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, list[str]]:
+    """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
+    notes, rows = [], list(table.rows)
+    indices = [column.index for column in columns.values()]
+    measured = [columns[role].index for role in ("time", "tension")]
+    while rows and not any(is_value(rows[-1].cell(i)) for i in indices):
+        rows.pop()  # what stands under the readings
+    below = len(table.rows) - len(rows)
+    rows = [row for row in rows if any(row.cell(i) for i in indices)]
+    if below:
+        notes.append(f"{below} line{'s' * (below != 1)} under the readings left out")
+    filled = []
+    last = dict.fromkeys(indices, "")
+    for row in rows:
+        cells = list(row.cells) + [""] * (len(table.header) - len(row.cells))
+        for role in ("hold", "displacement"):
+            if role in columns and not cells[columns[role].index]:
+                cells[columns[role].index] = last[columns[role].index]
+        last = {index: cells[index] for index in indices}
+        filled.append(replace(row, cells=tuple(cells)))
+    gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
+    if gaps:
+        notes.append(f"{gaps} empty cells of hold or displacement filled with the value above them")
+    kept = [row for i, row in enumerate(filled) if not i or row.cells != filled[i - 1].cells]
+    if len(kept) < len(filled):
+        notes.append(f"rows that repeat the row above left out: {len(filled) - len(kept)}")
+    for row in kept:
+        for index in indices:
+            if not row.cells[index]:
+                missing = "a number" if index in measured else "a value here or in a line above"
+                raise table.complain(row.line, index, "an empty cell", missing)
+    return replace(table, rows=tuple(kept)), notes
+
+
+def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> str:
+    parts = []
+    for role, column in columns.items():
+        unit = f" in {column.unit.text}" if column.unit and column.unit.text != UNITS.get(role) else ""
+        how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
+        how += " (its weight)" if column.unit and column.unit.is_mass else ""
+        parts.append(f"{role} from {column.header!r}{unit}{how}")
+    comma = ", decimal comma" if decimal == "comma" else ""
+    return f"{table.sheet.described}{comma}; {listed(parts)}"
+
+
+def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
+    out = []
+    for row in table.rows:
+        number = plain_number(row.cell(column.index), decimal)
+        if number is None:
+            sign = "comma" if decimal == "comma" else "point"
+            expected = f"a number (decimal {sign}, as elsewhere in the file)"
+            raise table.complain(row.line, column.index, repr(row.cell(column.index)), expected)
+        out.append(number)
+    return out
+
+
+def _converted(column: Column, texts: list[str]) -> Floats:
+    assert column.unit is not None
+    return column.unit.convert(np.array([float(text) for text in texts]))
+
+
+def _from_zero(table: RawTable, column: Column, x: Floats, about: About, zero_mm: float | None) -> Floats:
+    """Displacements counted from the zero-tension length, refused where they are a machine's position."""
+    if zero_mm is not None:
+        return np.array([float(f"{value:.12g}") for value in x - zero_mm])
+    nearest = float(np.abs(x).min())
+    if nearest > FAR * about.length_mm and nearest > FAR_STEPS * float(np.ptp(x)):
+        found = f"displacements from {x.min():g} to {x.max():g} mm of a wire of {about.length_mm:g} mm"
+        answers = {f"--zero-mm {x[0]:g}": "counted from the first reading", "--zero-mm 0": "as they stand"}
+        place = f"{table.sheet.path}, {table.place(table.rows[0].line, column.index)}"
+        raise Undecided(f"{place}: found {found}", "where the wire begins to pull", answers)
+    return x
+
+
+def _hold_numbers(
+    table: RawTable, column: Column | None, decimal: Decimal
+) -> tuple[NDArray[np.int64] | None, list[str]]:
+    if column is None:
+        return None, []
+    cells = table.column(column.index)
+    plain = [plain_number(cell, decimal) for cell in cells]
+    if all(number is not None and float(number).is_integer() and float(number) >= 0 for number in plain):
+        return np.array([int(float(number or 0)) for number in plain], dtype=np.int64), []
+    odd = next((row for row in table.rows if is_number(row.cell(column.index))), None)
+    if odd is not None:
+        raise table.complain(odd.line, column.index, repr(odd.cell(column.index)), "a whole number for each hold")
+    names = list(dict.fromkeys(cells))
+    number_of = {name: i + 1 for i, name in enumerate(names)}
+    numbers = np.array([number_of[cell] for cell in cells], dtype=np.int64)
+    return numbers, [f"holds numbered in order, {names[0]} to {names[-1]}"]
+
+
+def _thin(holds: Cut) -> tuple[Cut, list[str]]:
+    kept = [thinned(times) for times in holds.time_s]
+    before, after = sum(map(len, holds.rows)), sum(map(len, kept))
+    if before == after:
+        return holds, []
+    rows = [of_hold[k] for of_hold, k in zip(holds.rows, kept, strict=True)]
+    times = [of_hold[k] for of_hold, k in zip(holds.time_s, kept, strict=True)]
+    note = (
+        f"{after} of {before} readings kept: those of holds with more than {MOST} thinned to times spaced evenly in "
+        "their logarithm"
+    )
+    return replace(holds, rows=rows, time_s=times), [note]
+
+
+def _missing_holds(holds: Cut) -> list[str]:
+    missing = sorted(set(range(min(holds.number), max(holds.number))) - set(holds.number))
+    if not missing or len(missing) > len(holds.number):
+        return []
+    one = len(missing) == 1
+    return [
+        f"hold{'s' * (not one)} {listed([str(n) for n in missing])} {'has' if one else 'have'} no readings: if "
+        f"{'it was' if one else 'they were'} held, say how long with unrecorded_holds in the TOML file"
+    ]
+
+
+def _resolution(column: Column, texts: list[str]) -> float | None:
+    step = evident_step(texts)
+    if step is None or column.unit is None:
+        return None
+    return float(f"{step * abs(column.unit.factor):.12g}")
+
+
+def _tidy(time: float) -> float:
+    """A difference of times without the binary's last digits."""
+    return round(float(time), 9) + 0.0
+
+
+def _experiment(
+    table: RawTable, columns: dict[Role, Column], header: tuple[str, ...], rows: list[list[Any]], origin: list[int],
+    about: About, resolution: float | None,
+) -> Experiment:  # fmt: skip
+    """The experiment checked as the reader of files checks its own, blaming the raw file's lines."""
+    keys = {"name": about.name, "material": about.material, "length_mm": about.length_mm}
+    extra = {"resolution_N": resolution} if resolution else {}
+
+    def readings() -> Table:
+        texts = [[str(value) if isinstance(value, int) else repr(value) for value in row] for row in rows]
+        return _RawReadings(table.sheet.path, list(header), texts, table, columns, origin)
+
+    return experiment_of(_Options(table.sheet.path, "", None, keys | extra), readings)
+
+
+@dataclass(frozen=True)
+class _RawReadings(Table):
+    """Readings whose complaints name the line and column of the raw file."""
+
+    raw: RawTable
+    columns: dict[Role, Column]
+    origin: list[int]
+
+    def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
+        tension = self.columns["tension"]
+        turn = f'change the sign with --map "{tension.header}=tension [-{tension.unit.text if tension.unit else "N"}]"'
+        return super().complain(row, column, found, expected.replace("change the sign of tension_N", turn))
+
+    def place(self, row: int, column: str) -> str:
+        role = _COLUMN_ROLES[column]
+        known = self.columns.get(role) or self.columns["displacement"]
+        return self.raw.place(self.raw.rows[self.origin[row]].line, known.index)
+
+
+class _Options(Keys):
+    """Options of a command in place of the keys of a file."""
+
+    def complain(self, key: str, found: str, expected: str) -> InputError:
+        if key == "readings":
+            return InputError(f"{self.source}: found {found.partition(' in ')[0]}, expected {expected}")
+        return InputError(f"--{key.replace('_', '-')}: found {found}, expected {expected}")
+
+
+def toml_of(experiment: Experiment, comments: Sequence[str] = ()) -> str:
+    """The experiment file of a test whose readings stand in ``NAME.csv`` beside it."""
+    lines = [f"# {comment}" for comment in comments]
+    lines += ["[[experiment]]", f"name = {_string(experiment.name)}", f"material = {_string(experiment.material)}"]
+    lines.append(f"length_mm = {experiment.length_mm!r}")
+    if experiment.resolution_N:
+        lines.append(f"resolution_N = {experiment.resolution_N!r}")
+    lines.append(f"readings = {_string(experiment.name + '.csv')}")
+    return "\n".join(lines) + "\n"
+
+
+def _string(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def default_name(path: Path) -> str:
+    """The name of an experiment from the name of its file: what a folder may be called."""
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in path.stem).strip("-.")
+    return kept or "experiment"

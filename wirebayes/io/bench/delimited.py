@@ -1,0 +1,69 @@
+"""Text as cells: which sign stands between them is seen from the lines, quotes are taken off."""
+
+import csv
+import re
+from pathlib import Path
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.sheet import Row, Sheet, is_value
+
+_NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
+_LOOKED_AT = 2000  # lines: enough to see a habit
+_COMMENT = re.compile(r"\s*[\"']?(#|%|//)+\s*")
+_SEPARATOR = re.compile(r"\ufeff?\"?sep=(.)\"?\s*", re.IGNORECASE)  # the first line that Excel writes and obeys
+
+
+def sheet_of_text(path: Path, text: str) -> Sheet:
+    """Split text into cells.
+
+    Raises
+    ------
+    InputError
+        No sign splits the lines into columns of numbers.
+    """
+    lines = text.splitlines()
+    stated = _SEPARATOR.fullmatch(lines[0])
+    if stated:
+        lines[0] = ""
+    sample = [line for line in lines if line.strip() and not _COMMENT.match(line)][:_LOOKED_AT]
+    candidates = [stated[1]] if stated else list(_NAMES)
+    scores = {sign: _score(sample, sign) for sign in candidates}
+    best = max(scores, key=lambda sign: scores[sign])
+    if not stated and scores[best][0] <= 0.0:
+        line = next(i for i, content in enumerate(lines, start=1) if content.strip())
+        expected = "cells between commas, semicolons, tabs or spaces"
+        raise InputError(f"{path}, line {line}: found no columns of numbers, expected {expected}")
+    return Sheet(path, _rows(lines, best), described=f"{_NAMES.get(best, best)} between cells")
+
+
+def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
+    """How well a sign splits lines: share of the cells that are values, headers of as many cells, cells."""
+    split = [_cells(line, sign) for line in lines]
+    measured = [cells for cells in split if len(cells) > 1 and 2 * sum(map(is_value, cells)) >= len(cells)]
+    if not measured:
+        return 0.0, 0, 0
+    values = sum(is_value(cell) for cells in measured for cell in cells)
+    filled = sum(bool(cell) for cells in measured for cell in cells)
+    width = sorted(map(len, measured))[len(measured) // 2]
+    headed = any(len(cells) == width and not any(map(is_value, cells)) for cells in split)
+    every = len(measured) / len(lines)
+    return round(every * values / max(filled, 1), 3), int(headed), width
+
+
+def _cells(line: str, sign: str) -> list[str]:
+    if sign == " ":
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
+
+
+def _rows(lines: list[str], sign: str) -> tuple[Row, ...]:
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        sign_of_comment = _COMMENT.match(line)
+        content = line[sign_of_comment.end() :] if sign_of_comment else line
+        cells = _cells(content, sign)
+        while cells and not cells[-1]:
+            cells.pop()
+        if cells:
+            rows.append(Row(number, tuple(cells), bool(sign_of_comment)))
+    return tuple(rows)

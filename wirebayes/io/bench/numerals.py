@@ -1,0 +1,81 @@
+"""Which sign is the decimal one, seen from all numbers of a file; then numbers are plain.
+
+A comma followed by three digits may be either; so may a point where semicolons separate. Any other number in the file
+that can be read in one way only decides for all of them.
+"""
+
+import re
+from collections.abc import Sequence
+
+from wirebayes.io.bench.sheet import is_number
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.undecided import Decimal, Undecided
+
+_GROUPED = r"[+\-\u2212]?[1-9]\d{{0,2}}({sign}\d{{3}})+"
+_EITHER = r"[+\-\u2212]?[1-9]\d{{0,2}}{sign}\d{{3}}"
+_OTHER_GROUPS = re.compile(r"(?<=\d)['\u2019 \u00a0\u2009\u202f](?=\d{3})")
+_SIGNS: dict[Decimal, str] = {"point": ".", "comma": ","}
+
+
+def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None = None) -> Decimal:
+    """The decimal sign of a table.
+
+    Parameters
+    ----------
+    table : RawTable
+    columns : sequence of int
+        Those of which numbers are read.
+    stated : {"point", "comma"}, optional
+        What the user says.
+
+    Raises
+    ------
+    Undecided
+        Every number with a comma could be thousands or a fraction.
+    """
+    if stated is not None:
+        return stated
+    cells = [(row.line, column, row.cell(column)) for row in table.rows for column in columns]
+    signed = [(line, column, cell) for line, column, cell in cells if is_number(cell) and ("," in cell or "." in cell)]
+    if any(_proves(cell, "comma") for _, _, cell in signed):
+        return "comma"
+    if any(_proves(cell, "point") for _, _, cell in signed):
+        return "point"
+    # what is left could be grouped thousands: trusted only for a point that no habit of commas makes doubtful
+    semicolons = "semicolon" in table.sheet.described
+    doubtful = next((found for found in signed if "," in found[2] or semicolons), None)
+    if doubtful is None or table.sheet.lettered and "," not in doubtful[2]:
+        return "point"
+    line, column, cell = doubtful
+    sign: Decimal = "comma" if "," in cell else "point"
+    other: Decimal = "point" if sign == "comma" else "comma"
+    whole, fraction = plain_number(cell, other), plain_number(cell, sign)
+    raise Undecided(
+        f"{table.sheet.path}, {table.place(line, column)}: found {cell!r}, which is {fraction} or {whole}",
+        "which",
+        {f"--decimal {sign}": f"{cell} is {fraction}", f"--decimal {other}": f"{cell} is {whole}"},
+    )
+
+
+def _proves(cell: str, decimal: Decimal) -> bool:
+    """Whether a number can be read with this decimal sign only."""
+    sign, other = _SIGNS[decimal], _SIGNS["point" if decimal == "comma" else "comma"]
+    if sign in cell and other in cell:
+        return cell.rindex(sign) > cell.rindex(other)
+    if cell.count(other) > 1:  # 1.234.567
+        return True
+    return cell.count(sign) == 1 and not re.fullmatch(_EITHER.format(sign=re.escape(sign)), cell)
+
+
+def plain_number(cell: str, decimal: Decimal) -> str | None:
+    """A number as Python spells it, or None where a cell is none with this decimal sign."""
+    if not is_number(cell):
+        return None
+    text = _OTHER_GROUPS.sub("", cell.replace("\u2212", "-"))
+    sign, other = _SIGNS[decimal], _SIGNS["point" if decimal == "comma" else "comma"]
+    if other in text:
+        whole, _, fraction = text.partition(sign)
+        if other in fraction or not re.fullmatch(_GROUPED.format(sign=re.escape(other)), whole):
+            return None
+        text = whole.replace(other, "") + (sign + fraction if fraction else "")
+    return None if text.count(sign) > 1 else text.replace(sign, ".")

@@ -1,0 +1,139 @@
+"""A continuous recording cut into holds: where the displacement stays, between moves.
+
+The displacement is split where its mean changes most, again and again (binary segmentation), until no split explains
+more than noise would. Neighbours at one level are joined; pieces that are short or lean are moves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+PENALTY = 4.0  # times the log of the readings: noise alone is then split less often than once in a hundred recordings
+SAME_LEVEL = 2.0  # noise levels between neighbours that are one hold
+LEAN = 3.0  # noise levels of drift along a hold; moves lean by more between any two splits
+EDGE = 5  # readings averaged at either end of a hold, to see a move that noise hides
+ARRIVED = 2.5  # standard errors of that mean from the level of the hold: nearer is at rest
+LONG = 10  # times the edge: a hold of more readings can spare one at its end, where the next move may have begun
+RANGE_SHARE = 0.0025  # of the whole range: no bench that is read holds better, and settling is no step
+SHORTEST_SHARE = 0.05  # of the usual hold: shorter ones are pauses of a move
+FEWEST = 3  # readings of a hold
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """A stretch of a recording at one displacement.
+
+    Attributes
+    ----------
+    begin, end : int
+        First reading, and the one after the last.
+    level : float
+    """
+
+    begin: int
+    end: int
+    level: float
+
+
+def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
+    """Where the displacement stays.
+
+    Parameters
+    ----------
+    x : (r,) array
+        Displacement.
+    time : (r,) array
+        Rising.
+    step : float
+        To which displacements are written; 0 where it is not known.
+
+    Returns
+    -------
+    list of Plateau
+        In order; empty where the displacement never stays.
+    """
+    noise, scatter = noise_of(x, step), scatter_of(x, step)
+    if noise == 0.0:
+        return []
+    pieces = _joined(_split(x / noise), x, noise)
+    # seen over readings, most are of long holds: moves have few
+    length = np.array([time[end - 1] - time[begin] for begin, end in pieces])
+    usual = float(np.median(np.repeat(length, [end - begin for begin, end in pieces])))
+    found = []
+    for (begin, end), lasts in zip(pieces, length, strict=True):
+        near = np.flatnonzero(np.abs(x[begin:end] - np.median(x[begin:end])) <= SAME_LEVEL * noise)
+        if len(near) < FEWEST or _drift(x[begin + near[0] : begin + near[-1] + 1]) > LEAN * noise:
+            continue
+        begin, end = _trimmed(x, begin, end, scatter)
+        if end - begin >= FEWEST and lasts >= SHORTEST_SHARE * usual:
+            found.append(Plateau(begin, end, float(np.median(x[begin:end]))))
+    return found
+
+
+def scatter_of(x: Floats, step: float) -> float:
+    """Standard deviation of a displacement that mostly stays: from its changes, at least that of its rounding."""
+    changes = np.abs(np.diff(x))
+    return max(float(np.median(changes)) / (0.6745 * np.sqrt(2.0)) if len(changes) else 0.0, step / np.sqrt(12.0))
+
+
+def noise_of(x: Floats, step: float) -> float:
+    """What a displacement may change by and still count as the same: its scatter, or a share of its range."""
+    return max(scatter_of(x, step), RANGE_SHARE * float(np.ptp(x)))
+
+
+def _split(x: Floats) -> list[int]:
+    """Where means change, in noise levels: boundaries, the first 0 and the last the number of readings."""
+    n = len(x)
+    total = np.concatenate([[0.0], np.cumsum(x - x.mean())])
+    worth = PENALTY * np.log(n)
+    bounds, todo = {0, n}, [(0, n)]
+    while todo:
+        begin, end = todo.pop()
+        if end - begin < 2:
+            continue
+        left = np.arange(1, end - begin)
+        away = total[begin + 1 : end] - total[begin] - left * (total[end] - total[begin]) / (end - begin)
+        gain = away**2 * (end - begin) / (left * (end - begin - left))
+        best = int(gain.argmax())
+        if gain[best] > worth:
+            middle = begin + 1 + best
+            bounds.add(middle)
+            todo += [(begin, middle), (middle, end)]
+    return sorted(bounds)
+
+
+def _joined(bounds: list[int], x: Floats, noise: float) -> list[tuple[int, int]]:
+    """Pieces between the bounds, neighbours at one level joined, the nearest first."""
+    pieces = list(zip(bounds[:-1], bounds[1:], strict=True))
+    levels = [float(np.median(x[begin:end])) for begin, end in pieces]
+    while len(pieces) > 1:
+        apart = np.abs(np.diff(levels))
+        i = int(apart.argmin())
+        if apart[i] > SAME_LEVEL * noise:
+            break
+        pieces[i : i + 2] = [(pieces[i][0], pieces[i + 1][1])]
+        levels[i : i + 2] = [float(np.median(x[slice(*pieces[i])]))]
+    return pieces
+
+
+def _trimmed(x: Floats, begin: int, end: int, scatter: float) -> tuple[int, int]:
+    """A piece without the ends of the moves beside it: from the first few readings at its level to the last few."""
+    edge = min(EDGE, end - begin)
+    off = x[begin:end] - np.median(x[begin:end])
+    settled = SAME_LEVEL * RANGE_SHARE * float(np.ptp(x))
+    level = np.abs(np.convolve(off, np.full(edge, 1.0 / edge), "valid")) <= settled + ARRIVED * scatter / np.sqrt(edge)
+    alone = np.abs(off) <= settled + ARRIVED * scatter  # where there is little noise, the mean is not as sharp
+    first, last = np.flatnonzero(level & alone[: len(level)]), np.flatnonzero(level & alone[edge - 1 :])
+    if not len(first) or not len(last):
+        return begin, begin
+    begin, end = begin + int(first[0]), begin + int(last[-1]) + edge
+    return begin, end - EDGE if end - begin > LONG * EDGE else end
+
+
+def _drift(x: Floats) -> float:
+    """By how much a straight line through it rises or falls."""
+    place = np.arange(len(x)) - 0.5 * (len(x) - 1)
+    return float(abs(place @ x) / (place @ place) * (len(x) - 1))

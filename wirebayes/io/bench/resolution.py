@@ -1,0 +1,42 @@
+"""The step to which tensions were rounded, where the readings show it beyond doubt.
+
+A likelihood adds the variance of rounding, step²/12, so a step that is too large widens every interval: only what all
+readings agree on counts. Too small a step does no harm.
+"""
+
+import math
+from collections.abc import Sequence
+from decimal import Decimal
+
+FEWEST = 10  # different readings: that all are multiples of ten times the step by chance is then one in 10^10
+FEWEST_COARSE = 20  # for steps such as 0.02 or 0.05, of which chance leaves one in 2^20
+MOST_DIGITS = 9  # of a reading: more are a computed number's, not a display's
+COARSEST = 0.1  # of the range of the readings: a coarser grid may be the test's own doing
+
+
+def evident_step(numbers: Sequence[str]) -> float | None:
+    """The step of numbers as they were written.
+
+    Parameters
+    ----------
+    numbers : sequence of str
+        Plain decimal numbers.
+
+    Returns
+    -------
+    float or None
+        In their unit; None where it is not evident.
+    """
+    values = {Decimal(text).normalize() for text in numbers}
+    if len(values) < FEWEST or any(len(value.as_tuple().digits) > MOST_DIGITS for value in values):
+        return None
+    places = max(-int(value.as_tuple().exponent) for value in values)
+    unit = Decimal(1).scaleb(-places)
+    whole = [int(value / unit) for value in values]
+    coarse = math.gcd(*(number - whole[0] for number in whole), whole[0]) if len(values) >= FEWEST_COARSE else 1
+    step = float(unit * max(coarse, 1))
+    if step > COARSEST * float(max(values) - min(values)):
+        return None
+    # a number of ten has a last digit of zero: fewer mean that the last place is not the display's
+    last = sum(number % 10 != 0 for number in whole) / len(whole)
+    return step if coarse > 1 or last >= 0.5 else None

@@ -1,0 +1,106 @@
+"""The readings of a sheet: where the header stands, whether a row of units follows, where the numbers begin and end."""
+
+from dataclasses import dataclass
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.quantities import ROLES, unit_of
+from wirebayes.io.bench.sheet import Row, Sheet, is_value
+
+_ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
+_SHOWN = 5  # rows that show how many columns there are
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """Header and readings as they stand in a file.
+
+    Attributes
+    ----------
+    sheet : Sheet
+    header : tuple of str
+    units : tuple of str
+        Of the row of units under the header; empty texts where there is none.
+    rows : tuple of Row
+    """
+
+    sheet: Sheet
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[Row, ...]
+    header_line: int
+
+    def place(self, line: int, column: int) -> str:
+        """Where a cell stands."""
+        return f"line {line}, column {self.sheet.column_name(column)} ({self.header[column]})"
+
+    def complain(self, line: int, column: int, found: str, expected: str) -> InputError:
+        """The error of a cell."""
+        return InputError(f"{self.sheet.path}, {self.place(line, column)}: found {found}, expected {expected}")
+
+    def column(self, column: int) -> list[str]:
+        """The cells of a column."""
+        return [row.cell(column) for row in self.rows]
+
+
+def find_table(sheet: Sheet) -> RawTable:
+    """Find header, units and readings.
+
+    Raises
+    ------
+    InputError
+        There are no rows of numbers, no header above them, or two columns have one header.
+    """
+    rows = sheet.rows
+    first = _first(rows)
+    if first is None:
+        line = rows[0].line if rows else 1
+        raise InputError(f"{sheet.path}, line {line}: found no rows of numbers, expected a header and readings")
+    above = list(rows[:first])
+    units: tuple[str, ...] = ()
+    if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
+        units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
+    head = above[-1] if above else None
+    if head is None or len(head.filled) < 2 or sum(map(is_value, head.filled)) > len(head.filled) // 2:
+        raise InputError(
+            f"{sheet.path}, line {rows[first].line}: found numbers without a header above them, expected a line of "
+            "names and units such as displacement [mm], time [s], force [N]"
+        )
+    width = max(len(head.cells), *(len(row.cells) for row in rows[first : first + _SHOWN]))
+    header = tuple(head.cell(column) for column in range(width))
+    for column, name in enumerate(header):
+        if name and name in header[:column]:
+            where = f"line {head.line}, column {sheet.column_name(column)}"
+            raise InputError(f"{sheet.path}, {where}: found {name} a second time, expected it once")
+    padded = tuple(units[column] if column < len(units) else "" for column in range(width))
+    body = tuple(row for row in rows[first:] if not row.comment)
+    named = len(head.cells)
+    for row in body:
+        if len(row.cells) > width or any(map(is_value, row.cells[named:])):
+            raise InputError(
+                f"{sheet.path}, line {row.line}, column {sheet.column_name(named)}: found {len(row.cells)} cells, "
+                f"expected {named} as in the header of line {head.line}"
+                + (" (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else "")
+            )
+    return RawTable(sheet, header, padded, body, head.line)
+
+
+def _first(rows: tuple[Row, ...]) -> int | None:
+    """The first row of readings: one that is followed by rows like it."""
+    measured = [not row.comment and _is_measured(row) for row in rows]
+    for i, yes in enumerate(measured):
+        following = [flag for flag, row in zip(measured[i:], rows[i:], strict=True) if not row.comment]
+        if yes and all(following[:_ALIKE]):
+            return i
+    return None
+
+
+def _is_measured(row: Row) -> bool:
+    values = sum(map(is_value, row.filled))
+    return values >= 2 and 2 * values >= len(row.filled)
+
+
+def _are_units(row: Row) -> bool:
+    """Whether most cells are units, in brackets or not, or stand for none."""
+    cells = [cell.strip("[]() ") for cell in row.filled]
+    named = [cell for cell in cells if cell not in ("", "-", "–", "1", "#")]
+    return 2 * sum(any(unit_of(cell, role) for role in ROLES) for cell in named) > len(named)

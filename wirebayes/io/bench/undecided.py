@@ -1,0 +1,73 @@
+"""Two readings are possible, and nothing in the file says which: a person may choose, a program is refused."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from wirebayes.errors import InputError
+
+Decimal = Literal["point", "comma"]
+TimeSince = Literal["hold", "test"]
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a user says of raw files, beyond what stands in them.
+
+    Attributes
+    ----------
+    mapping : tuple of str
+        ``HEADER=COLUMN`` or ``HEADER=COLUMN [UNIT]``.
+    decimal : {"point", "comma"} or None
+        The decimal sign.
+    time_since : {"hold", "test"} or None
+        What times count from.
+    sheet : str or None
+        Of a workbook.
+    zero_mm : float
+        Reading of the displacement where the wire has its zero-tension length.
+    """
+
+    mapping: tuple[str, ...] = ()
+    decimal: Decimal | None = None
+    time_since: TimeSince | None = None
+    sheet: str | None = None
+    zero_mm: float | None = None
+
+    def with_option(self, option: str) -> "Choices":
+        """These choices and one more, as the command line spells it: ``--decimal comma``."""
+        name, _, value = option.removeprefix("--").partition(" ")
+        if name == "map":
+            return replace(self, mapping=(*self.mapping, value))
+        changed = {name.replace("-", "_"): float(value) if name == "zero-mm" else value}
+        return replace(self, **changed)  # type: ignore[arg-type]
+
+
+class Undecided(InputError):
+    """Several readings are possible.
+
+    Parameters
+    ----------
+    found : str
+        Where and what.
+    question : str
+        What is to be decided, in the words of a person who asks.
+    answers : mapping of str to str
+        What each answer means, by the option that says so.
+    """
+
+    def __init__(self, found: str, question: str, answers: Mapping[str, str]) -> None:
+        options = listed([quoted(option) for option in answers], "or")
+        super().__init__(f"{found}; expected {options} to say {question}")
+        self.found, self.question, self.answers = found, question, dict(answers)
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """Words as a sentence lists them."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def quoted(option: str) -> str:
+    """An option as a shell takes it."""
+    name, _, value = option.partition(" ")
+    return f'{name} "{value}"' if name == "--map" else option

@@ -1,0 +1,82 @@
+"""Workbooks (xlsx) as cells: numbers as Excel shows them to fifteen digits, times and dates as text."""
+
+import io
+import warnings
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+from typing import Any
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.sheet import Row, Sheet, is_value
+from wirebayes.io.bench.undecided import Undecided
+from wirebayes.units import nearest
+
+SIGNATURE = b"PK\x03\x04"
+OLD_EXCEL = b"\xd0\xcf\x11\xe0"
+
+
+def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Sheet:
+    """The cells of the sheet that holds readings, or of the one named.
+
+    Raises
+    ------
+    InputError
+        It is no workbook, there is no such sheet, or no readings; `Undecided` where several sheets hold some.
+    """
+    import openpyxl
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles and extensions that do not concern cells
+            book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
+            rows = {sheet.title: _rows(sheet) for sheet in book.worksheets}
+    except Exception as error:  # whatever a damaged archive raises
+        found = f"no workbook that can be opened ({type(error).__name__})"
+        raise InputError(f"{path}: found {found}, expected xlsx or text; save it as CSV") from error
+    if chosen is not None:
+        if chosen not in rows:
+            names = ", ".join(rows)
+            raise InputError(f"{path}: found no sheet {chosen!r}{nearest(chosen, list(rows))}, expected one of {names}")
+        return Sheet(path, rows[chosen], lettered=True, described=f"sheet {chosen}")
+    full = [name for name, found in rows.items() if sum(_measured(row) for row in found) > 1]
+    if not full:
+        raise InputError(f"{path}: found no sheet with columns of numbers, expected a header and readings")
+    if len(full) > 1:
+        answers = {f"--sheet {name}": f"the readings of sheet {name}" for name in full}
+        raise Undecided(f"{path}: found readings in {len(full)} sheets", "which one to read", answers)
+    return Sheet(path, rows[full[0]], lettered=True, described=f"sheet {full[0]}")
+
+
+def _measured(row: Row) -> bool:
+    return sum(map(is_value, row.filled)) >= 2
+
+
+def _rows(sheet: Any) -> tuple[Row, ...]:
+    out = []
+    for line, cells in enumerate(sheet.iter_rows(), start=1):
+        texts = [_text(cell) for cell in cells]
+        while texts and not texts[-1]:
+            texts.pop()
+        if texts:
+            comment = texts[0].startswith("#") and not texts[0].startswith("#N")  # "#N/A" is Excel's, not a person's
+            out.append(Row(line, (texts[0].lstrip("# "), *texts[1:]) if comment else tuple(texts), comment))
+    return tuple(out)
+
+
+def _text(cell: Any) -> str:
+    value = cell.value
+    if value is None or isinstance(value, bool):
+        return "" if value is None else str(value)
+    if isinstance(value, int | float):
+        return f"{value:.15g}"  # what Excel keeps; more are the binary's
+    if isinstance(value, time) and "s" not in str(cell.number_format):
+        return f"{value.hour}:{value.minute:02d}"  # typed without seconds: hours and minutes, or what?
+    if isinstance(value, timedelta):
+        hours, rest = divmod(value.total_seconds(), 3600.0)
+        minutes, seconds = divmod(rest, 60.0)
+        return f"{hours:.0f}:{minutes:02.0f}:{seconds:09.6f}"
+    if isinstance(value, datetime):
+        return value.isoformat(sep=" ")
+    if isinstance(value, date | time):
+        return value.isoformat()
+    return " ".join(str(value).split())  # headers are broken into lines now and then

@@ -1,0 +1,78 @@
+"""Pictures of what was understood: the displacement and the tension of a test over its time, hold by hold."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from wirebayes.io.bench.convert import Recording
+from wirebayes.io.experiment import Experiment
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
+
+Array = NDArray[Any]
+_MOST_NUMBERS = 40  # holds that can all be numbered in a picture
+_MINUTES = 600.0  # s from which on an axis in minutes reads better
+
+
+def understood(
+    experiment: Experiment, target: Path, recording: Recording | None = None, expected_N: Array | None = None
+) -> None:
+    """Draw one test.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    target : Path
+        The picture to write.
+    recording : Recording, optional
+        Everything that was recorded, of which the experiment keeps a part.
+    expected_N : (H, R) array, optional
+        Tension of a model fitted to the readings.
+    """
+    figure = Figure(figsize=(9.0, 5.4), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.0))
+    starts = [hold.start_s for hold in experiment.holds] if recording is None else recording.start_s.tolist()
+    last = max(start + hold.duration_s for start, hold in zip(starts, experiment.holds, strict=True))
+    scale, unit = (60.0, "min") if last > _MINUTES else (1.0, "s")
+    if recording is not None:
+        for axes, values in ((upper, recording.displacement_mm), (lower, recording.tension_N)):
+            axes.plot(recording.time_s / scale, values, color=QUIET, lw=1.0, zorder=1, label="recorded")
+    labels = {"held": "held", "gap": "held, not recorded", "kept": "reading", "model": "plain model, best fit"}
+    row = 0
+    every = int(np.ceil(len(experiment.recorded_holds) / _MOST_NUMBERS))
+    for i, (hold, start) in enumerate(zip(experiment.holds, starts, strict=True)):
+        ends = np.array([start, start + hold.duration_s]) / scale
+        style = {"color": HOLD, "lw": 2.2} if hold.recorded else {"color": INK, "lw": 1.6, "ls": ":"}
+        key = "held" if hold.recorded else "gap"
+        upper.plot(ends, [hold.displacement_mm] * 2, zorder=3, label=labels.pop(key, None), **style)
+        if not hold.recorded:
+            lower.axvspan(*ends, color=QUIET, alpha=0.3, lw=0)
+            continue
+        if row % 2:
+            for axes in (upper, lower):
+                axes.axvspan(*ends, color=QUIET, alpha=0.16, lw=0, zorder=0)
+        if row % every == 0:
+            upper.annotate(str(hold.number), (float(ends.mean()), 1.02), xycoords=("data", "axes fraction"),
+                           ha="center", va="bottom", fontsize=7.5, color=INK)  # fmt: skip
+        time = (start + hold.time_s) / scale
+        lower.plot(time, hold.tension_N, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))
+        if expected_N is not None:
+            lower.plot(time, expected_N[i, : len(time)], color=HOLD, lw=1.2, zorder=2, label=labels.pop("model", None))
+        row += 1
+    upper.set_ylabel("displacement, mm")
+    lower.set_ylabel("tension, N")
+    lower.set_xlabel(f"time of the test, {unit}" + ("" if recording is not None else " (moves take none)"))
+    upper.set_title(f"{experiment.name}: {experiment.length_mm:g} mm of {experiment.material}; hold numbers above",
+                    fontsize=10.5, loc="left", color=INK, pad=16)  # fmt: skip
+    for axes in (upper, lower):
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=9)
+        axes.margins(x=0.01)
+    shown = dict(
+        reversed(pair) for axes in (upper, lower) for pair in zip(*axes.get_legend_handles_labels(), strict=True)
+    )
+    place: Any = "outside lower center"
+    figure.legend(shown.values(), shown.keys(), loc=place, ncols=len(shown), frameon=False, fontsize=8.5)
+    figure.savefig(target, dpi=130)
