@@ -19,6 +19,7 @@ Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expec
 
 CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
+MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
 STEADY = 0.25  # of the smallest step: less scatter in a hold is the encoder's
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
 
@@ -104,9 +105,10 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
                 raise _wandering(readings, groups)
         return _in_groups(readings, groups, time_since or "hold")
     groups = _groups(change)
-    usual = float(np.median(np.repeat([len(g) for g in groups], [len(g) for g in groups])))
-    by_hand = 2 * len(groups) <= len(x) and usual < CONTINUOUS
-    if by_hand:
+    sizes = np.array([len(rows) for rows in groups])
+    usual = float(np.median(np.repeat(sizes, sizes)))
+    no_moves = sizes.min() > MOVE_SHARE * usual
+    if 2 * len(groups) <= len(x) and (usual < CONTINUOUS or no_moves):
         return _in_groups(readings, groups, time_since)
     return _by_plateaus(readings, "")
 

@@ -13,7 +13,8 @@ Floats = NDArray[np.float64]
 
 PENALTY = 4.0  # times the log of the readings: noise alone is then split less often than once in a hundred recordings
 SAME_LEVEL = 2.0  # noise levels between neighbours that are one hold
-LEAN = 3.0  # noise levels of drift along a hold; moves lean by more between any two splits
+LEAN = 3.0  # noise levels of drift along a hold; a piece of a move leans by more
+STAIRS = 0.5  # of the way to the pieces beside it: pieces of a slow move lean by all of it
 EDGE = 5  # readings averaged at either end of a hold, to see a move that noise hides
 ARRIVED = 2.5  # standard errors of that mean from the level of the hold: nearer is at rest
 LONG = 10  # times the edge: a hold of more readings can spare one at its end, where the next move may have begun
@@ -63,9 +64,11 @@ def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
     length = np.array([time[end - 1] - time[begin] for begin, end in pieces])
     usual = float(np.median(np.repeat(length, [end - begin for begin, end in pieces])))
     found = []
-    for (begin, end), lasts in zip(pieces, length, strict=True):
-        near = np.flatnonzero(np.abs(x[begin:end] - np.median(x[begin:end])) <= SAME_LEVEL * noise)
-        if len(near) < FEWEST or _drift(x[begin + near[0] : begin + near[-1] + 1]) > LEAN * noise:
+    level = np.array([np.median(x[begin:end]) for begin, end in pieces])
+    gaps = np.pad(np.abs(np.diff(level)), 1, mode="edge") if len(pieces) > 1 else np.zeros(2)
+    beside = 0.5 * (gaps[:-1] + gaps[1:])
+    for (begin, end), lasts, apart in zip(pieces, length, beside, strict=True):
+        if end - begin < FEWEST or _drift(x[begin:end]) > min(LEAN * noise, STAIRS * apart):
             continue
         begin, end = _trimmed(x, begin, end, scatter)
         if end - begin >= FEWEST and lasts >= SHORTEST_SHARE * usual:

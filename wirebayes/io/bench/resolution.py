@@ -37,6 +37,6 @@ def evident_step(numbers: Sequence[str]) -> float | None:
     step = float(unit * max(coarse, 1))
     if step > COARSEST * float(max(values) - min(values)):
         return None
-    # a number of ten has a last digit of zero: fewer mean that the last place is not the display's
+    # one number in ten ends in a zero, half of those in steps of 5: more mean that the last place is not the display's
     last = sum(number % 10 != 0 for number in whole) / len(whole)
-    return step if coarse > 1 or last >= 0.5 else None
+    return step if last >= 0.5 else None

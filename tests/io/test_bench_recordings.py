@@ -1,0 +1,110 @@
+"""Continuous recordings: holds are found whatever the noise, the speed of the moves and the rate."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.plateaus import plateaus
+from wirebayes.io.bench.thinning import KEPT, MOST, thinned
+from wirebayes.io.bench.undecided import Choices
+
+
+class Pull(NamedTuple):
+    """A recording: rates in Hz, mm, s."""
+
+    rate: float = 10.0
+    holds: int = 10
+    step: float = 1.0
+    lasts: float = 60.0
+    speed: float = 1.0
+    noise: float = 0.01
+    unload: int = 0
+    quantum: float = 0.0
+    settle: float = 0.0
+
+
+def record(pull, rng):
+    """Displacements, times, and (first, end, level) of each hold."""
+    up = list(np.arange(1, pull.holds + 1) * pull.step)
+    levels = up + up[-2 : -2 - pull.unload : -1] if pull.unload else up
+    x, truth, here = [0.0], [], 0.0
+    for level in levels:
+        rows = max(1, round(abs(level - here) / pull.speed * pull.rate))
+        x += list(np.linspace(here, level, rows + 1)[1:])
+        begin, n = len(x) - 1, round(pull.lasts * pull.rate)
+        x += list(level + pull.settle * np.exp(-np.arange(n) / pull.rate / 5.0))
+        truth.append((begin, len(x), level))
+        here = level
+    measured = np.array(x) + rng.normal(0.0, pull.noise, len(x))
+    if pull.quantum:
+        measured = np.round(measured / pull.quantum) * pull.quantum
+    return measured, np.arange(len(x)) / pull.rate, truth
+
+
+@pytest.mark.parametrize(
+    "pull",
+    [
+        Pull(),
+        Pull(noise=0.0, quantum=0.001),
+        Pull(noise=0.006, quantum=0.01),
+        Pull(noise=0.1),
+        Pull(speed=0.1, noise=0.02),
+        Pull(speed=1e6),
+        Pull(unload=8),
+        Pull(rate=100.0, lasts=30.0),
+        Pull(rate=1.0),
+        Pull(rate=1.0, lasts=20.0, speed=0.2, noise=0.02),
+        Pull(holds=50, step=0.2, lasts=20.0),
+        Pull(noise=0.0005, settle=-0.04),
+        Pull(holds=4, step=0.05, noise=0.01),
+    ],
+    ids=str,
+)
+def test_holds_are_found_where_they_are(pull):
+    for seed in range(3):
+        x, time, truth = record(pull, np.random.default_rng(seed))
+        found = plateaus(x, time, pull.quantum)
+        assert len(found) == len(truth)
+        for hold, (begin, end, level) in zip(found, truth, strict=True):
+            passed = max(2.0 / pull.rate, 9.0 * pull.noise / pull.speed)  # a move hides in the noise so long
+            assert abs(hold.begin - begin) / pull.rate <= passed
+            assert -6.0 / pull.rate <= (hold.end - end) / pull.rate <= passed
+            assert hold.level == pytest.approx(level, abs=max(0.3 * pull.noise, 0.01 * pull.step, pull.quantum))
+
+
+def test_a_pull_without_holds_has_none():
+    rng = np.random.default_rng(0)
+    x = np.linspace(0.0, 10.0, 3000) + rng.normal(0.0, 0.01, 3000)
+    found = plateaus(x, np.arange(3000) / 10.0, 0.0)
+    assert sum(hold.end - hold.begin for hold in found) < 1500
+
+
+def test_a_recording_becomes_holds_of_thinned_readings(tmp_path):
+    rng = np.random.default_rng(1)
+    x, time, truth = record(Pull(unload=4), rng)
+    tension = np.round(2.0 * x + rng.normal(0.0, 0.01, len(x)), 3)
+    rows = [f"{t + 100:.1f}\t{a:.4f}\t{f:.3f}\n" for t, a, f in zip(time, x, tension, strict=True)]
+    path = tmp_path / "raw.txt"
+    path.write_text("Time (s)\tExtension (mm)\tLoad (N)\n" + "".join(rows))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    holds = made.experiment.holds
+    assert [hold.displacement_mm for hold in holds] == pytest.approx([level for *_, level in truth], abs=0.005)
+    assert all(hold.time_s[0] == 0.0 and 58.0 < hold.duration_s < 60.5 for hold in holds)
+    assert all(15 < hold.time_s.size <= KEPT for hold in holds)
+    assert any(f"{len(made.rows)} of" in note for note in made.notes)
+    assert made.experiment.resolution_N == 0.001
+    assert made.recording is not None
+    assert made.recording.start_s == pytest.approx([begin / 10.0 for begin, *_ in truth], abs=0.2)
+    recorded = {f for _, f in zip(time, tension, strict=True)}
+    assert all(value in recorded for row in made.rows for value in row[3:])  # readings are kept, not averaged
+
+
+@pytest.mark.parametrize("count", [1, 2, MOST, MOST + 1, 100, 5000])
+def test_thinned_readings_are_early_and_few(count):
+    kept = thinned(np.arange(count) * 0.1)
+    assert kept[0] == 0
+    assert kept[-1] == count - 1
+    assert (np.diff(kept) > 0).all()
+    assert len(kept) == count if count <= MOST else len(kept) <= KEPT

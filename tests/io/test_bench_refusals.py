@@ -1,0 +1,217 @@
+"""Where a raw file can be read in two ways, or not at all, nothing is guessed: what is said, and what settles it."""
+
+import datetime
+
+import openpyxl
+import pytest
+
+import wirebayes as wb
+from wirebayes.cli import main
+from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.undecided import Choices, Undecided
+
+ABOUT = About("wire", "line", 1000.0)
+HEADER = "Weg [mm],Zeit [s],Kraft [N]\n"
+BODY = "1,0,2.1\n1,30,2.05\n1,60,2.01\n2,0,4.1\n2,30,4.05\n2,60,4.01\n"
+THREE_DECIMALS = "1;0;1,234\n1;30;1,205\n1;60;1,111\n2;0;2,345\n2;30;2,222\n2;60;2,111\n"
+CLOCK = "Weg [mm],Zeit,Kraft [N]\n" + "".join(
+    f"{h},{h - 1}:{t:02d},{h}.{9 - t // 10}\n" for h in range(1, 5) for t in (0, 20, 50)
+)
+PUSH = HEADER + "".join(f"{h},{t},{-2 * h + t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
+TWO_HOLDS = "hold," + HEADER + "1,1,0,2\n1,1,30,1.9\n2,2,60,4\n2,2,90,3.9\n2,2,120,3.8\n"
+POSITION = HEADER + "".join(f"{520 + h},{t},{2 * h - t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
+
+
+def read(folder, text, **choices):
+    path = folder / "raw.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return convert(path, ABOUT, Choices(**choices))
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "answers"),
+    [
+        (HEADER.replace(" [N]", "") + BODY, r"line 1, column 3 \(Kraft\): found no unit", "--map Kraft=tension [kgf]"),
+        (HEADER.replace(" [s]", "") + BODY, r"line 1, column 2 \(Zeit\): found no unit", "--map Zeit=time [min]"),
+        (
+            HEADER.replace("\n", ",Kraft 2 [N]\n") + BODY.replace("\n", ",1\n"),
+            r"line 1: found Kraft \[N\] and Kraft 2 \[N\], each of which may be the tension",
+            "--map Kraft 2 [N]=tension",
+        ),
+        (
+            HEADER.replace(",", ";") + THREE_DECIMALS,
+            r"line 2, column 3 \(Kraft \[N\]\): found '1,234', which is 1.234 or 1234",
+            "--decimal comma",
+        ),
+        (
+            HEADER.replace(",", ";") + THREE_DECIMALS.replace(",", "."),
+            r"line 2, column 3 \(Kraft \[N\]\): found '1.234', which is 1.234 or 1234",
+            "--decimal point",
+        ),
+        (CLOCK, r"line 2, column 2 \(Zeit\): found '0:00', which is minutes and seconds or", "--map Zeit=time [mm:ss]"),
+        (
+            TWO_HOLDS,
+            r"line 4, column 3 \(Zeit \[s\]\): found 60 s at the first reading of the second",
+            "--time-since test",
+        ),
+        (POSITION, r"line 2, column 1 \(Weg \[mm\]\): found displacements from 521 to 525 mm", "--zero-mm 521"),
+    ],
+    ids=["force unit", "time unit", "two forces", "comma", "point", "clock", "times run on", "machine position"],
+)
+def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, said, answers):
+    with pytest.raises(Undecided, match=f"raw.csv, {said}.*; expected --") as refused:
+        read(tmp_path, text)
+    assert answers in refused.value.answers
+    before = len(refused.value.answers)
+    assert before > 1
+    for answer in refused.value.answers:
+        path = tmp_path / "raw.csv"
+        assert convert(path, ABOUT, Choices().with_option(answer)).rows
+
+
+def test_each_answer_means_what_it_says(tmp_path):
+    rows = read(tmp_path, HEADER.replace(",", ";") + THREE_DECIMALS, decimal="comma").rows
+    assert rows[0] == [1, 1.0, 0.0, 1.234]
+    rows = read(tmp_path, HEADER.replace(",", ";") + THREE_DECIMALS, decimal="point").rows
+    assert rows[0] == [1, 1.0, 0.0, 1234.0]
+    assert read(tmp_path, CLOCK, mapping=("Zeit=time [mm:ss]",)).rows[1][2] == 20.0
+    assert read(tmp_path, CLOCK, mapping=("Zeit=time [hh:mm]",)).rows[1][2] == 1200.0
+    assert [row[2] for row in read(tmp_path, TWO_HOLDS, time_since="test").rows] == [0.0, 30.0, 0.0, 30.0, 60.0]
+    assert [row[2] for row in read(tmp_path, TWO_HOLDS, time_since="hold").rows] == [0.0, 30.0, 60.0, 90.0, 120.0]
+    assert read(tmp_path, POSITION, zero_mm=520.0).rows[0][1] == 1.0
+    bare = HEADER.replace(" [N]", "") + BODY
+    for mapping, factor in (("Kraft=tension [kN]", 1000.0), ("Kraft [kN]=tension", 1000.0), ("Kraft=tension [N]", 1.0)):
+        assert read(tmp_path, bare, mapping=(mapping,)).rows[0][3] == 2.1 * factor
+    assert read(tmp_path, PUSH, mapping=("Kraft [N]=tension [-N]",)).rows[0][3] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (b"", "line 1: found an empty file"),
+        (BODY, "line 1: found numbers without a header"),
+        ("a,b,c\nd,e,f\n", "line 1: found no columns of numbers"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\1", "line 1: found binary data"),
+        (b"PK\x03\x04 no archive", "found no workbook that can be opened"),
+        (HEADER.replace("Kraft", "Weg").replace("[N]", "[mm]") + BODY, "found Weg .mm. a second time"),
+        (HEADER + BODY.replace("2.05", "n/a"), r"line 3, column 3 \(Kraft .N.\): found 'n/a', expected a number"),
+        (HEADER + BODY.replace("2.05", ""), r"line 3, column 3 \(Kraft .N.\): found an empty cell"),
+        (HEADER + BODY.replace("2.05", "2,05"), "line 3, column 4: found 4 cells, expected 3 .*comma as decimal sign"),
+        (HEADER + BODY.replace("1,30,", "1,0,"), r"line 3, column 2 \(Zeit .s.\): found 0 s after 0 s in one hold"),
+        (HEADER.replace("[N]", "[V]") + BODY, r"line 1, column 3 \(Kraft .V.\): found the unit 'V', expected one of ten"),
+        (HEADER.replace("Zeit [s]", "Kanal 7") + BODY, "line 1: found no column of time among Weg"),
+        (PUSH, r"line 14, column 3 .*expected a pull .*with --map \"Kraft \[N\]=tension \[-N\]\""),
+        (HEADER + "1,0,2\n1,30,1.9\n2,0,4\n2,30,3.9\n", "raw.csv: found 2 holds with 4 readings, expected at least 2"),
+        (
+            "x [mm],t [s],F [N]\n" + "".join(f"{i / 100},{i / 10},{i / 50}\n" for i in range(400)),
+            r"line \d+, column 1 \(x .mm.\): found a displacement that stays in \d+ % of the readings",
+        ),
+        ("hold," + HEADER + "1,1,0,2\n1,1,9,2\n1,7,20,2\n2,2,0,4\n2,2,9,3\n", r"line 4, column 2 .*7 mm in a hold"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, said):
+    with pytest.raises(wb.InputError, match=said):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "said"),
+    [
+        ("Kraft [N]=tenson", r"--map: found 'Kraft \[N\]=tenson' \(did you mean tension\?\)"),
+        ("Kraft [N]", "expected HEADER=COLUMN"),
+        ("Kraftt [N]=tension", r"found no column 'Kraftt \[N\]' \(did you mean Kraft \[N\]\?\)"),
+        ("Kraft [N]=tension [mm]", "--map: found the unit 'mm' for Kraft"),
+        ("Weg [mm]=tension [N]", "found no column of displacement among"),
+    ],
+)
+def test_a_wrong_mapping_is_refused(tmp_path, mapping, said):
+    with pytest.raises(wb.InputError, match=said):
+        read(tmp_path, HEADER + BODY, mapping=(mapping,))
+
+
+def workbook(path, rows, *more):
+    book = openpyxl.Workbook()
+    for sheet, content in zip([book.active, *(book.create_sheet() for _ in more)], [rows, *more], strict=True):
+        for row in content:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+def test_workbooks_with_times_line_breaks_and_several_sheets(tmp_path):
+    times = [datetime.time(0, 0, 0), datetime.time(0, 0, 30), datetime.time(0, 1, 0)]
+    rows = [
+        ["Weg\n[mm]", "Zeit", "Kraft\n[N]"],
+        *([h, t, 2.0 * h - 0.1 * i] for h in (1, 2) for i, t in enumerate(times)),
+    ]
+    path = workbook(tmp_path / "a.xlsx", rows, [["notes"]])
+    assert [row[2] for row in convert(path, ABOUT, Choices()).rows] == [0.0, 30.0, 60.0] * 2
+    path = workbook(tmp_path / "b.xlsx", rows, rows)
+    with pytest.raises(Undecided, match="found readings in 2 sheets") as refused:
+        convert(path, ABOUT, Choices())
+    assert list(refused.value.answers) == ["--sheet Sheet", "--sheet Sheet1"]
+    assert convert(path, ABOUT, Choices(sheet="Sheet1")).rows
+    rows[2][2] = "#DIV/0!"
+    path = workbook(tmp_path / "c.xlsx", rows)
+    with pytest.raises(wb.InputError, match=r"line 3, column C \(Kraft \[N\]\): found '#DIV/0!', expected a number"):
+        convert(path, ABOUT, Choices())
+
+
+def test_moments_of_a_day_pass_midnight(tmp_path):
+    rows = ["23:59:00;1;2", "23:59:30;1;1,9", "00:00:10;2;4", "00:00:40;2;3,9", "00:01:10,5;2;3,8"]
+    found = read(tmp_path, "Uhrzeit;Weg [mm];Kraft [N]\n" + "\n".join(rows)).rows
+    assert [row[2] for row in found] == [0.0, 30.0, 0.0, 30.0, 60.5]
+
+
+def test_what_is_harmless_is_done_and_said(tmp_path):
+    text = "Stufe,Weg [mm],Zeit [s],Kraft [N]\n1,1,0,2.1\n,,30,2\n,,30,2\n,,60,1.9\n4,2,0,4\n,,30,3.9\nend of test\n"
+    found = read(tmp_path, text)
+    assert len(found.rows) == 5
+    said = " ".join(found.notes)
+    for note in ("filled with the value above", "repeat the row above left out: 1", "1 line under the readings",
+                 "holds 2 and 3 have no readings"):  # fmt: skip
+        assert note in said
+    assert found.recording is None
+
+
+def test_resolution_is_written_only_where_it_is_evident(tmp_path):
+    def resolution(values, unit="N"):
+        rows = [f"{1 + i // 5},{i % 5},{value}" for i, value in enumerate(values)]
+        return read(tmp_path, HEADER.replace("[N]", f"[{unit}]") + "\n".join(rows)).experiment.resolution_N
+
+    steady = [f"{2 + 0.37 * i:.2f}" for i in range(30)]
+    assert resolution(steady) == 0.01
+    assert resolution(steady, "kgf") == pytest.approx(0.0980665)
+    assert resolution([f"{2 + 0.06 * ((7 * i) % 40):.2f}" for i in range(30)]) == 0.02
+    assert resolution(steady[:8]) == 0.0  # too few to tell
+    assert resolution([*steady[:20], "4.5678", *steady[20:]]) == 0.0  # one of more digits
+    assert resolution([f"{2 + i / 7:.15f}" for i in range(30)]) == 0.0  # computed, not displayed
+
+
+def test_the_command_refuses_in_one_line_and_leaves_nothing(tmp_path, capsys):
+    raw = tmp_path / "raw.csv"
+    raw.write_text(HEADER.replace(" [N]", "") + BODY)
+    arguments = ["import", str(raw), "--output", str(tmp_path / "out"), "--length-mm", "1000"]
+    assert main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1
+    assert '--map "Kraft=tension [N]"' in shown.err
+    assert not (tmp_path / "out").exists()
+    assert main([*arguments, "--map", "Kraft [N]=tension"]) == 0
+    assert "2 holds, 6 readings" in capsys.readouterr().out
+    assert len(wb.read_experiments(tmp_path / "out" / "raw.toml")) == 1
+
+
+def test_a_person_is_asked_and_the_answer_holds(tmp_path):
+    raw = tmp_path / "raw.csv"
+    raw.write_text(HEADER.replace(" [N]", "").replace(" [s]", "") + BODY)
+    questions = []
+
+    def ask(question):
+        questions.append(question.question)
+        return list(question.answers)[0]
+
+    imported = wb.import_bench(raw, length_mm=1000, ask=ask)
+    assert questions == ["the unit of time", "the unit of tension"]
+    assert imported.experiments[0].tension()[0, 0] == 2.1
