@@ -91,7 +91,9 @@ def test_findings_and_their_posteriors_are_saved_and_loaded_again(shared, tmp_pa
     assert wb.predict(findings, protocol, model="plain").equals(wb.predict(findings.plain["wire"], protocol))
 
 
-@pytest.mark.parametrize("name", ["posterior", "findings", "comparison", "stiffening", "held", "lengths", "exported"])
+@pytest.mark.parametrize(
+    "name", ["posterior", "findings", "many", "comparison", "stiffening", "held", "lengths", "exported"]
+)
 def test_a_result_shows_itself_in_a_line_and_in_a_table(name, shared):
     value = shared[1][name]
     assert repr(value).startswith(f"{type(value).__name__}(")

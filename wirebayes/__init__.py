@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from wirebayes.io.experiment import Experiment as Experiment
     from wirebayes.io.experiment import read_experiments as read_experiments
     from wirebayes.robot.mechanics.description import Robot as Robot
+    from wirebayes.workflows.batch import batch as batch
     from wirebayes.workflows.calibrate import calibrate as calibrate
     from wirebayes.workflows.compare import compare as compare
     from wirebayes.workflows.discover import discover as discover
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.pose import pose as pose
     from wirebayes.workflows.predict import predict as predict
     from wirebayes.workflows.reproduce_paper import reproduce_paper as reproduce_paper
+    from wirebayes.workflows.results import Batch as Batch
     from wirebayes.workflows.results import Calibration as Calibration
     from wirebayes.workflows.results import Comparison as Comparison
     from wirebayes.workflows.results import Export as Export
@@ -49,6 +51,7 @@ _PLACES = {
     "fit": "wirebayes.workflows.fit",
     "compare": "wirebayes.workflows.compare",
     "discover": "wirebayes.workflows.discover",
+    "batch": "wirebayes.workflows.batch",
     "predict": "wirebayes.workflows.predict",
     "simulate_tests": "wirebayes.workflows.simulate_tests",
     "load": "wirebayes.workflows.load",
@@ -62,6 +65,7 @@ _PLACES = {
     "Experiment": "wirebayes.io.experiment",
     "Posterior": "wirebayes.workflows.results",
     "Posteriors": "wirebayes.workflows.results",
+    "Batch": "wirebayes.workflows.results",
     "Findings": "wirebayes.workflows.results",
     "Comparison": "wirebayes.workflows.results",
     "ImportedTests": "wirebayes.workflows.results",

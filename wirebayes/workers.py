@@ -4,11 +4,18 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from itertools import islice
+from typing import TYPE_CHECKING, Any
 
+from wirebayes import __version__
+from wirebayes.errors import InputError
 from wirebayes.interrupt import held_back, watch_silently
 
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
 Each = Callable[..., Iterable[Any]]  # as the built-in `map`
+_PATIENCE_S = 10.0  # for a scheduler and its first worker to answer: a cluster's network takes a second at most
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -58,6 +65,13 @@ def workers(most: int | None = None, prepare: Callable[[], object] | None = None
     if most is not None and most < 2:
         yield map
         return
+    with processes(most, prepare) as pool:
+        yield pool.map
+
+
+@contextmanager
+def processes(most: int | None = None, prepare: Callable[[], object] | None = None) -> Iterator["Executor"]:
+    """Processes of this machine, as many as there are cores and no more than `most`; `prepare` as for `workers`."""
     # every command imports this module, few start processes
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
@@ -65,14 +79,14 @@ def workers(most: int | None = None, prepare: Callable[[], object] | None = None
     one_thread_each()
     # Python's tracker of semaphores removes those of a process that is gone; that it had to is nobody's business.
     os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"]))
-    n = cores() if most is None else min(cores(), most)
+    n = cores() if most is None else max(1, min(cores(), most))
     before = active_children()
     pool = ProcessPoolExecutor(n, get_context("spawn"), _prepare, (prepare,))
     try:
         with held_back():
             for _ in range(n):
                 pool.submit(cores)  # processes start now, not when they are needed
-        yield pool.map
+        yield pool
     except BaseException:  # do not wait for work that nobody wants any more
         for process in active_children():
             if process not in before:
@@ -80,6 +94,90 @@ def workers(most: int | None = None, prepare: Callable[[], object] | None = None
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
+
+
+@contextmanager
+def executor(
+    scheduler: str | None = None, most: int | None = None, prepare: Callable[[], object] | None = None
+) -> Iterator["Executor"]:
+    """Where work is done: the workers of a Dask cluster, or processes of this machine.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``. Work whose worker is lost is done again elsewhere.
+    most, prepare
+        As for `workers`, on this machine.
+
+    Raises
+    ------
+    InputError
+        No scheduler answers at that address, it has no workers, or Dask is not installed.
+    """
+    if scheduler is None:
+        with processes(most, prepare) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        said = "found no dask.distributed, expected it installed: pip install 'wirebayes[cluster]'"
+        raise InputError(f"--scheduler: {said}") from None
+    try:
+        client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        said = f"found no Dask scheduler there ({type(error).__name__}), expected an address such as tcp://HOST:8786"
+        raise InputError(f"--scheduler {scheduler}: {said}") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE_S)
+        except TimeoutError:
+            raise InputError(f"--scheduler {scheduler}: found no workers there, expected one or more") from None
+        try:
+            versions = client.run(_version)
+        except Exception as error:  # whatever keeps a worker from importing this package
+            said = f"found workers that cannot import wirebayes ({error}), expected version {__version__} on each"
+            raise InputError(f"--scheduler {scheduler}: {said}") from None
+        for worker, version in versions.items():
+            if version != __version__:
+                said = f"found wirebayes {version} on {worker}, expected {__version__}, as here"
+                raise InputError(f"--scheduler {scheduler}: {said}")
+        yield client.get_executor(pure=False)
+
+
+def as_finished(
+    pool: "Executor", function: Callable[[Any], Any], work: Iterable[tuple[Any, Any]], at_once: int = 1000
+) -> Iterator[tuple[Any, "Future[Any]"]]:
+    """Each piece of work's key with its finished future, in the order in which they end.
+
+    Parameters
+    ----------
+    pool : Executor
+    function : function of one piece of work
+    work : iterable of (key, piece)
+    at_once : int
+        Most pieces handed over and not finished: more would only fill the memory of whoever keeps the list.
+    """
+    from queue import SimpleQueue
+
+    finished: SimpleQueue[Future[Any]] = SimpleQueue()
+    pieces, running = iter(work), dict[Any, Any]()
+
+    def hand_over(count: int) -> None:
+        for key, piece in islice(pieces, count):
+            future = pool.submit(function, piece)
+            running[future] = key
+            future.add_done_callback(finished.put)
+
+    hand_over(at_once)
+    while running:
+        future = finished.get()
+        yield running.pop(future), future
+        hand_over(1)
+
+
+def _version() -> str:
+    return __version__
 
 
 def _prepare(prepare: Callable[[], object] | None) -> None:

@@ -56,6 +56,12 @@ COMMANDS = {
         "Find which physical effect the model is missing.",
         "wirebayes discover data/paper/experiments.toml --output out/discover",
     ),
+    "batch": Command(
+        "wirebayes.cli.batch",
+        "batch",
+        "Fit and discover many experiments, each on its own, in one table.",
+        "wirebayes batch lot-1.toml lot-2.toml --output out/batch",
+    ),
     "predict": Command(
         "wirebayes.cli.predict",
         "predict",

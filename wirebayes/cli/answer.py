@@ -1,10 +1,12 @@
 """What a command says at its end: the answer in a few lines, where the results lie, and what to do next."""
 
 import json
+from collections import Counter
 from typing import Any
 
 from wirebayes.io.run_folder import plain
 from wirebayes.workflows.results import (
+    Batch,
     Calibration,
     Comparison,
     Findings,
@@ -56,6 +58,8 @@ def answer(result: Result) -> list[str]:
         return _posterior(found)
     if isinstance(result, Findings):
         return [line for name, report in found["experiments"].items() for line in _finding(name, report)]
+    if isinstance(result, Batch):
+        return _batch(found)
     if isinstance(result, Comparison):
         return [_comparison(name, table) for name, table in found["experiments"].items()]
     if isinstance(result, Pose):
@@ -78,6 +82,9 @@ def next_step(result: Result) -> str:
         return f"wirebayes predict {folder} PROTOCOL.csv --output FILE.csv, or wirebayes pose ROBOT.toml --wires DIR"
     if isinstance(result, Findings):
         return " ".join(f"{name}: {r['next_measurement']}" for name, r in result.report["experiments"].items())
+    if isinstance(result, Batch):
+        predicted = f"wirebayes predict {folder} PROTOCOL.csv --experiment NAME --output FILE.csv"
+        return f"read {folder / 'summary.csv'}; {predicted}"
     if isinstance(result, Comparison):
         return "wirebayes fit FILE.toml with the options of the best model, or wirebayes discover FILE.toml"
     if isinstance(result, Pose):
@@ -131,6 +138,21 @@ def _imported(name: str, test: dict[str, Any]) -> list[str]:
         f"{name}: {test['holds']} holds, {test['readings']} readings, {sample}",
         *(f"  {note}" for note in test["notes"]),
     ]
+
+
+def _batch(found: dict[str, Any]) -> list[str]:
+    rows, far = found["experiments"], found["outliers"]
+    failed = sum(row["error"] is not None for row in rows)
+    converged = sum(bool(row["converged"]) for row in rows)
+    lines = [f"{len(rows)} experiments: {converged} converged, {failed} failed"]
+    verdicts = Counter(row["verdict"] for row in rows if row["verdict"])
+    if verdicts:
+        lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
+    lines += [f"  apart: {outlier['sentence']}" for outlier in far[:_MOST_LINES]]
+    return lines + ([f"  and {len(far) - _MOST_LINES} more outliers"] if len(far) > _MOST_LINES else [])
+
+
+_MOST_LINES = 10  # of outliers, on a terminal
 
 
 def _comparison(name: str, table: dict[str, Any]) -> str:

@@ -1,9 +1,6 @@
 """``wirebayes discover``: what the plain model is missing, added to it where it has a name."""
 
 import sys
-from typing import Annotated
-
-import typer
 
 from wirebayes.cli.options import (
     AsJson,
@@ -16,6 +13,7 @@ from wirebayes.cli.options import (
     Quiet,
     Seed,
     TrainHolds,
+    Without,
 )
 
 
@@ -27,10 +25,7 @@ def discover(
     train_holds: TrainHolds = None,
     elastic_law: ElasticLawOption = "hooke",
     history: HistoryOption = "saturating",
-    without: Annotated[
-        list[str] | None,
-        typer.Option("--without", metavar="EFFECT", help="Leave an effect out of the catalogue; may be repeated."),
-    ] = None,
+    without: Without = None,
     own_effects: OwnEffects = None,
     as_json: AsJson = False,
     quiet: Quiet = False,

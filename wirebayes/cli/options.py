@@ -41,3 +41,11 @@ OwnEffects = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON instead of a few lines.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing on standard output.")]
+Without = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="EFFECT", help="Leave an effect out of the catalogue; may be repeated."),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler."),
+]

@@ -7,6 +7,7 @@ simulated at the fit and refitted, so the readings are not used twice, and for o
 
 import json
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -143,18 +144,26 @@ def check_model(
     return ModelCheck(p, alpha, len(gate.test.null), names if failed else (), tuple(gate.struck), "", bool(effects))
 
 
-def write_checks(jobs: Sequence[Job], directory: Path, seed: int, report: Report) -> None:
+def write_checks(
+    jobs: Sequence[Job],
+    directory: Path,
+    seed: int,
+    report: Report,
+    each: Each | None = None,
+    simulations: int | None = None,
+) -> None:
     """Check all fits of a command and put the result first in their ``summary.json``, as ``model_check``.
 
     The level is that which the command as a whole keeps. What was checked before an interruption is not checked again.
+    Processes share the work unless a map is given as `each`; `simulations` as for `check_model`.
     """
     alpha = level(len(jobs))
     paths = {job.folder: directory / job.folder / "summary.json" for job in jobs}
     summaries = {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items()}
     todo = [job for job in jobs if "model_check" not in summaries[job.folder]]
-    work = partial(check_model, seed=seed, alpha=alpha)
+    work = partial(check_model, seed=seed, alpha=alpha, simulations=simulations)
     own_effects = jobs[0].own_effects
-    with workers(prepare=partial(catalogue, own_effects)) as each:
+    with workers(prepare=partial(catalogue, own_effects)) if each is None else nullcontext(each) as each:
         # One fit shares its simulations among the cores, several are each done on one.
         checks = [work(todo[0], each=each)] if len(todo) == 1 else each(work, todo)
         for done, (job, check) in enumerate(zip(todo, checks, strict=True), 1):

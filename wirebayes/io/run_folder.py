@@ -58,6 +58,19 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     write_text(path, text.getvalue())
 
 
+def write_parquet(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """Write the same table as `write_csv` as Parquet, where pyarrow is installed; otherwise nothing."""
+    try:
+        from pyarrow import BufferOutputStream, array, table
+        from pyarrow.parquet import write_table
+    except ImportError:
+        return
+    columns = {name: array([plain(row[i]) for row in rows]) for i, name in enumerate(header)}
+    stream = BufferOutputStream()
+    write_table(table(columns), stream)
+    write_bytes(path, stream.getvalue().to_pybytes())
+
+
 def read_json(path: Path, otherwise: str = "") -> Any:
     """A JSON file that a command of ours wrote.
 

@@ -16,6 +16,7 @@ from wirebayes.report.blocks import Page
 _TELLERS = {
     "reproduce": "wirebayes.report.pages.reproduce",
     "fit": "wirebayes.report.pages.fit",
+    "batch": "wirebayes.report.pages.batch",
     "compare": "wirebayes.report.pages.compare",
     "discover": "wirebayes.report.pages.discover",
     "pose": "wirebayes.report.pages.pose",

@@ -112,16 +112,21 @@ def discover(
     with without_script():
         with workers(prepare=partial(catalogue, own)) as each:
             found = investigate(experiments, settings, seed, progress or silent, each)
-        jobs = _jobs(found, elastic_law, history, own)
+        jobs = jobs_of(found, elastic_law, history, own)
         run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
-    _pictures(found, place.path, own)
-    _posterior_amplitudes(found, place.path)
-    write_json(place.path / "discovery.json", found.report)
+    write_findings(found, place.path, own)
     opened.finish()
     return Findings(place, own)
 
 
-def _jobs(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
+def write_findings(found: search.Findings, output: Path, own_effects: Path | None) -> None:
+    """Beside the fits in a folder: pictures, and ``discovery.json`` with the amplitudes of the final posteriors."""
+    _pictures(found, output, own_effects)
+    _posterior_amplitudes(found, output)
+    write_json(output / "discovery.json", found.report)
+
+
+def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
     """Plain fit of every experiment, and the final ones."""
     plain = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
     out = []

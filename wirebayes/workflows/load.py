@@ -11,6 +11,7 @@ from wirebayes.workflows.options import PathLike, path_of
 from wirebayes.workflows.results import (
     POSTERIOR,
     SUMMARY,
+    Batch,
     Calibration,
     Comparison,
     Export,
@@ -25,6 +26,7 @@ from wirebayes.workflows.results import (
 )
 
 _KINDS: dict[str, type[Result]] = {
+    "batch": Batch,
     "compare": Comparison,
     "discover": Findings,
     "pose": Pose,
@@ -48,7 +50,8 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
 
     Returns
     -------
-    Posterior, Posteriors, Findings, Comparison, Pose, Calibration, Export, SimulatedTests, ImportedTests, Reproduction
+    Posterior, Posteriors, Findings, Batch, Comparison, Pose, Calibration, Export, SimulatedTests, ImportedTests or
+    Reproduction
         What the function of the same name returns.
 
     Raises

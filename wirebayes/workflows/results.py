@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
 IMPORTED = "import.json"
+_MESSAGES = 20  # lines on standard error: what a terminal shows at once
 _FIGURES = 4  # digits that a short form shows
 
 
@@ -340,6 +341,76 @@ class Findings(Result):
             for name, found in self.report["experiments"].items()
         ]
         return html_table("What the plain model is missing", ["experiment", "verdict", "effects", "p"], rows)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Result):
+    """Many experiments, each fitted and discovered on its own.
+
+    Examples
+    --------
+    >>> many.rows[0]["name"], many.rows[0]["converged"]
+    ('wire-1', True)
+    >>> many.plain["wire-1"]
+    Posterior(wire-1, chain hooke saturating, converged)
+    >>> many.outliers
+    []
+    """
+
+    _content: ClassVar[str] = "batch.json"
+
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """What ``summary.csv`` says, a row an experiment."""
+        return list(self.summary()["experiments"])
+
+    @cached_property
+    def outliers(self) -> list[dict[str, Any]]:
+        """Parameters of specimens that lie far from those of their material's others, farthest first."""
+        return list(self.summary()["outliers"])
+
+    @cached_property
+    def plain(self) -> dict[str, Posterior]:
+        """Posteriors of the plain model, by experiment; none where the draws were not kept."""
+        return self._posteriors(".") | self._posteriors("plain")
+
+    @cached_property
+    def final(self) -> dict[str, Posterior]:
+        """Posteriors of the model with what was found missing, by experiment; none where nothing was discovered."""
+        return self._posteriors("final")
+
+    def to_datatree(self) -> "xr.DataTree":
+        """One tree with a branch for each stored posterior."""
+        both = [*self.plain.values(), *self.final.values()]
+        return store.datatrees({posterior.within: posterior.folder for posterior in both})
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """Experiments that failed or did not converge, the first of them where there are many."""
+        said = [f"{row['name']}: {row['error'] or 'not converged'}" for row in self.rows if not row["converged"]]
+        more = f"and {len(said) - _MESSAGES} more: see summary.csv, columns converged and error"
+        return (*said[:_MESSAGES], *([more] if len(said) > _MESSAGES else []))
+
+    def _posteriors(self, model: str) -> dict[str, Posterior]:
+        within = {row["name"]: (Path(row["name"]) / model).as_posix() for row in self.rows if row["parameters"]}
+        return {
+            name: Posterior(self.place, self.own_effects, self.computed, name, folder, alone=False)
+            for name, folder in within.items()
+            if (self.folder / folder / POSTERIOR).is_file()
+        }
+
+    def _shortly(self) -> list[str]:
+        failed = sum(row["error"] is not None for row in self.rows)
+        converged = sum(bool(row["converged"]) for row in self.rows)
+        lying = len({outlier["experiment"] for outlier in self.outliers})
+        return [f"{len(self.rows)} experiments", f"{converged} converged", f"{lying} outliers", f"{failed} failed"]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [row["name"], row["material"] or "-", row["verdict"] or row["error"] or "-", row["check"] or "-"]
+            for row in self.rows
+        ]
+        return html_table(repr(self), ["experiment", "material", "verdict", "check"], rows, self.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,64 @@
+"""``wirebayes batch``: many experiments, each fitted and discovered on its own, in one table."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wirebayes.cli.options import (
+    AsJson,
+    ElasticLawOption,
+    HistoryOption,
+    Output,
+    OwnEffects,
+    Quiet,
+    Scheduler,
+    Seed,
+    TrainHolds,
+    Without,
+)
+
+Files = Annotated[list[Path], typer.Argument(metavar="FILE.toml...", help="Experiment files.")]
+
+
+def batch(
+    files: Files,
+    output: Output,
+    seed: Seed = 0,
+    discover: Annotated[
+        bool,
+        typer.Option("--discover/--no-discover", help="Find what is missing in each, or fit the plain model only."),
+    ] = True,
+    check: Annotated[
+        bool, typer.Option("--check/--no-check", help="With --no-discover: check each fit against 999 simulations.")
+    ] = True,
+    posteriors: Annotated[
+        bool, typer.Option("--posteriors/--no-posteriors", help="Keep the draws (3 MB a fit), or their summaries only.")
+    ] = True,
+    keep_going: Annotated[
+        bool, typer.Option("--keep-going", help="Give an unreadable file a row with its error instead of stopping.")
+    ] = False,
+    train_holds: TrainHolds = None,
+    elastic_law: ElasticLawOption = "hooke",
+    history: HistoryOption = "saturating",
+    without: Without = None,
+    own_effects: OwnEffects = None,
+    scheduler: Scheduler = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit and discover many experiments, each on its own: DIR/summary.csv and a folder DIR/NAME for each."""
+    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.progress import progress
+    from wirebayes.workflows.batch import batch as run
+
+    with progress() as report:
+        many = run(
+            files, discover=discover, check=check, posteriors=posteriors, keep_going=keep_going,
+            train_holds=train_holds, elastic_law=elastic_law, history=history, without=without or (),
+            own_effects=own_effects, scheduler=scheduler, seed=seed, output=output, progress=report,
+        )  # fmt: skip
+    for line in many.messages:
+        print(line, file=sys.stderr)
+    conclude(many, as_json=as_json, quiet=quiet)

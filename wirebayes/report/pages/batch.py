@@ -1,0 +1,104 @@
+"""The page of ``wirebayes batch``: how many experiments say what, which specimens lie apart, and the table."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from wirebayes.discovery.settings import ALPHA
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import Block, Columns, Page, Picture, Pictures, Points, Section, Table, Text, drawn, number
+from wirebayes.report.pictures.batch import specimens_of_materials
+from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
+
+_MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all
+_SHOWN = ("k1", "B", "U", "k2", "N")
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """The content of ``batch.json``."""
+    found = read_json(folder / "batch.json")
+    rows, far = found["experiments"], found["outliers"]
+    fitted = [row for row in rows if row["parameters"]]
+    first: list[Block] = [Columns([_done(rows), _known(fitted), _unknown(rows, configuration)])]
+    sections = [Section("Summary", first), Section("Specimens that lie apart", _outliers(fitted, far))]
+    if fitted:
+        picture = Picture(drawn(specimens_of_materials(fitted, far)), "Parameters of all specimens by material.")
+        sections.append(Section("Parameters by material", [Pictures([picture])]))
+    sections.append(Section("Experiments", _table(rows), folded=len(rows) > 50))
+    lead = "Each experiment was judged on its own; the table is summary.csv, the folders hold what each fit left."
+    return Page("Many experiments", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _done(rows: list[dict[str, Any]]) -> Points:
+    materials = Counter(row["material"] for row in rows if row["material"])
+    failed = [row for row in rows if row["error"]]
+    said = [f"{len(rows)} experiments on {len(materials)} materials."]
+    said += [f"{len(failed)} failed: {_some([row['name'] for row in failed])}."] if failed else []
+    return Points("What was done", said)
+
+
+def _known(fitted: list[dict[str, Any]]) -> Points:
+    verdicts = Counter(row["verdict"] for row in fitted if row["verdict"])
+    effects = Counter(effect for row in fitted for effect in row["effects"])
+    said = [f"{count} × {verdict.replace('-', ' ')}" for verdict, count in verdicts.most_common()]
+    said += [f"{effect.replace('_', ' ')}: in {count} experiments" for effect, count in effects.most_common()]
+    checks = Counter(row["check"] for row in fitted if row["check"])
+    said += [f"Model check: {checks['passed']} passed, {checks['failed']} failed."] if checks else []
+    return Points("What is known", said or ["The parameters; nothing was looked for."])
+
+
+def _unknown(rows: list[dict[str, Any]], configuration: dict[str, Any]) -> Points:
+    stopped = [row["name"] for row in rows if row["converged"] is False]
+    said = [f"Not converged: {_some(stopped)}."] if stopped else []
+    checked = sum(row["p_global"] is not None for row in rows)
+    if checked:
+        said.append(
+            f"Were nothing missing anywhere, about {number(ALPHA * checked, 2)} of {checked} checks would fail by "
+            f"chance, each at its level of {ALPHA:g}."
+        )
+    odd = [row["name"] for row in rows if row["warnings"]]
+    said += [f"Odd readings or fits: {_some(odd)}; the column warnings says how."] if odd else []
+    return Points("How far it can be trusted", said or ["All fits converged."])
+
+
+def _outliers(fitted: list[dict[str, Any]], far: list[dict[str, Any]]) -> list[Block]:
+    small = sorted(m for m, n in Counter(row["material"] for row in fitted).items() if n < LEAST_SPECIMENS)
+    rule = (
+        "A specimen lies apart when a parameter's median is farther from the median of its material than the scatter "
+        f"of the others and its own uncertainty explain. Among alike specimens {100 * FALSE_ALARMS:g} % of materials "
+        "have any such specimen by chance."
+    )
+    said = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
+    if not far:
+        return [Text("No specimen lies apart from its material's others.", strong=True), Text(rule + said)]
+    lines = [
+        [o["experiment"], o["material"], o["parameter"], number(o["value"]), number(o["median"]), number(o["z"], 2)]
+        for o in far[:_MOST_ROWS]
+    ]
+    header = ["experiment", "material", "parameter", "its median", "median of the material", "robust z"]
+    return [Table(header, lines, "B is per metre of length."), Text(rule + said)]
+
+
+def _table(rows: list[dict[str, Any]]) -> list[Block]:
+    lines = [
+        [
+            row["name"],
+            row["material"] or "–",
+            {True: "yes", False: "no", None: "–"}[row["converged"]],
+            *(_value(row, name) for name in _SHOWN),
+            row["error"] or (row["verdict"] or row["check"] or "–").replace("-", " "),
+            (row["best_effect"] or "–").replace("_", " "),
+        ]
+        for row in rows[:_MOST_ROWS]
+    ]
+    header = ["experiment", "material", "converged", *_SHOWN, "verdict", "best effect"]
+    more = f"The first {_MOST_ROWS} of {len(rows)}. " if len(rows) > _MOST_ROWS else ""
+    return [Table(header, lines, more + "Posterior medians; intervals stand in summary.csv.")]
+
+
+def _value(row: dict[str, Any], name: str) -> str:
+    return number(row["parameters"][name]["q50"]) if name in row["parameters"] else "–"
+
+
+def _some(names: list[str], most: int = 10) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,0 +1,65 @@
+"""Pictures of a batch: each parameter of all specimens, side by side by material."""
+
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+_SHOWN = {"k1": "k1 (N)", "B": "B (mm N⁻ᵁ) per m of length", "U": "U", "k2": "k2 (s⁻ᴺ)", "N": "N"}
+_MOST_BARS = 200  # specimens of which intervals are drawn: more are a smear
+_MOST_MATERIALS = 12  # columns whose labels can be read
+_DOT, _FAR = "#4c78a8", "#d1495b"
+
+
+def specimens_of_materials(rows: list[dict[str, Any]], far: list[dict[str, Any]]) -> Figure:
+    """Posterior medians with 90 % intervals, a panel a parameter, a column a material.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Fitted rows of ``batch.json``.
+    far : list of dict
+        Its outliers.
+
+    Returns
+    -------
+    Figure
+    """
+    count: dict[str, int] = {}
+    for row in rows:
+        count[row["material"]] = count.get(row["material"], 0) + 1
+    materials = sorted(count, key=lambda material: -count[material])[:_MOST_MATERIALS]
+    marked = {(outlier["experiment"], outlier["parameter"]) for outlier in far}
+    figure = Figure(figsize=(7.6, 5.0 if len(materials) < 5 else 6.4), layout="constrained")
+    axes = figure.subplots(2, 3).ravel()
+    axes[-1].set_axis_off()
+    for axis, (name, label) in zip(axes, _SHOWN.items(), strict=False):
+        for at, material in enumerate(materials):
+            members = [row for row in rows if row["material"] == material and name in row["parameters"]]
+            _column(axis, at, name, members, marked)
+        axis.set_title(label, fontsize=9, loc="left")
+        axis.set_xticks(range(len(materials)), materials, rotation=90, fontsize=7)
+        axis.set_xlim(-0.6, len(materials) - 0.4)
+        axis.tick_params(axis="y", which="both", labelsize=7)
+        if name in ("k1", "B", "k2"):
+            axis.set_yscale("log")
+    return figure
+
+
+def _column(axis: Axes, at: int, name: str, members: list[dict[str, Any]], marked: set[tuple[str, str]]) -> None:
+    """The specimens of one material."""
+    places = at + np.linspace(-0.35, 0.35, len(members) + 2)[1:-1]
+    for x, row in zip(places, members, strict=True):
+        scale = 1e3 / row["length_mm"] if name == "B" else 1.0
+        low, middle, high = (scale * row["parameters"][name][q] for q in ("q05", "q50", "q95"))
+        apart = (row["name"], name) in marked
+        color = _FAR if apart else _DOT
+        if len(members) <= _MOST_BARS or apart:
+            axis.plot([x, x], [low, high], "-", color=color, lw=0.8, alpha=0.6)
+        axis.plot([x], [middle], "o", color=color, ms=5 if apart else 3)
+        if apart:
+            axis.annotate(row["name"], (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=color)

@@ -1,0 +1,159 @@
+"""One experiment of a batch: fitted, or discovered, in a folder of its own that comes back as files.
+
+Whoever computes needs no folder in common with whoever asks, so it may be another machine. Work travels as bytes, also
+within one machine: then arrays lie in memory alike everywhere, and results agree to the last bit.
+"""
+
+import pickle
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Lock
+from typing import Any
+
+from wirebayes import __version__
+from wirebayes.discovery.model_check import write_checks
+from wirebayes.discovery.search import catalogue_without, investigate
+from wirebayes.discovery.settings import ALPHA, Settings
+from wirebayes.effects import catalogue
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import read_json
+from wirebayes.results.jobs import Job, one
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.workers import one_thread_each
+from wirebayes.workflows.discover import jobs_of, write_findings
+from wirebayes.workflows.results import POSTERIOR, SUMMARY, cautions
+
+QUANTITIES = ("mean", "sd", "q05", "q50", "q95")
+_ALONE = Lock()  # a worker with several threads still draws one picture at a time
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be done with each experiment.
+
+    Attributes
+    ----------
+    discover : bool
+        Look for what the model is missing; otherwise fit.
+    check : bool
+        Check the fit's model, where nothing is looked for.
+    law, history, seed, policy
+        As for a fit.
+    without : tuple of str
+        Effects left out of the catalogue.
+    own_effects : Path or None
+        Must be there under the same path wherever the work is done.
+    simulations : int
+        Refitted data sets behind the p-value.
+    posteriors : bool
+        Keep the draws, not only their summaries.
+    scratch : Path or None
+        Folder for what is being computed; the system's where it is left out.
+    """
+
+    discover: bool
+    check: bool
+    law: ElasticLaw
+    history: History
+    seed: int
+    policy: Policy
+    without: tuple[str, ...]
+    own_effects: Path | None
+    simulations: int
+    posteriors: bool
+    scratch: Path | None = None
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of one experiment: its row of the table and the content of its files by their path."""
+
+    row: dict[str, Any]
+    files: dict[str, bytes]
+
+
+def packed(experiment: Experiment, file: str, task: Task) -> bytes:
+    """A piece of work for `do`."""
+    return pickle.dumps((experiment, file, task))
+
+
+def do(work: bytes) -> Done:
+    """Do one experiment; whatever goes wrong with it stands in its row."""
+    one_thread_each()
+    with _ALONE:
+        experiment, file, task = pickle.loads(work)
+        row = first_columns(experiment, file)
+        with TemporaryDirectory(prefix="wirebayes-", dir=task.scratch) as scratch:
+            folder = Path(scratch)
+            try:
+                row |= _discovered(experiment, task, folder) if task.discover else _fitted(experiment, task, folder)
+            except OSError:  # a full disk is not the specimen's fault
+                raise
+            except Exception as error:  # no specimen may lose the others
+                said = f"{type(error).__name__}: {error}".replace(f"{folder}/", "")
+                return Done(row | {"error": said}, {})
+            return Done(row, _files(folder, experiment.name, task.posteriors))
+
+
+def first_columns(experiment: Experiment, file: str) -> dict[str, Any]:
+    """A row before anything is known of its posterior."""
+    recorded = experiment.recorded_holds
+    return {
+        "name": experiment.name, "material": experiment.material, "file": file, "length_mm": experiment.length_mm,
+        "holds": len(recorded), "readings": sum(hold.time_s.size for hold in recorded), "converged": None,
+        "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None, "check": None,
+        "warnings": [], "error": None,
+    }  # fmt: skip
+
+
+def _fitted(experiment: Experiment, task: Task, folder: Path) -> dict[str, Any]:
+    about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
+    job = Job(experiment.name, (experiment,), (), task.own_effects, task.law, task.history, provenance=about)
+    one(job, folder, task.seed, task.policy)
+    if task.check:
+        write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
+    summary = read_json(folder / experiment.name / SUMMARY)
+    check = summary.get("model_check", {"passed": None, "p": None})
+    return _columns(summary) | {"p_global": check["p"], "check": _word(check["passed"])}
+
+
+def _discovered(experiment: Experiment, task: Task, folder: Path) -> dict[str, Any]:
+    kinds = catalogue_without(task.without, catalogue(task.own_effects))
+    found = investigate([experiment], Settings(task.law, task.history, kinds, task.simulations), task.seed)
+    for job in jobs_of(found, task.law, task.history, task.own_effects):
+        one(job, folder, task.seed, task.policy)
+    write_findings(found, folder, task.own_effects)
+    report = found.report["experiments"][experiment.name]
+    # the check of a fit is this global test
+    p = report["p_global"]
+    return _columns(read_json(folder / experiment.name / "plain" / SUMMARY)) | {
+        "verdict": report["verdict"], "effects": report["effects"], "best_effect": report["best"],
+        "p_global": p, "check": _word(p > ALPHA),
+    }  # fmt: skip
+
+
+def _columns(summary: dict[str, Any]) -> dict[str, Any]:
+    parameters = {n: {q: p[q] for q in QUANTITIES} for n, p in summary["parameters"].items()}
+    said = [s for s in cautions(summary) if s.startswith("warning: ")]
+    return {"converged": summary["converged"], "parameters": parameters, "warnings": said}
+
+
+def _word(passed: bool | None) -> str | None:
+    return None if passed is None else "passed" if passed else "failed"
+
+
+def _hash(experiment: Experiment) -> dict[str, str]:
+    return {experiment.name: experiment.data_hash}
+
+
+def _files(folder: Path, name: str, posteriors: bool) -> dict[str, bytes]:
+    """The files by their path below the experiment's own folder."""
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    kept = [path for path in paths if posteriors or path.name != POSTERIOR]
+    inside = folder / name
+    return {
+        (path.relative_to(inside) if path.is_relative_to(inside) else path.relative_to(folder)).as_posix():
+        path.read_bytes() for path in kept
+    }  # fmt: skip
