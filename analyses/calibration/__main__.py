@@ -4,7 +4,6 @@ import argparse
 import json
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from analyses.calibration.study import BROKEN, STUDIES, Study
 from wirebayes.inference.simulation_based_calibration import band, verdict
 from wirebayes.io.run_folder import write_json
+from wirebayes.workers import executor
 
 
 def main() -> int:
@@ -22,13 +22,15 @@ def main() -> int:
     parser.add_argument("--broken", type=int, default=100, help="data sets fitted with the setting error dropped")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--scheduler", help="address of a Dask scheduler whose workers can import this checkout")
     parser.add_argument("--only", help="one study, such as paper-chain, without a verdict over all")
     asked = parser.parse_args()
     asked.output.mkdir(parents=True, exist_ok=True)
     wanted = [(study, asked.data_sets) for study in STUDIES] + [(BROKEN, asked.broken)]
     if asked.only:
         wanted = [(study, count) for study, count in wanted if study.name == asked.only]
-    lines = {study.name: run(study, count, asked.output, asked.seed, asked.workers) for study, count in wanted}
+    where = asked.output, asked.seed, asked.workers, asked.scheduler
+    lines = {study.name: run(study, count, *where) for study, count in wanted}
     if asked.only:
         return 0
     result = judged(lines, asked.seed)
@@ -38,7 +40,9 @@ def main() -> int:
     return 0 if result["inside"] and result["broken_outside"] and result["share_not_converged"] <= 0.01 else 1
 
 
-def run(study: Study, count: int, folder: Path, seed: int, workers: int) -> list[dict[str, Any]]:
+def run(
+    study: Study, count: int, folder: Path, seed: int, workers: int, scheduler: str | None = None
+) -> list[dict[str, Any]]:
     """The data sets of a study in order; those on file are not run again. One line of JSON each, written when done."""
     path = folder / f"{study.name}-seed{seed}.jsonl"
     done: dict[int, dict[str, Any]] = {}
@@ -48,7 +52,7 @@ def run(study: Study, count: int, folder: Path, seed: int, workers: int) -> list
         path.write_text("".join(complete), encoding="utf-8")
         done = {row["index"]: row for row in map(json.loads, complete)}
     missing = [i for i in range(count) if i not in done]
-    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(max(1, workers)) as pool:
+    with path.open("a", encoding="utf-8") as file, executor(scheduler, workers) as pool:
         for future in [pool.submit(study.data_set, seed, i) for i in missing]:
             row = future.result()
             done[row["index"]] = row

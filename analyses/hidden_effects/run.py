@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import sys
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
+
+from wirebayes.workers import executor
 
 from . import cases as case_list
 from .ask import ANSWERERS, BASELINES, ask
@@ -75,7 +76,13 @@ def _judge(job: Job) -> dict[str, Any]:
 
 
 def work(
-    stage: str, jobs: list[Job], done: Iterable[str], path: Path, do: Callable[[Job], dict[str, Any]], workers: int
+    stage: str,
+    jobs: list[Job],
+    done: Iterable[str],
+    path: Path,
+    do: Callable[[Job], dict[str, Any]],
+    workers: int,
+    scheduler: str | None = None,
 ) -> None:
     """Do the jobs not done yet, in parallel, appending each record as it comes."""
     finished = set(done)
@@ -83,8 +90,7 @@ def work(
     if not todo:
         return
     begin, shown = time.monotonic(), 0.0
-    spawn = multiprocessing.get_context("spawn")  # workers that may have children of their own, unlike a Pool's
-    with ProcessPoolExecutor(min(workers, len(todo)), mp_context=spawn) as pool:
+    with executor(scheduler, min(workers, len(todo))) as pool:
         for i, future in enumerate(as_completed([pool.submit(do, job) for job in todo]), 1):
             append_line(path, future.result())
             now = time.monotonic() - begin
@@ -112,6 +118,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--stage", choices=("cases", "ask", "score", "all"), default="all", help="stop after this stage")
     p.add_argument("--output", type=Path, default=Path("out/hidden_effects"))
     p.add_argument("--workers", type=int, default=2)
+    p.add_argument("--scheduler", help="address of a Dask scheduler; its workers share this checkout and --output")
     p.add_argument("--seed", type=int, default=0, help="another seed makes other cases of the same plan")
     return p
 
@@ -142,7 +149,7 @@ def main(arguments: list[str] | None = None) -> int:
     wanted = chosen_specs(options)
     jobs = [(spec, str(folder), "") for spec in wanted]
     reach = folder / "reach.jsonl"
-    work("cases", jobs, read_lines(reach), reach, _seal, options.workers)
+    work("cases", jobs, read_lines(reach), reach, _seal, options.workers, options.scheduler)
     within = {key for key, record in read_lines(reach).items() if record["within_reach"]}
     jobs = [job for job in jobs if job[0].key in within]
     if options.stage == "cases":
@@ -151,11 +158,11 @@ def main(arguments: list[str] | None = None) -> int:
     for how in options.answer:
         path = folder / "answers" / f"{how}.jsonl"
         answered = [key for key, record in read_lines(path).items() if record["error"] is None]
-        work(how, [(s, f, how) for s, f, _ in jobs], answered, path, _ask, options.workers)
+        work(how, [(s, f, how) for s, f, _ in jobs], answered, path, _ask, options.workers, options.scheduler)
     if options.stage == "ask":
         return 0
     judged = folder / "judged.jsonl"
-    work("judge", jobs, read_lines(judged), judged, _judge, options.workers)
+    work("judge", jobs, read_lines(judged), judged, _judge, options.workers, options.scheduler)
     keys = [spec.key for spec, _, _ in jobs]
     truths = {key: json.loads((folder / "sealed" / f"{key}.json").read_text(encoding="utf-8")) for key in keys}
     lost = [spec for spec in wanted if spec.key not in within]
