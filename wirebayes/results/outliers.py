@@ -107,7 +107,7 @@ def robust_z(values: Array, sd: Array) -> Array:
 
 
 def threshold(specimens: int, parameters: int) -> float:
-    """The |z| that no specimen of a material exceeds in any parameter, with probability 1 - `FALSE_ALARMS`.
+    """The size of z that no specimen of a material exceeds in any parameter, with probability 1 - `FALSE_ALARMS`.
 
     Student's t with as many degrees of freedom as the median absolute deviation is worth, and one more, which the
     simulations of the tests show to keep the level for 6 to 200 specimens.
