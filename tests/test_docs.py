@@ -35,7 +35,9 @@ def test_the_example_is_valid():
     assert [hold.number for hold in experiment.holds] == [1, 2, None, 3, 4]
 
 
-@pytest.mark.parametrize("command", [name for name in ("fit", "compare", "discover", "batch") if name in COMMANDS])
+@pytest.mark.parametrize(
+    "command", [name for name in ("fit", "compare", "discover", "batch", "check") if name in COMMANDS]
+)
 @pytest.mark.parametrize("case", malformed.CASES, ids=[case.mistake for case in malformed.CASES])
 def test_a_mistake_is_exit_code_2_one_line_and_nothing_left_behind(case, command, tmp_path, capsys):
     toml = malformed.write(case, tmp_path)

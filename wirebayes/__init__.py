@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from wirebayes.robot.mechanics.description import Robot as Robot
     from wirebayes.workflows.batch import batch as batch
     from wirebayes.workflows.calibrate import calibrate as calibrate
+    from wirebayes.workflows.check import check as check
     from wirebayes.workflows.compare import compare as compare
     from wirebayes.workflows.discover import discover as discover
     from wirebayes.workflows.export import export as export
@@ -24,11 +25,13 @@ if TYPE_CHECKING:
     from wirebayes.workflows.list_effects import EffectDescription as EffectDescription
     from wirebayes.workflows.list_effects import list_effects as list_effects
     from wirebayes.workflows.load import load as load
+    from wirebayes.workflows.new_experiment import new_experiment as new_experiment
     from wirebayes.workflows.pose import pose as pose
     from wirebayes.workflows.predict import predict as predict
     from wirebayes.workflows.reproduce_paper import reproduce_paper as reproduce_paper
     from wirebayes.workflows.results import Batch as Batch
     from wirebayes.workflows.results import Calibration as Calibration
+    from wirebayes.workflows.results import Check as Check
     from wirebayes.workflows.results import Comparison as Comparison
     from wirebayes.workflows.results import Export as Export
     from wirebayes.workflows.results import Findings as Findings
@@ -48,6 +51,8 @@ _PLACES = {
     "read_experiments": "wirebayes.io.experiment",
     "from_arrays": "wirebayes.io.arrays",
     "import_bench": "wirebayes.workflows.import_bench",
+    "new_experiment": "wirebayes.workflows.new_experiment",
+    "check": "wirebayes.workflows.check",
     "fit": "wirebayes.workflows.fit",
     "compare": "wirebayes.workflows.compare",
     "discover": "wirebayes.workflows.discover",
@@ -69,6 +74,7 @@ _PLACES = {
     "Findings": "wirebayes.workflows.results",
     "Comparison": "wirebayes.workflows.results",
     "ImportedTests": "wirebayes.workflows.results",
+    "Check": "wirebayes.workflows.results",
     "SimulatedTests": "wirebayes.workflows.results",
     "Robot": "wirebayes.robot.mechanics.description",
     "Pose": "wirebayes.workflows.results",

@@ -38,6 +38,18 @@ COMMANDS = {
         "Turn what benches write (CSV, xlsx) into experiment files.",
         'wirebayes import raw.csv --output wire --length-mm 1200 --map "Kraft [N]=tension"',
     ),
+    "init": Command(
+        "wirebayes.cli.new_experiment",
+        "new_experiment",
+        "Write a commented experiment file and a small CSV to replace.",
+        "wirebayes init wire",
+    ),
+    "check": Command(
+        "wirebayes.cli.check",
+        "check",
+        "Say what was understood of an experiment file and what such a test can tell.",
+        "wirebayes check data/paper/experiments.toml --experiment nylon-1.5m",
+    ),
     "fit": Command(
         "wirebayes.cli.fit",
         "fit",

@@ -2,12 +2,14 @@
 
 import json
 from collections import Counter
+from textwrap import wrap
 from typing import Any
 
 from wirebayes.io.run_folder import plain
 from wirebayes.workflows.results import (
     Batch,
     Calibration,
+    Check,
     Comparison,
     Findings,
     ImportedTests,
@@ -39,14 +41,15 @@ def conclude(result: Result, *, as_json: bool = False, quiet: bool = False) -> N
     print_answer(result, as_json=as_json, quiet=quiet)
 
 
-def print_answer(result: Result, *, as_json: bool = False, quiet: bool = False) -> None:
-    """Print the answer of a command, as `conclude` does; for results without a page of their own, too."""
+def print_answer(result: Result, *, as_json: bool = False, quiet: bool = False, kept: bool = True) -> None:
+    """Print the answer of a command, as `conclude` does; for results without a page, or not `kept` in a folder, too."""
     folder = result.place.path
     if as_json:
         print(json.dumps(plain(result.summary()), indent=2, ensure_ascii=False, allow_nan=False))
     elif not quiet:
         look = f" (open {folder / PAGE})" if (folder / PAGE).is_file() else ""
-        print("\n".join([*answer(result), f"Results: {folder}{look}", f"Next: {next_step(result)}"]))
+        where = [f"Results: {folder}{look}"] if kept else []
+        print("\n".join([*answer(result), *where, f"Next: {next_step(result)}"]))
 
 
 def answer(result: Result) -> list[str]:
@@ -66,6 +69,8 @@ def answer(result: Result) -> list[str]:
         return _pose(found)
     if isinstance(result, Calibration):
         return _calibration(found)
+    if isinstance(result, Check):
+        return [line for name, test in found["experiments"].items() for line in _checked(name, test)]
     if isinstance(result, ImportedTests):
         return [line for name, test in found["experiments"].items() for line in _imported(name, test)]
     return [repr(result)]
@@ -91,10 +96,14 @@ def next_step(result: Result) -> str:
         return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
     if isinstance(result, Calibration):
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"
+    if isinstance(result, Check):
+        return "wirebayes fit FILE.toml --output DIR" + (
+            ", once the warnings are settled" if result.messages else ", then wirebayes discover FILE.toml"
+        )
     if isinstance(result, ImportedTests):
         names = list(result.summary()["experiments"])
         file = names[0] if len(names) == 1 else "experiments"
-        return f"look at {folder / names[0]}.png, then wirebayes fit {folder / file}.toml"
+        return f"look at {folder / names[0]}.png, then wirebayes check {folder / file}.toml"
     return f"read {folder}"
 
 
@@ -153,6 +162,56 @@ def _batch(found: dict[str, Any]) -> list[str]:
 
 
 _MOST_LINES = 10  # of outliers, on a terminal
+
+
+def _checked(name: str, test: dict[str, Any]) -> list[str]:
+    recorded = f"{test['recorded_holds']} holds, {test['readings']} readings in {test['duration_s'] / 60.0:.3g} min"
+    steps = f", written in steps of {test['resolution_N']:g} N" if test["resolution_N"] else ""
+    lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
+    if test["temperature_C"]:
+        lines.append("  temperature from {:.3g} to {:.3g} °C".format(*test["temperature_C"]))
+    lines.append(f"  {'hold':>4} {'displacement':>13} {'begins':>9} {'lasts':>9}  readings")
+    for hold in test["holds"]:
+        course = "none: held, not recorded"
+        if hold["number"] is not None:
+            course = (
+                f"{hold['readings']} from {hold['first_s']:g} s on, {hold['first_N']:.4g} to {hold['last_N']:.4g} N"
+            )
+        place = f"{hold['displacement_mm']:g} mm"
+        begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
+        number = "-" if hold["number"] is None else hold["number"]
+        lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
+    for teller in ("data", "data and prior", "prior"):
+        told = [f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["told_by"] == teller]
+        lines += _wrapped(f"parameters from the {teller}", told)
+    for shows, words in _SHOWS.items():
+        effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
+        lines += _wrapped(words, [_size(e, found) for e, found in effects])
+    count = len(test["warnings"])
+    lines.append(f"  {count} warning{'s' * (count > 1)}, on standard error" if count else "  nothing suspicious")
+    return lines
+
+
+_SHOWS = {
+    "yes": "effects that would be found, from this size on",
+    "if unusually large": "effects that would be found if unusually large",
+    "no": "effects that it cannot show",
+}
+
+
+def _size(effect: str, found: dict[str, Any]) -> str:
+    if found["amplitude_80"] is None:
+        return f"{effect} ({found['reason']})"
+    return f"{effect} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
+
+
+def _wrapped(title: str, items: list[str]) -> list[str]:
+    """A list in lines that a terminal shows whole."""
+    if not items:
+        return []
+    whole = [item.replace(" ", "\u00a0") for item in items]  # no item is broken
+    lines = wrap(f"{title}: {', '.join(whole)}", 110, initial_indent="  ", subsequent_indent="    ")
+    return [line.replace("\u00a0", " ") for line in lines]
 
 
 def _comparison(name: str, table: dict[str, Any]) -> str:

@@ -24,6 +24,7 @@ LARGEST_STRAIN = 0.5  # lines and ropes break below; rubber is no wire of this m
 ISOLATED = 10.0  # times as far from its neighbours as nine in ten readings
 GROSS = 0.2  # of the range of all other tensions; smaller ones are the model check's affair
 RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that rise, rise in noise levels: not by chance
+COPIED = 3  # different readings that agree one by one at two displacements: not by chance
 OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
 
 
@@ -223,6 +224,21 @@ def off_grid(readings: Readings) -> str:
     )
 
 
+def repeated(readings: Readings) -> str:
+    """The same readings at two displacements, as rows that were copied and not changed leave them."""
+    known: dict[tuple[float, ...], int] = {}
+    for j, row in enumerate(readings.each):
+        if len(set(row.tolist())) < COPIED:
+            continue
+        first = known.setdefault(tuple(row.tolist()), j)
+        if readings.displacement_mm[first] != readings.displacement_mm[j]:
+            a, b = readings.number[first], readings.number[j]
+            return (
+                f"holds {a} and {b} have the same {len(row)} readings at two displacements: check that none is a copy"
+            )
+    return ""
+
+
 CHECKS: tuple[Callable[[Readings], str], ...] = (
-    run_on_times, negative_tension, response, strain_scale, outlier, rising, off_grid,
+    run_on_times, negative_tension, response, strain_scale, outlier, rising, off_grid, repeated,
 )  # fmt: skip

@@ -13,6 +13,7 @@ from wirebayes.workflows.results import (
     SUMMARY,
     Batch,
     Calibration,
+    Check,
     Comparison,
     Export,
     Findings,
@@ -34,6 +35,7 @@ _KINDS: dict[str, type[Result]] = {
     "export": Export,
     "simulate": SimulatedTests,
     "import": ImportedTests,
+    "check": Check,
     "reproduce": Reproduction,
 }
 
@@ -50,8 +52,7 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
 
     Returns
     -------
-    Posterior, Posteriors, Findings, Batch, Comparison, Pose, Calibration, Export, SimulatedTests, ImportedTests or
-    Reproduction
+    Posterior, Posteriors or another result
         What the function of the same name returns.
 
     Raises

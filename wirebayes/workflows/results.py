@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
-IMPORTED = "import.json"
+IMPORTED, CHECKED = "import.json", "check.json"
 _MESSAGES = 20  # lines on standard error: what a terminal shows at once
 _FIGURES = 4  # digits that a short form shows
 
@@ -632,6 +632,38 @@ class ImportedTests(Result):
     def _repr_html_(self) -> str:
         rows = [[name, note] for name, each in self.summary()["experiments"].items() for note in each["notes"]]
         return html_table(repr(self), ["experiment", "what was understood"], rows, self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Check(Result):
+    """What was understood of experiments, what is suspicious, and what such tests can tell.
+
+    Examples
+    --------
+    >>> checked.messages
+    ()
+    """
+
+    _content: ClassVar[str] = CHECKED
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What is suspicious."""
+        found = self.summary()["experiments"]
+        return tuple(f"warning: {name}: {said}" for name, test in found.items() for said in test["warnings"])
+
+    def _shortly(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [f"{name}: {test['recorded_holds']} holds, {test['readings']} readings" for name, test in found.items()]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, parameter, _figure(p["q50"]), f"{_figure(p['q05'])} to {_figure(p['q95'])}", p["told_by"]]
+            for name, test in self.summary()["experiments"].items()
+            for parameter, p in test["parameters"].items()
+        ]
+        header = ["experiment", "parameter", "median", "90 % interval", "told by"]
+        return html_table(repr(self), header, rows, self.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,9 +16,7 @@ _MOST_NUMBERS = 40  # holds that can all be numbered in a picture
 _MINUTES = 600.0  # s from which on an axis in minutes reads better
 
 
-def understood(
-    experiment: Experiment, target: Path, recording: Recording | None = None, expected_N: Array | None = None
-) -> None:
+def understood(experiment: Experiment, target: Path, recording: Recording | None = None) -> None:
     """Draw one test.
 
     Parameters
@@ -28,8 +26,6 @@ def understood(
         The picture to write.
     recording : Recording, optional
         Everything that was recorded, of which the experiment keeps a part.
-    expected_N : (H, R) array, optional
-        Tension of a model fitted to the readings.
     """
     figure = Figure(figsize=(9.0, 5.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.0))
@@ -39,10 +35,10 @@ def understood(
     if recording is not None:
         for axes, values in ((upper, recording.displacement_mm), (lower, recording.tension_N)):
             axes.plot(recording.time_s / scale, values, color=QUIET, lw=1.0, zorder=1, label="recorded")
-    labels = {"held": "held", "gap": "held, not recorded", "kept": "reading", "model": "plain model, best fit"}
+    labels = {"held": "held", "gap": "held, not recorded", "kept": "reading"}
     row = 0
     every = int(np.ceil(len(experiment.recorded_holds) / _MOST_NUMBERS))
-    for i, (hold, start) in enumerate(zip(experiment.holds, starts, strict=True)):
+    for hold, start in zip(experiment.holds, starts, strict=True):
         ends = np.array([start, start + hold.duration_s]) / scale
         style = {"color": HOLD, "lw": 2.2} if hold.recorded else {"color": INK, "lw": 1.6, "ls": ":"}
         key = "held" if hold.recorded else "gap"
@@ -58,8 +54,6 @@ def understood(
                            ha="center", va="bottom", fontsize=7.5, color=INK)  # fmt: skip
         time = (start + hold.time_s) / scale
         lower.plot(time, hold.tension_N, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))
-        if expected_N is not None:
-            lower.plot(time, expected_N[i, : len(time)], color=HOLD, lw=1.2, zorder=2, label=labels.pop("model", None))
         row += 1
     upper.set_ylabel("displacement, mm")
     lower.set_ylabel("tension, N")

@@ -1,0 +1,77 @@
+"""What a test can tell before it is fitted: compared with what a test of known strengths and gaps must show."""
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery.preview import preview
+from wirebayes.effects import CATALOGUE
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+from wirebayes.workflows.check import check
+
+WIRE = {"k1": 700.0, "B": 0.5, "U": 0.8, "k2": 0.03, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
+
+
+def told(bench):
+    """The preview of a simulated test."""
+    sample = draw([bench], Truth(WIRE), seed=3)
+    experiment = bench.experiment()
+    holds = tuple(
+        type(hold)(**vars(hold) | {"tension_N": row[: hold.time_s.size]})
+        for hold, row in zip(experiment.holds, sample.problem.samples[0].readings[..., 0], strict=True)
+    )
+    measured = type(experiment)(**vars(experiment) | {"holds": holds})
+    return measured, preview(measured, CATALOGUE, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def loading():
+    """Six holds upwards."""
+    return told(Bench(displacements_mm=(1, 2, 3, 4, 5, 6)))
+
+
+@pytest.fixture(scope="module")
+def unloading():
+    """Six holds upwards and five back."""
+    return told(Bench(displacements_mm=(1, 2, 3, 4, 5, 6, 5, 4, 3, 2, 1)))
+
+
+def test_what_a_protocol_cannot_show_is_said(loading, unloading):
+    up, back = loading[1].effects, unloading[1].effects
+    for effect in ("lost_motion", "guide_friction"):
+        assert up[effect]["shows"] == "no"
+        assert up[effect]["amplitude_80"] is None
+        assert back[effect]["shows"] == "yes"
+    assert set(up) == set(CATALOGUE)
+    assert up["thermal_expansion"]["reason"] == "follows the logged temperature"
+
+
+def test_more_holds_show_smaller_effects(loading, unloading):
+    up, back = loading[1].effects, unloading[1].effects
+    seen = [name for name in up if up[name]["amplitude_80"] is not None]
+    assert len(seen) > 10
+    assert np.median([back[name]["amplitude_80"] / up[name]["amplitude_80"] for name in seen]) < 0.8
+
+
+def test_parameters_lie_where_the_truth_is_and_the_prior_is_named_where_it_answers(loading):
+    parameters = loading[1].parameters
+    for name, value in WIRE.items():
+        told_by, low, high = (parameters[name][key] for key in ("told_by", "q05", "q95"))
+        width = np.log(high / low) if name != "preload" else high - low
+        away = (
+            abs(np.log(parameters[name]["q50"] / value)) if name != "preload" else abs(parameters[name]["q50"] - value)
+        )
+        assert away < 1.5 * width, name
+        assert told_by in ("data", "data and prior", "prior")
+    assert parameters["k1"]["told_by"] == "data"
+    short = told(Bench(displacements_mm=(1, 2), times_s=(0.0, 1.0, 2.0)))[1]
+    assert short.parameters["U"]["told_by"] == "prior"
+    assert short.parameters["N"]["told_by"] != "data"
+    assert {found["reason"] for found in short.effects.values()} == {"fewer readings than parameters"}
+
+
+def test_what_is_suspicious_is_said_with_the_fits_own_checks(loading):
+    experiment = loading[0]
+    scaled = tuple(type(h)(**vars(h) | {"tension_N": 1e4 * h.tension_N}) for h in experiment.holds)
+    checked = check(type(experiment)(**vars(experiment) | {"holds": scaled}))
+    assert any("far outside its prior" in line for line in checked.messages)
+    assert check(experiment).messages == ()

@@ -1,0 +1,36 @@
+"""``wirebayes check``: what was understood of an experiment file."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wirebayes.cli.options import AsJson, ExperimentFile, ExperimentName, OwnEffects, Quiet, Seed
+
+
+def check(
+    file: ExperimentFile,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", metavar="DIR", help="Folder for check.json and a picture of each experiment."),
+    ] = None,
+    seed: Seed = 0,
+    experiment: ExperimentName = None,
+    own_effects: OwnEffects = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say what was understood of an experiment file, what is suspicious, and what such a test can tell.
+
+    Exit code 0 means that the file can be used, 2 that it is bad. With --output: DIR/check.json and DIR/NAME.png.
+    """
+    from wirebayes.cli.answer import print_answer
+    from wirebayes.cli.progress import progress
+    from wirebayes.workflows.check import check as run
+
+    with progress() as report:
+        checked = run(file, experiment=experiment, own_effects=own_effects, seed=seed, output=output, progress=report)
+    for line in checked.messages:
+        print(line, file=sys.stderr)
+    print_answer(checked, as_json=as_json, quiet=quiet, kept=output is not None)

@@ -1,0 +1,21 @@
+"""``wirebayes init``: a start for one's own measurements."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wirebayes.cli.options import Quiet
+
+
+def new_experiment(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the files; made where it is absent.")],
+    quiet: Quiet = False,
+) -> None:
+    """Write a commented experiment file and a small CSV to replace: DIR/my-wire.toml and DIR/my-wire.csv."""
+    from wirebayes.workflows.new_experiment import new_experiment as run
+
+    file = run(directory)
+    if not quiet:
+        print(f"Written: {file} and {file.with_suffix('.csv')}; both are valid, replace their content by yours")
+        print(f"Next: wirebayes check {file}; for a raw file of a bench, wirebayes import")

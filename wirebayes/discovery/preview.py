@@ -1,0 +1,110 @@
+"""What a test can and cannot tell, before a fit or a search is run: parameters by a short run, effects by their size.
+
+An effect is measured by δ, how far it moves the readings beyond what the plain model's own parameters can follow, in
+units of the noise (`wirebayes.discovery.linear_scan`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.discovery.linear_scan import Probe, expand, probes, scan
+from wirebayes.inference import rough_draws
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.io.experiment import Experiment
+from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, taught
+from wirebayes.wire.effect import Effect
+
+Array = NDArray[Any]
+
+SEEN = 5.0  # δ that `discover` detects in four cases of five (57 of 74 sealed cases of that size)
+UNUSUAL = 2.0  # standard deviations of an effect's prior: few wires show it as large
+UNTOLD, TOLD = 0.3, 0.9  # contraction below which the prior answers, and from which on the data do
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What a test can tell.
+
+    Attributes
+    ----------
+    parameters : dict
+        Of each: ``q05``, ``q50``, ``q95``, ``prior_q05``, ``prior_q95``, and ``told_by``: data, data and prior, or
+        prior.
+    effects : dict
+        Of each: ``amplitude_80``, about the smallest that would be detected in four cases of five, its ``unit``, and
+        whether the test ``shows`` it: yes (at usual sizes), if unusually large, or no, and the ``reason``.
+    warnings : list of str
+        What is odd about what was fitted.
+    """
+
+    parameters: dict[str, dict[str, Any]]
+    effects: dict[str, dict[str, Any]]
+    warnings: list[str]
+
+
+def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> Preview:
+    """Fit the plain model roughly and see what the test would tell.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    kinds : mapping of name to effect class
+    rng : Generator
+    """
+    block = fitted((experiment,), (), "hooke", "saturating", rng)
+    problem = block.target.problem
+    theta = rough_draws.draws(block.target, block.modes, rng)
+    before = problem.prior.rvs(4000, rng)
+    sample = problem.samples[0]
+    own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
+    said = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), taught(own, prior)]
+    parameters = {
+        name: _told(theta[:, i], before[:, i], name in problem.prior.logarithmic)
+        for i, name in enumerate(problem.names)
+    }
+    return Preview(parameters, _effects(block, experiment, kinds), [sentence for sentence in said if sentence])
+
+
+def _told(draws: Array, before: Array, positive: bool) -> dict[str, Any]:
+    """One parameter: its range now and before, and who tells it."""
+    low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
+    prior_low, prior_high = np.quantile(before, [0.05, 0.95])
+    spread = [float(np.var(np.log(x) if positive else x)) for x in (draws, before)]
+    contraction = 1.0 - spread[0] / spread[1]
+    told_by = "prior" if contraction < UNTOLD else "data" if contraction >= TOLD else "data and prior"
+    return {
+        "q05": float(low), "q50": float(middle), "q95": float(high), "prior_q05": float(prior_low),
+        "prior_q95": float(prior_high), "told_by": told_by,
+    }  # fmt: skip
+
+
+def _effects(block: LaplaceFit, experiment: Experiment, kinds: Mapping[str, type[Effect]]) -> dict[str, dict[str, Any]]:
+    """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
+    trials: list[tuple[str, Probe]] = []
+    for name, kind in kinds.items():
+        trials += [(name, p) for variant in kind.variants([experiment.protocol()]) for p in probes(variant)]
+    x = expand(block.target, block.modes.z[:1], [probe for _, probe in trials])
+    if x.degrees < 1:
+        return {name: _hidden(kind, "fewer readings than parameters") for name, kind in kinds.items()}
+    best: dict[str, float] = {}
+    for (name, _), norm in zip(trials, scan(x).norm[0], strict=True):
+        best[name] = max(best.get(name, 0.0), float(norm))
+    return {
+        name: _shown(kind, best[name]) if name in best else _hidden(kind, kind.shows) for name, kind in kinds.items()
+    }
+
+
+def _shown(kind: type[Effect], norm: float) -> dict[str, Any]:
+    if norm == 0.0:
+        return _hidden(kind, "taken up by the model's own parameters")
+    main, amplitude = kind.amplitudes[0], SEEN / norm
+    shows = "yes" if amplitude <= UNUSUAL * float(main.prior.std()) else "if unusually large"
+    return {"shows": shows, "amplitude_80": amplitude, "unit": main.unit, "reason": None}
+
+
+def _hidden(kind: type[Effect], reason: str) -> dict[str, Any]:
+    return {"shows": "no", "amplitude_80": None, "unit": kind.amplitudes[0].unit, "reason": reason}

@@ -1,0 +1,115 @@
+"""What was understood of an experiment file, what is suspicious in it, and what such a test can tell."""
+
+from typing import Any
+
+import numpy as np
+
+from wirebayes import __version__
+from wirebayes.discovery.preview import preview
+from wirebayes.effects import catalogue, source_of
+from wirebayes.inference.fit import seed_of
+from wirebayes.io import data_checks
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import open_run, write_json
+from wirebayes.workflows.options import PathLike, Progress, Source, check_seed, experiments_of, path_of, silent
+from wirebayes.workflows.results import CHECKED, Check, Place
+
+
+def check(
+    source: Source,
+    *,
+    experiment: str | None = None,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+) -> Check:
+    """Say what was understood of an experiment, what is suspicious, and what such a test can and cannot tell.
+
+    The plain model is fitted roughly, in a few seconds an experiment; `fit` and `discover` give the numbers to rely on.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+        What was measured; a path names an experiment file.
+    experiment : str, optional
+        This experiment only.
+    own_effects : path, optional
+        A Python file with effects of your own.
+    seed : int
+    output : path, optional
+        Folder for ``check.json`` and a picture of each experiment, ``NAME.png``; a temporary one when left out.
+    progress : function of (name, done, total), optional
+        Called as the work goes on.
+
+    Returns
+    -------
+    Check
+
+    Raises
+    ------
+    InputError
+        The file is bad: says where, what was found and what was expected.
+
+    Examples
+    --------
+    >>> checked = wb.check("experiments.toml", experiment="kite-1.5m")
+    >>> checked
+    Check(kite-1.5m: 8 holds, 40 readings)
+    >>> found = checked.summary()["experiments"]["kite-1.5m"]
+    >>> found["holds"][0]["displacement_mm"], found["unrecorded_holds"], found["duration_s"]
+    (1.0, 1, 1080.0)
+    >>> found["parameters"]["k1"]["told_by"]
+    'data'
+    >>> found["effects"]["guide_friction"]["shows"]  # needs unloading
+    'no'
+    """
+    seed, own, report = check_seed(seed), path_of(own_effects), progress or silent
+    experiments = experiments_of(source, experiment)
+    kinds = catalogue(own)
+    configuration = {
+        "command": "check", "version": __version__, "seed": seed, "own_effects": source_of(own),
+        "priors": {e.name: e.priors for e in experiments}, "data_sha256": {e.name: e.data_hash for e in experiments},
+    }  # fmt: skip
+    place = Place.at(output)
+    run = open_run(place.path, configuration)
+    if run.state != "done":
+        from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
+
+        found = {}
+        for done, e in enumerate(experiments):
+            report("check", done, len(experiments))
+            told = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
+            warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *told.warnings]
+            found[e.name] = _understood(e) | {
+                "warnings": warnings, "parameters": told.parameters, "effects": told.effects,
+            }  # fmt: skip
+            understood(e, place.path / f"{e.name}.png")
+        report("check", len(experiments), len(experiments))
+        write_json(place.path / CHECKED, {"experiments": found})
+        run.finish()
+    return Check(place, own, computed=run.state != "done")
+
+
+def _understood(e: Experiment) -> dict[str, Any]:
+    """What the files say, as plain values."""
+    holds = [
+        {
+            "number": hold.number, "displacement_mm": hold.displacement_mm, "start_s": hold.start_s,
+            "duration_s": hold.duration_s, "readings": int(hold.time_s.size),
+            "first_s": float(hold.time_s[0]) if hold.recorded else None,
+            "first_N": float(hold.tension_N[0]) if hold.recorded else None,
+            "last_N": float(hold.tension_N[-1]) if hold.recorded else None,
+        }
+        for hold in e.holds
+    ]  # fmt: skip
+    recorded = e.recorded_holds
+    temperatures = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
+    return {
+        "material": e.material, "length_mm": e.length_mm, "resolution_N": e.resolution_N or None,
+        "holds": holds, "recorded_holds": len(recorded), "unrecorded_holds": len(e.holds) - len(recorded),
+        "readings": sum(hold.time_s.size for hold in recorded),
+        "duration_s": sum(hold.duration_s for hold in e.holds),
+        "temperature_C": [float(min(map(np.min, temperatures))), float(max(map(np.max, temperatures)))]
+        if temperatures else None,
+    }  # fmt: skip
