@@ -212,6 +212,10 @@ def test_a_person_is_asked_and_the_answer_holds(tmp_path):
         questions.append(question.question)
         return list(question.answers)[0]
 
+    with pytest.raises(
+        Undecided, match="--map .Zeit=time .s.*; besides, undecided: line 1, column 3 .Kraft.: found no"
+    ):
+        wb.import_bench(raw, length_mm=1000)
     imported = wb.import_bench(raw, length_mm=1000, ask=ask)
     assert questions == ["the unit of time", "the unit of tension"]
     assert imported.experiments[0].tension()[0, 0] == 2.1

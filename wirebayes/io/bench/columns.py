@@ -22,7 +22,7 @@ _WORDS: dict[Role, tuple[str, ...]] = {
         "escalon", "paso", "passo", "gradino", "stap", "degrau", "段階",
     ),
     "displacement": (
-        "displacement", "extension", "elongation", "position", "stroke", "crosshead", "travel", "stretch", "weg",
+        "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
         "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp",
@@ -96,13 +96,20 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
             raise InputError(f"--map: found {found}, expected one column for it")
         roles[known] = _column(table, index, known, unit)
     free = [i for i, name in enumerate(table.header) if name and i not in taken]
+    open_questions: list[Undecided] = []
     for role in ROLES:
-        if role not in roles:
-            likely = [i for i in free if _may_be(table, i, role)]
+        likely = [i for i in free if _may_be(table, i, role)] if role not in roles else []
+        try:
             if len(likely) > 1:
                 raise _several(table, likely, role)
             if likely:
                 roles[role] = _column(table, likely[0], role, None)
+        except Undecided as question:
+            open_questions.append(question)
+    if open_questions:
+        first, *others = open_questions
+        path = f"{table.sheet.path}, "
+        raise Undecided(first.found, first.question, first.answers, [q.found.removeprefix(path) for q in others])
     for role in _NEEDED:
         if role not in roles:
             raise _missing(table, free, role)
@@ -240,7 +247,7 @@ def _plain(text: str) -> str:
     return unicodedata.normalize("NFC", joined).strip(" .:_#")
 
 
-def _several(table: RawTable, likely: Sequence[int], role: Role) -> InputError:
+def _several(table: RawTable, likely: Sequence[int], role: Role) -> Undecided:
     names = [table.header[i] for i in likely]
     return Undecided(
         f"{table.sheet.path}, line {table.header_line}: found {listed(names)}, each of which may be the {role}",

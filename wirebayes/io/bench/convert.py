@@ -1,6 +1,7 @@
 """A raw file of a bench as the experiment that it holds, with everything that was understood on the way."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -149,7 +150,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     recording = None
     if holds.of_test:
         since = values["time"] - values["time"][0]
-        starts = np.array([since[of_hold[0]] for of_hold in holds.rows])
+        starts = np.array([since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)])
         recording = Recording(since, values["displacement"], values["tension"], starts)
     return Converted(experiment, rows, header, notes, recording)
 
@@ -202,7 +203,8 @@ def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, l
 def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> str:
     parts = []
     for role, column in columns.items():
-        unit = f" in {column.unit.text}" if column.unit and column.unit.text != UNITS.get(role) else ""
+        stated = column.unit is None or column.unit.text in (UNITS[role], *re.split(r"[\s()\[\]/_,]+", column.header))
+        unit = "" if stated or column.unit is None else f" in {column.unit.text}"
         how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
         how += " (its weight)" if column.unit and column.unit.is_mass else ""
         parts.append(f"{role} from {column.header!r}{unit}{how}")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.plateaus import noise_of, plateaus
+from wirebayes.io.bench.plateaus import Plateau, noise_of, plateaus
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 
@@ -21,6 +21,9 @@ CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
 STEADY = 0.25  # of the smallest step: less scatter in a hold is the encoder's
+ARRIVING = 2  # readings by which the end of a move is known: none of them counts
+LONG = 10  # times as many readings: shorter holds have none to spare
+AFTER_MOVE = 0.1  # of a hold at most is left out after a slow move
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
 
 
@@ -196,8 +199,9 @@ def _by_plateaus(readings: Readings, note: str) -> Cut:
         found = f"a displacement that stays in {share}, {len(found_holds)} time{'s' * (len(found_holds) != 1)}"
         expected = "at least two displacements that are held while tension is read (or a column of hold numbers)"
         raise readings.complain(row, "displacement", found, expected)
-    rows = [np.arange(p.begin, p.end) for p in found_holds]
-    moves = [time[b.begin] - time[a.end - 1] for a, b in zip(found_holds, found_holds[1:], strict=False)]
+    ends = [0, *(p.left - 1 for p in found_holds[:-1])]
+    moves = [float(time[p.begin] - time[end]) for p, end in zip(found_holds, ends, strict=True)]
+    rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
     noise = noise_of(x, readings.displacement_step_mm)
     notes = [note] if note else []
     notes.append(
@@ -205,11 +209,21 @@ def _by_plateaus(readings: Readings, note: str) -> Cut:
         f"{noise:.2g} mm or so, {len(x) - kept} readings of moves dropped"
     )
     notes.append(
-        f"each hold begins when its displacement is reached; moves took {np.median(moves):.3g} s in the middle and "
-        "count as no time"
+        f"each hold begins when its displacement is reached; moves took {np.median(moves):.3g} s (median) and "
+        "count as no time, so readings as soon after a move are left out: the wire crept while it moved"
     )
-    since = [time[r] - time[r[0]] for r in rows]
+    since = [time[r] - time[p.begin] for r, p in zip(rows, found_holds, strict=True)]
     return Cut(rows, list(range(1, len(rows) + 1)), [_level(x[r]) for r in rows], since, True, notes)
+
+
+def _after_move(time: Floats, hold: Plateau, move_s: float) -> NDArray[np.int64]:
+    """The rows of a hold that are as long after the move before it as that move took, or nearly all."""
+    rows = np.arange(hold.begin, hold.end)
+    since = time[rows] - time[hold.begin]
+    if move_s <= 0.0 or len(rows) <= LONG * ARRIVING:
+        return rows
+    wait = min(move_s, AFTER_MOVE * float(since[-1]))
+    return rows[max(ARRIVING, int(np.searchsorted(since, wait))) :]
 
 
 def _level(x: Floats) -> float:

@@ -32,11 +32,14 @@ class Plateau:
     begin, end : int
         First reading, and the one after the last.
     level : float
+    left : int
+        The reading at which the next move may begin: a few after `end`, which are not trusted.
     """
 
     begin: int
     end: int
     level: float
+    left: int
 
 
 def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
@@ -71,8 +74,9 @@ def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
         if end - begin < FEWEST or _drift(x[begin:end]) > min(LEAN * noise, STAIRS * apart):
             continue
         begin, end = _trimmed(x, begin, end, scatter)
+        left, end = end, end - EDGE if end - begin > LONG * EDGE else end
         if end - begin >= FEWEST and lasts >= SHORTEST_SHARE * usual:
-            found.append(Plateau(begin, end, float(np.median(x[begin:end]))))
+            found.append(Plateau(begin, end, float(np.median(x[begin:end])), left))
     return found
 
 
@@ -133,7 +137,7 @@ def _trimmed(x: Floats, begin: int, end: int, scatter: float) -> tuple[int, int]
     if not len(first) or not len(last):
         return begin, begin
     begin, end = begin + int(first[0]), begin + int(last[-1]) + edge
-    return begin, end - EDGE if end - begin > LONG * EDGE else end
+    return begin, end
 
 
 def _drift(x: Floats) -> float:

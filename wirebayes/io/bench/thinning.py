@@ -13,7 +13,7 @@ def thinned(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
     Parameters
     ----------
     time_s : (r,) array
-        Since the hold began, rising.
+        Since the hold began, rising from 0 or later.
 
     Returns
     -------
@@ -23,8 +23,8 @@ def thinned(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
     count = len(time_s)
     if count <= MOST:
         return np.arange(count)
-    since = time_s - time_s[0]
-    targets = np.concatenate([[0.0], np.geomspace(since[1], since[-1], KEPT - 1)])
-    after = np.searchsorted(since, targets).clip(1, count - 1)
-    nearest = np.where(targets - since[after - 1] < since[after] - targets, after - 1, after)
+    begin = time_s[0] if time_s[0] > 0 else time_s[1]
+    targets = np.concatenate([time_s[:1], np.geomspace(begin, time_s[-1], KEPT - 1)])
+    after = np.searchsorted(time_s, targets).clip(1, count - 1)
+    nearest = np.where(targets - time_s[after - 1] < time_s[after] - targets, after - 1, after)
     return np.unique(np.concatenate([nearest, [count - 1]]))

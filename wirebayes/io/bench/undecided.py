@@ -54,11 +54,14 @@ class Undecided(InputError):
         What is to be decided, in the words of a person who asks.
     answers : mapping of str to str
         What each answer means, by the option that says so.
+    more : sequence of str
+        What will have to be decided besides, so that all can be said at once.
     """
 
-    def __init__(self, found: str, question: str, answers: Mapping[str, str]) -> None:
+    def __init__(self, found: str, question: str, answers: Mapping[str, str], more: Sequence[str] = ()) -> None:
         options = listed([quoted(option) for option in answers], "or")
-        super().__init__(f"{found}; expected {options} to say {question}")
+        besides = f"; besides, undecided: {'; '.join(more)}" if more else ""
+        super().__init__(f"{found}; expected {options} to say {question}{besides}")
         self.found, self.question, self.answers = found, question, dict(answers)
 
 

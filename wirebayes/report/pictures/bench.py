@@ -53,6 +53,7 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
             upper.annotate(str(hold.number), (float(ends.mean()), 1.02), xycoords=("data", "axes fraction"),
                            ha="center", va="bottom", fontsize=7.5, color=INK)  # fmt: skip
         time = (start + hold.time_s) / scale
+        lower.plot(time, hold.tension_N, color=QUIET, lw=1.0, zorder=2)
         lower.plot(time, hold.tension_N, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))
         row += 1
     upper.set_ylabel("displacement, mm")
