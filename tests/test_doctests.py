@@ -92,7 +92,7 @@ def test_findings_and_their_posteriors_are_saved_and_loaded_again(shared, tmp_pa
 
 
 @pytest.mark.parametrize(
-    "name", ["posterior", "findings", "many", "comparison", "stiffening", "held", "lengths", "exported"]
+    "name", ["posterior", "findings", "many", "planned", "comparison", "stiffening", "held", "lengths", "exported"]
 )
 def test_a_result_shows_itself_in_a_line_and_in_a_table(name, shared):
     value = shared[1][name]

@@ -17,6 +17,7 @@ LAYERS: list[set[str]] = [
     {"results"},
     {"prediction"},
     {"comparison", "discovery"},
+    {"planning"},
     {"report"},
     {"reproduce"},
     {"workflows"},

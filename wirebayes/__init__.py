@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.list_effects import list_effects as list_effects
     from wirebayes.workflows.load import load as load
     from wirebayes.workflows.new_experiment import new_experiment as new_experiment
+    from wirebayes.workflows.plan import plan as plan
     from wirebayes.workflows.pose import pose as pose
     from wirebayes.workflows.predict import predict as predict
     from wirebayes.workflows.reproduce_paper import reproduce_paper as reproduce_paper
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.results import Export as Export
     from wirebayes.workflows.results import Findings as Findings
     from wirebayes.workflows.results import ImportedTests as ImportedTests
+    from wirebayes.workflows.results import Plan as Plan
     from wirebayes.workflows.results import Pose as Pose
     from wirebayes.workflows.results import Posterior as Posterior
     from wirebayes.workflows.results import Posteriors as Posteriors
@@ -57,6 +59,7 @@ _PLACES = {
     "compare": "wirebayes.workflows.compare",
     "discover": "wirebayes.workflows.discover",
     "batch": "wirebayes.workflows.batch",
+    "plan": "wirebayes.workflows.plan",
     "predict": "wirebayes.workflows.predict",
     "simulate_tests": "wirebayes.workflows.simulate_tests",
     "load": "wirebayes.workflows.load",
@@ -72,6 +75,7 @@ _PLACES = {
     "Posteriors": "wirebayes.workflows.results",
     "Batch": "wirebayes.workflows.results",
     "Findings": "wirebayes.workflows.results",
+    "Plan": "wirebayes.workflows.results",
     "Comparison": "wirebayes.workflows.results",
     "ImportedTests": "wirebayes.workflows.results",
     "Check": "wirebayes.workflows.results",

@@ -74,6 +74,12 @@ COMMANDS = {
         "Fit and discover many experiments, each on its own, in one table.",
         "wirebayes batch lot-1.toml lot-2.toml --output out/batch",
     ),
+    "plan": Command(
+        "wirebayes.cli.plan",
+        "plan",
+        "What a test would teach before it is done.",
+        "wirebayes plan plan.toml --budget-min 60 --output out/plan",
+    ),
     "predict": Command(
         "wirebayes.cli.predict",
         "predict",

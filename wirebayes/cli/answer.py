@@ -13,6 +13,7 @@ from wirebayes.workflows.results import (
     Comparison,
     Findings,
     ImportedTests,
+    Plan,
     Pose,
     Posterior,
     Posteriors,
@@ -63,6 +64,8 @@ def answer(result: Result) -> list[str]:
         return [line for name, report in found["experiments"].items() for line in _finding(name, report)]
     if isinstance(result, Batch):
         return _batch(found)
+    if isinstance(result, Plan):
+        return [line for row in found["protocols"] for line in _planned(row)]
     if isinstance(result, Comparison):
         return [_comparison(name, table) for name, table in found["experiments"].items()]
     if isinstance(result, Pose):
@@ -87,6 +90,8 @@ def next_step(result: Result) -> str:
         return f"wirebayes predict {folder} PROTOCOL.csv --output FILE.csv, or wirebayes pose ROBOT.toml --wires DIR"
     if isinstance(result, Findings):
         return " ".join(f"{name}: {r['next_measurement']}" for name, r in result.report["experiments"].items())
+    if isinstance(result, Plan):
+        return f"do {result.best['words'] or 'the test ' + result.best['name']}, then wirebayes discover FILE.toml"
     if isinstance(result, Batch):
         predicted = f"wirebayes predict {folder} PROTOCOL.csv --experiment NAME --output FILE.csv"
         return f"read {folder / 'summary.csv'}; {predicted}"
@@ -159,6 +164,18 @@ def _batch(found: dict[str, Any]) -> list[str]:
         lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
     lines += [f"  apart: {outlier['sentence']}" for outlier in far[:_MOST_LINES]]
     return lines + ([f"  and {len(far) - _MOST_LINES} more outliers"] if len(far) > _MOST_LINES else [])
+
+
+def _planned(row: dict[str, Any]) -> list[str]:
+    budget = "" if row["within_budget"] else ", longer than there is time"
+    lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
+    known = [f"{name} {row['parameters'][name]['sd_median']:.2g}" for name in _SHOWN if name in row["parameters"]]
+    creep = row["creep"]
+    known.append(f"creep after 1 h at {creep['tension_N']:.3g} N {creep['creep_1h_mm']['sd_median']:.2g} mm")
+    lines.append(f"  expected sd: {', '.join(known)}")
+    if row["robot"] is not None and row["robot"]["drift_sd_mm"] is not None:
+        lines.append(f"  drift of the robot after 1 h: sd {row['robot']['drift_sd_mm']:.2g} mm")
+    return lines
 
 
 _MOST_LINES = 10  # of outliers, on a terminal

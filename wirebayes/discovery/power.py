@@ -129,14 +129,21 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
 
 
 @dataclass(frozen=True)
-class _Plan:
-    """A measurement one could make next, in words and as holds."""
+class MeasurementPlan:
+    """A measurement one could make next: in words, and as holds at displacements, each read at the same times."""
 
     words: str
-    protocol: Protocol
+    displacement_mm: Array
+    times_s: Array
+    length_mm: float
+
+    @property
+    def protocol(self) -> Protocol:
+        """Its holds."""
+        return _holds(self.displacement_mm, self.times_s, self.length_mm)
 
 
-def _plans(p: Protocol, alone: bool) -> list[_Plan]:
+def alternatives(p: Protocol, alone: bool) -> list[MeasurementPlan]:
     """What could be done with a sample instead; `alone` if there is no other, whose displacements would differ."""
     recorded = p.recorded
     x = p.displacement_mm[recorded]
@@ -150,10 +157,13 @@ def _plans(p: Protocol, alone: bool) -> list[_Plan]:
     last = f" from {x.max():g} to {x.min():g} mm" if alone else ", of every sample"
     back = f"the same displacements back{last}, each held {times[-1]:g} s"
     return [
-        _Plan(f"unload the wire after the last hold: {back}", _holds(there_and_back, times, p.length_mm)),
-        _Plan(f"hold each of the displacements {span} for {dense}", _holds(x, log_times, p.length_mm)),
-        _Plan(f"load and unload over {span}, each hold {dense}", _holds(there_and_back, log_times, p.length_mm)),
-        _Plan(f"take twice as many, half as large steps over {span}", _holds(halved, times, p.length_mm)),
+        MeasurementPlan(words, displacements, moments, p.length_mm)
+        for words, displacements, moments in (
+            (f"unload the wire after the last hold: {back}", there_and_back, times),
+            (f"hold each of the displacements {span} for {dense}", x, log_times),
+            (f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
+            (f"take twice as many, half as large steps over {span}", halved, times),
+        )
     ]
 
 
@@ -191,7 +201,7 @@ def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakes
     if not trials:
         return "No candidate remains; repeating the same holds would narrow the parameters."
     planned = [_another_length(problem)]
-    for plans in zip(*(_plans(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
+    for plans in zip(*(alternatives(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
         protocols = [plan.protocol for plan in plans]
         empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
         planned.append((plans[0].words, with_protocols(problem, protocols, empty)))

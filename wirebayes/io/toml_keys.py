@@ -23,12 +23,14 @@ class Keys:
     text : str
         The whole file, to find lines in: the parser does not keep them.
     index : int or None
-        Which ``[[experiment]]`` the table belongs to, from 0; None for the top level.
+        Which ``[[experiment]]`` (or other `kind`) the table belongs to, from 0; None for the top level.
     table : dict
     name : str
         The experiment's name, where it has one.
     prefix : str
         The way from the experiment to this table.
+    kind : str
+        What the tables of the file are called.
     """
 
     source: Path
@@ -37,16 +39,17 @@ class Keys:
     table: dict[str, Any]
     name: str = ""
     prefix: str = ""
+    kind: str = "experiment"
 
     def complain(self, key: str, found: str, expected: str) -> InputError:
         place = f"{self.source}, line {self.line(key)}"
         if self.index is not None:
-            place += f", experiment {_printable(self.name) or self.index + 1}"
+            place += f", {self.kind} {_printable(self.name) or self.index + 1}"
         return InputError(f"{place}, key {self.prefix}{_printable(key)}: found {found}, expected {expected}")
 
     def line(self, key: str) -> int:
         """The line on which a key stands."""
-        return line_of(self.text, self.prefix + key, self.index)
+        return line_of(self.text, self.prefix + key, self.index, self.kind)
 
     def only(self, known: tuple[str, ...]) -> None:
         for key in self.table:
@@ -91,7 +94,7 @@ class Keys:
         return tables
 
 
-def line_of(text: str, key: str, index: int | None = None) -> int:
+def line_of(text: str, key: str, index: int | None = None, kind: str = "experiment") -> int:
     """The line of a TOML file on which a key stands; of the innermost table found on the way to it otherwise.
 
     Parameters
@@ -101,9 +104,11 @@ def line_of(text: str, key: str, index: int | None = None) -> int:
         With the names of its tables, such as ``prior.k1.sd``.
     index : int, optional
         The ``[[experiment]]`` to look in, from 0; without it the whole file.
+    kind : str
+        What such tables are called.
     """
     lines = text.split("\n")
-    tables = [at for at, line in enumerate(lines) if line.strip().startswith("[[experiment]]")]
+    tables = [at for at, line in enumerate(lines) if line.strip().startswith(f"[[{kind}]]")]
     begin, end = 0, len(lines)
     if index is not None and index < len(tables):
         begin, end = tables[index], [*tables, end][index + 1]

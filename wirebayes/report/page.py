@@ -19,6 +19,7 @@ _TELLERS = {
     "batch": "wirebayes.report.pages.batch",
     "compare": "wirebayes.report.pages.compare",
     "discover": "wirebayes.report.pages.discover",
+    "plan": "wirebayes.report.pages.plan",
     "pose": "wirebayes.report.pages.pose",
     "calibrate": "wirebayes.report.pages.calibrate",
 }

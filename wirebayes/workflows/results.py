@@ -414,6 +414,49 @@ class Batch(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
+    """What each of several tests would teach, the best first.
+
+    Examples
+    --------
+    >>> [row["name"] for row in planned.protocols][0] == planned.best["name"]
+    True
+    """
+
+    _content: ClassVar[str] = "plan.json"
+
+    @cached_property
+    def protocols(self) -> list[dict[str, Any]]:
+        """Each test with its expected widths and what it would show, the best first."""
+        return list(self.summary()["protocols"])
+
+    @property
+    def best(self) -> dict[str, Any]:
+        """The first of them."""
+        return self.protocols[0]
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """That no test fits the time there is, if so."""
+        found = self.summary()
+        if found["protocols"][0]["within_budget"]:
+            return ()
+        return (f"no test is done within {found['budget_min']:g} min",)
+
+    def _shortly(self) -> list[str]:
+        return [f"{len(self.protocols)} protocols", f"best {self.best['name']}"]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [row["name"], _figure(row["duration_min"]), _figure(row["information_bits"])]
+            + [_figure(row["parameters"].get(n, {}).get("sd_median")) for n in ("k1", "B", "k2")]
+            for row in self.protocols
+        ]
+        header = ["protocol", "minutes", "bits", "sd of k1, N", "sd of B", "sd of k2"]
+        return html_table(repr(self), header, rows, self.messages)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Result):
     """Models side by side on readings that their fits have not seen.
 

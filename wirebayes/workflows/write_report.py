@@ -12,7 +12,8 @@ def write_report(folder: PathLike | Result) -> Path:
     Parameters
     ----------
     folder : path, or what a function returned
-        The folder of a ``fit``, ``compare``, ``discover``, ``batch``, ``pose``, ``calibrate`` or ``reproduce``.
+        The folder of a ``fit``, ``compare``, ``discover``, ``batch``, ``plan``, ``pose``, ``calibrate`` or
+        ``reproduce``.
 
     Returns
     -------

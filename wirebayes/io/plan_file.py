@@ -1,0 +1,253 @@
+"""A plan: tests that could be done, what is guessed of the wire, and what they are for; read from TOML."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.io.experiment import ENOUGH, LEAST_HOLDS, LEAST_READINGS, SHORTEST
+from wirebayes.io.readings import LARGEST, STRETCH, read_text, shown
+from wirebayes.io.toml_keys import Keys, read_toml
+from wirebayes.units import nearest
+
+KIND = "protocol"
+GUESSED = ("k1", "B", "U", "k2", "N", "preload", "sensor_sd", "setting_sd")
+MOST_READINGS = 20_000  # of a protocol: a plan simulates it hundreds of times
+_TOP = ("material", "budget_min", "robot", "aim", "posterior", "guess", "prior", KIND)
+_KEYS = ("name", "length_mm", "resolution_N", "displacements_mm", "step_mm", "holds", "unload", "times_s", "hold_s",
+         "readings", "temperatures_C")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """One test that could be done.
+
+    Attributes
+    ----------
+    name : str
+    length_mm, resolution_N : float
+    displacements_mm : tuple of float
+        One a hold, the way back included.
+    times_s : tuple of float
+        Reading times of each hold.
+    temperatures_C : tuple of float
+        At evenly spaced moments of the test; empty for none.
+    """
+
+    name: str
+    length_mm: float
+    resolution_N: float
+    displacements_mm: tuple[float, ...]
+    times_s: tuple[float, ...]
+    temperatures_C: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    """The content of a plan file.
+
+    Attributes
+    ----------
+    source : Path
+    tests : tuple of PlannedTest
+        Empty where the file leaves the choice to the toolkit.
+    material : str
+    guess : dict of name to table
+        As written: a distribution as in ``[prior]``, or a number.
+    guess_lines : dict of name to line
+    posterior : Path or None
+        Folder of an earlier fit whose draws are the guess.
+    priors : dict of name to table
+        Of the fit to come.
+    prior_lines : dict of name to line
+    budget_min : float or None
+    robot : str or None
+        Name or file of a robot.
+    aim : tuple of str
+        ``("parameters",)``, ``("creep",)``, or two effects to tell apart.
+    """
+
+    source: Path
+    tests: tuple[PlannedTest, ...]
+    material: str = "line"
+    guess: dict[str, Any] = field(default_factory=dict)
+    guess_lines: dict[str, int] = field(default_factory=dict)
+    posterior: Path | None = None
+    priors: dict[str, dict[str, Any]] = field(default_factory=dict)
+    prior_lines: dict[str, int] = field(default_factory=dict)
+    budget_min: float | None = None
+    robot: str | None = None
+    aim: tuple[str, ...] = ("parameters",)
+
+
+def is_plan(path: Path) -> bool:
+    """Whether a TOML file has no ``[[experiment]]``, so that it is read as a plan."""
+    return "experiment" not in read_toml(path, read_text(path, "TOML of a plan, or of experiments"))
+
+
+def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
+    """Read a plan file.
+
+    Parameters
+    ----------
+    path : Path
+    effects : sequence of str
+        Effects that an aim may name.
+
+    Raises
+    ------
+    InputError
+        On anything wrong, with the file, the line, the key, what was found and what was expected.
+    """
+    text = read_text(path, "TOML with [[protocol]] tables")
+    document = read_toml(path, text)
+    top = Keys(path, text, None, document, kind=KIND)
+    top.only(_TOP)
+    tables = document.get(KIND, [])
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
+        found = "nothing" if KIND not in document else "a single table" if isinstance(tables, dict) else shown(tables)
+        raise top.complain(KIND, found, "at least one [[protocol]]")
+    tests: list[PlannedTest] = []
+    for index, table in enumerate(tables):
+        name = table.get("name", f"protocol-{index + 1}")
+        keys = Keys(path, text, index, table, name if isinstance(name, str) else "", kind=KIND)
+        test = _planned(keys, index)
+        if any(test.name == other.name for other in tests):
+            raise keys.complain("name", shown(test.name) + " a second time", "a name used once in the file")
+        tests.append(test)
+    guess = _guess(top)
+    posterior = _path(top, "posterior", "the folder of a fit")
+    if posterior is not None and guess:
+        raise top.complain("posterior", "a posterior beside a [guess]", "one of them")
+    expected = "a time budget above 0 min"
+    budget = top.number("budget_min", expected, above=0.0) if "budget_min" in document else None
+    robot = top.string("robot", "a robot's name or file") if "robot" in document else None
+    if robot is not None and (path.parent / robot).is_file():
+        robot = str(path.parent / robot)
+    material = top.string("material", "a name") if "material" in document else "line"
+    priors = top.priors()
+    return PlanFile(
+        path, tuple(tests), material, guess, {n: top.line(f"guess.{n}") for n in guess}, posterior, priors,
+        {n: top.line(f"prior.{n}") for n in priors}, budget, robot, _aim(top, effects),
+    )  # fmt: skip
+
+
+def _planned(keys: Keys, index: int) -> PlannedTest:
+    keys.only(_KEYS)
+    name = keys.string("name", "a name") if "name" in keys.table else f"protocol-{index + 1}"
+    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {LARGEST['displacement_mm']:.0e} mm"
+    length = keys.number("length_mm", expected, least=SHORTEST, most=LARGEST["displacement_mm"])
+    resolution = 0.01
+    if "resolution_N" in keys.table:
+        resolution = keys.number("resolution_N", "a step of 0 N or more", least=0.0, most=LARGEST["tension_N"])
+    path = _displacements(keys, length)
+    if "unload" in keys.table:
+        expected = f"a whole number of holds on the way back, 0 to {len(path) - 1}"
+        back = _whole(keys, "unload", expected, 0, len(path) - 1)
+        path += path[-2 : -2 - back : -1]
+    times = _times(keys)
+    if len(path) < LEAST_HOLDS or len(path) * len(times) < LEAST_READINGS:
+        raise keys.complain(
+            "times_s" if "times_s" in keys.table else "readings", f"{len(path)} holds of {len(times)}", ENOUGH
+        )
+    if len(path) * len(times) > MOST_READINGS:
+        raise keys.complain(
+            "times_s" if "times_s" in keys.table else "readings", f"{len(path) * len(times)} readings in all",
+            f"at most {MOST_READINGS}",
+        )  # fmt: skip
+    warmth: list[float] = []
+    if "temperatures_C" in keys.table:
+        warmth = _numbers(keys, "temperatures_C", "a list of temperatures above -273.15 °C")
+        if not warmth or min(warmth) <= -273.15:
+            raise keys.complain("temperatures_C", shown(warmth), "a list of temperatures above -273.15 °C")
+    return PlannedTest(name, length, resolution, tuple(path), tuple(times), tuple(warmth))
+
+
+def _displacements(keys: Keys, length: float) -> list[float]:
+    expected = f"displacements above -{length:g} mm, the wire's length, and of at most {STRETCH:g} times it"
+    if "displacements_mm" in keys.table:
+        for other in ("step_mm", "holds"):
+            if other in keys.table:
+                raise keys.complain(other, f"{other} beside displacements_mm", "one way to say it")
+        path, said = _numbers(keys, "displacements_mm", expected), "displacements_mm"
+    else:
+        step = keys.number("step_mm", "a step other than 0 mm, or displacements_mm")
+        if step == 0:
+            raise keys.complain("step_mm", "0", "a step other than 0 mm")
+        count = _whole(keys, "holds", "a whole number of holds, 2 or more", LEAST_HOLDS, MOST_READINGS)
+        path, said = [step * (i + 1) for i in range(count)], "step_mm"
+    if not path or min(path) <= -length or max(path) > STRETCH * length:
+        raise keys.complain(said, shown(keys.table[said]), expected)
+    return path
+
+
+def _times(keys: Keys) -> list[float]:
+    if "times_s" in keys.table:
+        for other in ("hold_s", "readings"):
+            if other in keys.table:
+                raise keys.complain(other, f"{other} beside times_s", "one way to say it")
+        expected = "rising times from 0 s on"
+        times = _numbers(keys, "times_s", expected)
+        if not times or times[0] < 0 or times[-1] > LARGEST["time_s"] or (np.diff(times) <= 0).any():
+            raise keys.complain("times_s", shown(keys.table["times_s"]), expected)
+        return times
+    expected = f"how long each hold lasts, above 0 s and at most {LARGEST['time_s']:.0e} s, or times_s"
+    duration = keys.number("hold_s", expected, above=0.0, most=LARGEST["time_s"])
+    count = 5  # the paper's
+    if "readings" in keys.table:
+        count = _whole(keys, "readings", "a whole number of readings in a hold, 2 or more", 2, MOST_READINGS)
+    return [float(t) for t in np.linspace(0.0, duration, count)]
+
+
+def _whole(keys: Keys, key: str, expected: str, least: int, most: int) -> int:
+    value = keys.value(key, expected)
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise keys.complain(key, shown(value), expected)
+    return value
+
+
+def _numbers(keys: Keys, key: str, expected: str) -> list[float]:
+    values = keys.value(key, expected)
+    if not isinstance(values, list):
+        raise keys.complain(key, shown(values), f"a list of {expected}")
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < np.inf:
+            raise keys.complain(key, shown(value), expected)
+    return [float(value) for value in values]
+
+
+def _guess(top: Keys) -> dict[str, Any]:
+    table = top.table.get("guess", {})
+    if not isinstance(table, dict):
+        raise top.complain("guess", shown(table), "a table of parameters")
+    inner = replace(top, table=table, prefix="guess.")
+    for name, value in table.items():
+        if name not in GUESSED:
+            raise inner.complain(name, f"an unknown parameter{nearest(name, GUESSED)}", ", ".join(GUESSED))
+        if isinstance(value, bool) or not isinstance(value, int | float | dict):
+            raise inner.complain(name, shown(value), 'a number, or a table such as { distribution = "normal", … }')
+    return table
+
+
+def _path(top: Keys, key: str, expected: str) -> Path | None:
+    if key not in top.table:
+        return None
+    path = top.source.parent / top.string(key, expected)
+    if not path.is_dir():
+        raise top.complain(key, f"{shown(top.table[key])}, which is no folder there", expected)
+    return path
+
+
+def _aim(top: Keys, effects: Sequence[str]) -> tuple[str, ...]:
+    aim = top.table.get("aim", "parameters")
+    if aim in ("parameters", "creep"):
+        return (str(aim),)
+    expected = '"parameters", "creep", or a list of two effects to tell apart'
+    if not (isinstance(aim, list) and len(aim) == 2 and all(isinstance(name, str) for name in aim)):
+        raise top.complain("aim", shown(aim), expected)
+    for name in aim:
+        if name not in effects:
+            raise top.complain("aim", f"{shown(name)}{nearest(name, effects)}", expected)
+    return tuple(aim)

@@ -1,0 +1,83 @@
+"""Draws of what is guessed of a wire before a test: from a plan's tables, an earlier fit, or readings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.inference.rough_draws import draws as rough_draws
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.prior import from_table, wire_defaults
+from wirebayes.model.problem import MATERIAL, SAMPLE
+from wirebayes.wire.laws import ElasticLaw, History
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class GuessedWire:
+    """Draws of a wire's parameters, for a sample of one length.
+
+    Attributes
+    ----------
+    draws : dict of name to (n,) array
+        Parameters of the plain model.
+    length_mm : float
+        What `B` refers to.
+    source : str
+        Where the guess comes from, in words.
+    """
+
+    draws: dict[str, Array]
+    length_mm: float
+    source: str
+
+    def at(self, length_mm: float) -> dict[str, Array]:
+        """The draws for a sample of another length: creep is a strain of the whole wire."""
+        return self.draws | {"B": self.draws["B"] * (length_mm / self.length_mm)}
+
+
+def from_tables(
+    tables: Mapping[str, Any], lines: Mapping[str, int], source: Path, length_mm: float, n: int,
+    rng: np.random.Generator,
+) -> GuessedWire:  # fmt: skip
+    """A guess as a plan file writes it; what it leaves out is as wide as the model's prior.
+
+    Raises
+    ------
+    InputError
+        A table is no distribution.
+    """
+    defaults = wire_defaults(length_mm)
+    out = {}
+    for name in (*MATERIAL, *SAMPLE):
+        if name not in tables:
+            out[name] = defaults[name].rvs(n, random_state=rng)
+            continue
+        table = tables[name] if isinstance(tables[name], dict) else {"fixed": tables[name]}
+        found = from_table(f"{source}, line {lines[name]}: guess.{name}", table)
+        fixed = isinstance(found, float)
+        out[name] = np.full(n, found) if fixed else np.asarray(found.rvs(n, random_state=rng))
+    said = ", ".join(tables) if tables else "nothing"
+    return GuessedWire(out, length_mm, f"the plan's guess ({said} given, the rest as wide as the model's prior)")
+
+
+def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n: int) -> GuessedWire:
+    """Some of a posterior's draws, evenly spaced."""
+    count = len(draws["k1"])
+    pick = np.linspace(0, count - 1, min(n, count)).round().astype(int)
+    return GuessedWire({name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}, length_mm, source)
+
+
+def from_readings(
+    experiment: Experiment, n: int, rng: np.random.Generator, law: ElasticLaw, history: History
+) -> GuessedWire:
+    """A short run of the sampler on what was measured."""
+    block = fitted([experiment], (), law, history, rng)
+    theta = rough_draws(block.target, block.modes, rng, n)
+    own = block.target.problem.parameters(theta, block.target.problem.samples[0])
+    return GuessedWire(dict(own), experiment.length_mm, f"a quick fit of {experiment.name}")

@@ -1,0 +1,140 @@
+"""Which missing effects a test not yet done would show, how large they would have to be, and which it would confuse.
+
+The guess's centre stands for the fit. Tests simulated there, each refitted, give the level that chance reaches in the
+global test of `wirebayes.discovery`; an effect is seen where its evidence passes that level.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.discovery import power, screening
+from wirebayes.discovery.linear_scan import expand
+from wirebayes.discovery.screening import GlobalTest
+from wirebayes.discovery.settings import ALPHA
+from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.inference.modes import Optimum
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.problem import build
+from wirebayes.planning.widths import Guess, central
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.laws import ElasticLaw, History
+
+Array = NDArray[Any]
+SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
+
+
+@dataclass(frozen=True)
+class EffectPower:
+    """What a test would show of one effect.
+
+    Attributes
+    ----------
+    amplitude_80 : float or None
+        Smallest amplitude that the global test detects in 80 % of tests; None where none is large enough.
+    unit : str
+    delta_80 : float or None
+        That amplitude's signature, in standard deviations of what the readings leave it.
+    delta_prior : float
+        The same of an amplitude of one standard deviation of the effect's prior.
+    confused_with : tuple of str
+        Effects whose signatures are as good as the same (cosine above `power.ALIKE`).
+    """
+
+    amplitude_80: float | None
+    unit: str
+    delta_80: float | None
+    delta_prior: float
+    confused_with: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What a test would show of the catalogue.
+
+    Attributes
+    ----------
+    effects : dict of name to EffectPower
+    cosines : dict of (name, name) to float
+        Between signatures, free of what the parameters absorb.
+    hidden : tuple of str
+        Sentences: what the test cannot show at all.
+    """
+
+    effects: dict[str, EffectPower] = field(default_factory=dict)
+    cosines: dict[tuple[str, str], float] = field(default_factory=dict)
+    hidden: tuple[str, ...] = ()
+
+    def apart(self, one: str, other: str) -> float:
+        """How far two effects of prior size lie apart: the smaller δ, less what the other effect explains of it."""
+        if one not in self.effects or other not in self.effects:
+            return 0.0
+        smaller = min(self.effects[one].delta_prior, self.effects[other].delta_prior)
+        return smaller * float(np.sqrt(max(0.0, 1.0 - self.cosines[one, other] ** 2)))
+
+
+def sensitivity(
+    test: Experiment,
+    guess: Guess,
+    kinds: Mapping[str, type[Effect]],
+    rng: np.random.Generator,
+    *,
+    law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    simulations: int = SIMULATIONS,
+) -> Sensitivity:
+    """Find what a planned test would show of missing effects.
+
+    Parameters
+    ----------
+    test : Experiment
+        With the readings of `wirebayes.planning.widths.at_centre`.
+    guess : mapping of name to (n,) array
+    kinds : mapping of name to effect class
+    rng : numpy Generator
+    law, history
+        Of the plain model.
+    simulations : int
+        Refitted tests behind the level of chance.
+
+    Returns
+    -------
+    Sensitivity
+    """
+    block = _fit_at(test, central(guess), law, history)
+    trials, candidates = screening.candidate_probes([block], kinds)
+    hidden = power.not_identifiable(block, list(kinds.values()), [c.name for c in candidates])
+    if not candidates:
+        return Sensitivity(hidden=tuple(hidden))
+    null = screening.replicated(block, trials, simulations, rng).scan
+    chance = screening.by_name(candidates, [null])
+    level = GlobalTest(chance, {}, np.max([screening.surprises(v) for v in chance.values()], axis=0))
+    x = expand(block.target, block.modes.z[:1], trials)
+    alike = power.similarity([x], trials, [float(x.ratio[0])])
+    strength = np.median(null.norm, axis=0)
+    best: dict[str, int] = {}
+    for c in candidates:
+        if c.name not in best or strength[c.probe] > strength[best[c.name]]:
+            best[c.name] = c.probe
+    effects = {}
+    for name, k in best.items():
+        main = trials[k].effect.amplitudes[0]
+        seen = power.amplitude_80(null, trials[k], k, level.threshold(name, ALPHA))
+        confused = tuple(n for n in power.group_of([name], alike) if n != name)
+        delta = None if seen is None else seen * float(strength[k])
+        effects[name] = EffectPower(seen, main.unit, delta, float(strength[k] * main.prior.std()), confused)
+    return Sensitivity(effects, alike, tuple(hidden))
+
+
+def _fit_at(test: Experiment, centre: Mapping[str, float], law: ElasticLaw, history: History) -> LaplaceFit:
+    """The fit whose best parameters are the guess's centre."""
+    target = LogPosterior(build([test], law=law, history=history))
+    theta = np.array([[centre[name] for name in target.problem.names]])
+    z = target.coordinates.to_sampled(theta)
+    d = z.shape[1]
+    there = Optimum(z, target(z), np.eye(d)[None], np.array([True]))
+    return LaplaceFit((test,), (), law, history, target, there, np.empty((0, d)))

@@ -1,0 +1,277 @@
+"""How wide the posterior of a test not yet done will be: the test simulated many times, each fitted approximately.
+
+A truth is drawn from the guess, readings from the truth with setting, sensor and rounding errors. The posterior is
+climbed from the truth; draws of a Student t at the mode, weighted by the posterior, give its widths. So what bends the
+posterior is seen, and what a fit's priors add is in it; a second mode far from the truth is not.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.modes import Density, climb, rowwise
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import frozen
+from wirebayes.model.problem import MATERIAL, Problem, build
+from wirebayes.model.replicate import readings
+from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.staircase import simulate
+
+Array = NDArray[Any]
+Guess = Mapping[str, Array]
+HOUR_S = 3600.0
+_DRAWS = (500, 500, 3000)  # of each posterior, round by round: the last tell its width to some 5 %, tails included
+_ROWS = 16  # simulated tests weighted at once
+_KEPT = 400  # draws that are handed on of a posterior
+_NUMBERS = 4_000_000  # draws times readings at once, so that a long protocol does not fill the memory
+_WIDER = 1.4  # times as wide as the posterior is found to be: weights in its tails stay small
+_LEAST = 1e-6  # of the covariance before, so that a round in which one draw has all the weight can be drawn from
+_DEGREES = 4.0  # of the Student t: its tails cover those of a posterior near its mode
+
+
+@dataclass(frozen=True)
+class Width:
+    """Expected width of one quantity's posterior.
+
+    Attributes
+    ----------
+    sd : float
+        Its standard deviation, mean over the simulated tests.
+    sd_se : float
+        Standard error of that mean.
+    sd_median : float
+        Its median over the simulated tests, which a few odd draws of a vague guess do not move.
+    width_90 : float
+        Length of its 90 % interval, mean over the simulated tests.
+    width_90_low, width_90_high : float
+        Between which that length lies in 90 % of the tests.
+    guess_sd : float
+        Standard deviation before the test, of the guess.
+    """
+
+    sd: float
+    sd_se: float
+    sd_median: float
+    width_90: float
+    width_90_low: float
+    width_90_high: float
+    guess_sd: float
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a test is expected to teach.
+
+    Attributes
+    ----------
+    widths : dict of name to Width
+        Parameters, then ``creep_longest_hold_mm`` and ``creep_1h_mm`` at `tension_N`.
+    tension_N, length_mm : float
+        For which creep is stated.
+    longest_hold_s : float
+    information_bits : float
+        What the test tells of the material: the logarithm, to base 2, of how often the volume that its parameters
+        (as logarithms) may lie in is halved, from the model's prior to the posterior; median over the tests.
+    tests : int
+        Simulated tests that could be used.
+    draws : tuple of dict of name to (k,) array
+        Equally weighted posterior draws of the first few simulated tests.
+    """
+
+    widths: dict[str, Width]
+    tension_N: float
+    length_mm: float
+    longest_hold_s: float
+    information_bits: float
+    tests: int
+    draws: tuple[dict[str, Array], ...]
+
+
+def central(guess: Guess) -> dict[str, float]:
+    """The median of each parameter."""
+    return {name: float(np.median(values)) for name, values in guess.items()}
+
+
+def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History) -> Experiment:
+    """The test with the readings that the guess's centre gives without errors."""
+    problem = build([test], law=law, history=history)
+    (sample,) = problem.samples
+    tension = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]
+    holds = [
+        replace(hold, tension_N=frozen(row[mask].tolist())) if hold.recorded else hold
+        for hold, row, mask in zip(test.holds, tension, sample.protocol.mask, strict=True)
+    ]
+    return replace(test, holds=tuple(holds))
+
+
+def typical_tension(test: Experiment) -> float:
+    """The middle one of the tensions with which the holds of a test begin, N."""
+    return float(np.median([hold.tension_N[0] for hold in test.recorded_holds]))
+
+
+def expected_widths(
+    test: Experiment,
+    guess: Guess,
+    rng: np.random.Generator,
+    *,
+    law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    tension_N: float | None = None,
+    length_mm: float | None = None,
+    kept_draws: int = 0,
+) -> Expected:
+    """Simulate a planned test at each draw of a guess, and find how wide each posterior is.
+
+    Parameters
+    ----------
+    test : Experiment
+        What is planned, with the readings of `at_centre`; its priors are those of the later fit.
+    guess : mapping of name to (n,) array
+        Draws of the plain model's parameters; ``n`` tests are simulated.
+    rng : numpy Generator
+    law, history
+        Of the model.
+    tension_N, length_mm : float, optional
+        For which creep is stated, so that tests of several lengths can be compared (creep is a strain of the whole
+        wire); this test's `typical_tension` and length when left out.
+    kept_draws : int
+        Of how many tests posterior draws are kept.
+
+    Returns
+    -------
+    Expected
+
+    Raises
+    ------
+    ValueError
+        If no simulated test has a posterior that can be climbed.
+    """
+    problem = build([test], law=law, history=history)
+    (sample,) = problem.samples
+    target = LogPosterior(problem)
+    truth = np.column_stack([guess[name] for name in problem.names])
+    y = readings(problem, truth, sample, rng)
+    usable = np.isfinite(y[sample.protocol.mask]).all(axis=0) & np.isfinite(problem.prior.log_density()(truth))
+    start = target.coordinates.to_sampled(truth[usable])
+    y = y[..., usable]
+    found = climb(rowwise(target, [y]), start, iterations=40, tolerance=1e-3)
+    good = np.flatnonzero(np.isfinite(found.log_density))
+    longest = float(sample.protocol.duration_s.max())
+    tension = typical_tension(test) if tension_N is None else tension_N
+    length = test.length_mm if length_mm is None else length_mm
+    covariance = found.covariance
+    good = good[np.isfinite(covariance[good]).all(axis=(1, 2))]
+    if not len(good):
+        raise ValueError("no simulated test could be fitted")
+    rows: list[dict[str, Array]] = []
+    volumes, draws = list[Array](), list[dict[str, Array]]()
+    for begin in range(0, len(good), _ROWS):
+        part = good[begin : begin + _ROWS]
+        theta, weight = _weighted(target, found.z[part], covariance[part], y[..., part], rng)
+        values = _quantities(problem, theta, tension, longest, length)
+        rows.append({name: _row_widths(v.reshape(weight.shape), weight) for name, v in values.items()})
+        volumes.append(_log_volume(theta.reshape(*weight.shape, -1), weight, problem))
+        for at in range(min(len(part), kept_draws - len(draws))):
+            pick = rng.choice(weight.shape[1], _KEPT, p=weight[at])
+            draws.append({name: v.reshape(weight.shape)[at, pick] for name, v in values.items()})
+    before = _quantities(problem, truth[usable], tension, longest, length)
+    widths = {name: _width(np.concatenate([r[name] for r in rows]), before[name]) for name in rows[0]}
+    prior = problem.prior.rvs(4000, np.random.default_rng(0))
+    known = _log_volume(prior[None], np.full((1, len(prior)), 1.0 / len(prior)), problem)
+    bits = float((known[0] - np.median(np.concatenate(volumes))) / np.log(2.0))
+    return Expected(widths, tension, length, longest, bits, len(good), tuple(draws))
+
+
+def _weighted(
+    target: LogPosterior, z: Array, covariance: Array, y: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """(m * k, d) natural draws at m modes, and their (m, k) weights, each row summing to one.
+
+    The first draws are spread as the curvature at the mode says, those of each further round as the weighted draws
+    before them lie.
+    """
+    density = rowwise(target, [y])
+    centre = z
+    for count in _DRAWS:
+        points, weight = _round(target, density, centre, _WIDER**2 * covariance, count, rng)
+        centre = np.einsum("mk,mkd->md", weight, points)
+        away = points - centre[:, None]
+        covariance = np.einsum("mk,mki,mkj->mij", weight, away, away) + _LEAST * covariance
+    with np.errstate(over="ignore"):
+        theta = target.coordinates.to_natural(points.reshape(-1, z.shape[1]))
+    # a draw without weight stands for the mode: infinity times nothing would be no number
+    modes = np.repeat(target.coordinates.to_natural(z), _DRAWS[-1], axis=0)
+    return np.where(weight.reshape(-1, 1) > 0, theta, modes), weight
+
+
+def _round(
+    target: LogPosterior, density: Density, centre: Array, covariance: Array, k: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """(m, k, d) draws of Student t's, and their (m, k) weights in the posteriors."""
+    m, d = centre.shape
+    normal = rng.normal(size=(m, k, d))
+    stretch = np.sqrt(rng.chisquare(_DEGREES, size=(m, k)) / _DEGREES)
+    points = centre[:, None] + np.einsum("mij,mkj->mki", np.linalg.cholesky(covariance), normal) / stretch[..., None]
+    square = (normal**2).sum(axis=-1) / stretch**2
+    drawn = -0.5 * (_DEGREES + d) * np.log1p(square / _DEGREES)
+    flat, rows = points.reshape(-1, d), np.repeat(np.arange(m), k)
+    readings_in_all = sum(int(s.protocol.mask.size) for s in target.problem.samples)
+    pieces = max(1, len(flat) * readings_in_all // _NUMBERS)
+    with np.errstate(all="ignore"):
+        values = [
+            density(p, r) for p, r in zip(np.array_split(flat, pieces), np.array_split(rows, pieces), strict=True)
+        ]
+        log_weight = np.concatenate(values).reshape(m, k) - drawn
+        finite = np.isfinite(target.coordinates.to_natural(flat)).all(axis=1).reshape(m, k)
+    log_weight[~np.isfinite(log_weight) | ~finite] = -np.inf
+    weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
+    # truncated importance sampling: no draw may count for more than sqrt(k) average ones
+    weight = np.minimum(weight, weight.mean(axis=1, keepdims=True) * np.sqrt(k))
+    return points, weight / weight.sum(axis=1, keepdims=True)
+
+
+def _quantities(
+    problem: Problem, theta: Array, tension_N: float, longest_s: float, length_mm: float
+) -> dict[str, Array]:
+    """Parameters and creep of (n, d) draws, each (n,)."""
+    (sample,) = problem.samples
+    own = problem.parameters(theta, sample)
+    wire = FreshSample({n: own[n] for n in MATERIAL}, sample.model, sample.protocol.length_mm)
+    creep = wire.creep_mm(tension_N, np.array([longest_s, HOUR_S])) * (length_mm / sample.protocol.length_mm)
+    free = {name: theta[:, i] for i, name in enumerate(problem.names)}
+    return free | {"creep_longest_hold_mm": creep[0], "creep_1h_mm": creep[1]}
+
+
+def _row_widths(values: Array, weight: Array) -> Array:
+    """(m, 2) standard deviation and length of the 90 % interval of each row's weighted draws."""
+    mean = (values * weight).sum(axis=1, keepdims=True)
+    sd = np.sqrt((weight * (values - mean) ** 2).sum(axis=1))
+    order = np.argsort(values, axis=1)
+    ranked, share = np.take_along_axis(values, order, 1), np.cumsum(np.take_along_axis(weight, order, 1), axis=1)
+    low, high = (np.array([np.interp(q, s, v) for s, v in zip(share, ranked, strict=True)]) for q in (0.05, 0.95))
+    return np.column_stack([sd, high - low])
+
+
+def _log_volume(theta: Array, weight: Array, problem: Problem) -> Array:
+    """(m,) half the log determinant of the covariance of the material's parameters, positive ones as logarithms."""
+    columns = [i for i, name in enumerate(problem.names) if name in MATERIAL]
+    x = theta[..., columns]
+    logs = [problem.names[i] in problem.prior.logarithmic for i in columns]
+    x = np.where(logs, np.log(np.where(logs, np.maximum(x, 1e-300), 1.0)), x)
+    away = x - np.einsum("mk,mkd->md", weight, x)[:, None]
+    covariance = np.einsum("mk,mki,mkj->mij", weight, away, away)
+    return np.asarray(0.5 * np.linalg.slogdet(covariance + 1e-24 * np.eye(len(columns)))[1])
+
+
+def _width(rows: Array, before: Array) -> Width:
+    sd, length = rows.T
+    low, high = np.quantile(length, [0.05, 0.95])
+    se = float(sd.std(ddof=1) / np.sqrt(len(sd))) if len(sd) > 1 else 0.0
+    return Width(
+        float(sd.mean()), se, float(np.median(sd)), float(length.mean()), float(low), float(high), float(before.std())
+    )

@@ -1,0 +1,124 @@
+"""The page of ``wirebayes plan``: tests that could be done, best first, with what each would teach and show."""
+
+from pathlib import Path
+from typing import Any
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    embedded,
+    number,
+    span,
+)
+
+_AIMS = {"parameters": "what they tell of the material", "creep": "how well the creep after an hour would be known"}
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """The content of ``plan.json``."""
+    found = read_json(folder / "plan.json")
+    rows = found["protocols"]
+    first: list[Block] = [Columns([_asked(found), _answered(found), _trusted(rows)]), _ranking(found)]
+    picture = folder / "plan.png"
+    if picture.is_file():
+        first.append(Pictures([Picture(embedded(picture), "Expected widths and detectable effects of each test.")]))
+    sections = [Section("Summary", first)]
+    sections += [Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1) for row in rows]
+    lead = "Each test was simulated many times before it is done, and fitted: how much would be known afterwards?"
+    return Page("What a test would teach", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _asked(found: dict[str, Any]) -> Points:
+    aim = found["aim"]
+    by = _AIMS[aim[0]] if len(aim) == 1 else f"how far {_words(aim[0])} and {_words(aim[1])} would lie apart"
+    said = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
+    if found["budget_min"] is not None:
+        said.append(f"There are {number(found['budget_min'])} min.")
+    return Points("What was asked", said)
+
+
+def _answered(found: dict[str, Any]) -> Points:
+    best = found["protocols"][0]
+    said = [f"Do {best['name']}" + (f": {best['words']}." if best["words"] else ".")]
+    creep = best["creep"]["creep_1h_mm"]
+    said.append(
+        f"The creep after an hour at {number(best['creep']['tension_N'])} N would be known to "
+        f"{number(creep['sd_median'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
+    )
+    if not best["within_budget"]:
+        said.insert(0, "No test is done within the time there is.")
+    return Points("What to do", said)
+
+
+def _trusted(rows: list[dict[str, Any]]) -> Points:
+    least = min(row["simulated_tests"] for row in rows)
+    return Points("How far it can be trusted", [
+        f"Each test was simulated and fitted {least} times or more, with the priors of the later fit. Half of the "
+        "tests would do better than a median, half worse; the range says by how much.",
+        "They hold if the wire is as guessed and nothing is missing in the model.",
+    ])  # fmt: skip
+
+
+def _ranking(found: dict[str, Any]) -> Table:
+    names = [n for n in ("k1", "B", "U", "k2", "N") if n in found["protocols"][0]["parameters"]]
+    robot = found["robot"] is not None
+    lines = [
+        [
+            str(row["rank"]), row["name"], number(row["duration_min"]), number(row["information_bits"]),
+            *(number(row["parameters"][n]["sd_median"], 2) for n in names),
+            number(row["creep"]["creep_1h_mm"]["sd_median"], 2),
+            *([number((row["robot"] or {}).get("drift_sd_mm"), 2)] if robot else []),
+            "yes" if row["within_budget"] else "too long",
+        ]
+        for row in found["protocols"]
+    ]  # fmt: skip
+    header = ["rank", "test", "minutes", "bits", *(f"sd of {n}" for n in names), "sd of creep in 1 h, mm"]
+    header += ["sd of the robot's drift in 1 h, mm"] if robot else []
+    return Table([*header, "in time"], lines, "Standard deviations of the posterior, median over the simulated tests.")
+
+
+def _protocol(row: dict[str, Any]) -> list[Block]:
+    blocks: list[Block] = [
+        Text(
+            f"{row['holds']} holds with {row['readings']} readings, {number(row['duration_min'])} min"
+            + (f": {row['words']}." if row["words"] else ".")
+        )
+    ]
+    quantities = row["parameters"] | {n: q for n, q in row["creep"].items() if isinstance(q, dict)}
+    lines = [
+        [
+            _words(n),
+            *(number(q[key], 2) for key in ("sd_median", "sd", "width_90")),
+            span(q["width_90_low"], q["width_90_high"], 2),
+            number(q["guess_sd"], 2),
+        ]
+        for n, q in quantities.items()
+    ]
+    header = ["quantity", "sd, median", "sd, mean", "90 % width, mean", "in 90 % of tests", "sd of the guess"]
+    creep = row["creep"]
+    caption = f"Creep of {number(creep['length_mm'])} mm at {number(creep['tension_N'])} N; the longest hold lasts "
+    blocks.append(Table(header, lines, caption + f"{number(creep['longest_hold_s'])} s."))
+    if row["effects"]:
+        shown = [
+            [_words(n), number(e["amplitude_80"], 2), e["unit"], number(e["delta_80"], 2),
+             ", ".join(map(_words, e["confused_with"])) or "–"]
+            for n, e in row["effects"].items()
+        ]  # fmt: skip
+        caption = "Smallest amplitude seen in 80 % of tests, its size δ in standard deviations, and what it looks like."
+        blocks.append(Table(["effect", "amplitude", "unit", "δ", "hardly told apart from"], shown, caption))
+    if row["not_identifiable"]:
+        parts = [sentence.partition(": ")[::2] for sentence in row["not_identifiable"]]
+        blocks.append(Table(["what", "why not"], [[_words(a), b] for a, b in parts], "What it would not show."))
+    return blocks
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

@@ -1,0 +1,68 @@
+"""The picture of a plan: how narrow each test would make each parameter, and which effects it would show."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import numpy as np
+from matplotlib.figure import Figure
+
+_COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#bab0ac")
+_MOST = 6  # tests that a picture can hold
+
+
+def widths_and_effects(plan: dict[str, Any], target: Path) -> None:
+    """Draw expected widths beside the guess's, and the size δ at which each effect is seen.
+
+    Parameters
+    ----------
+    plan : dict
+        The content of ``plan.json``.
+    target : Path
+        The picture to write.
+    """
+    rows = plan["protocols"][:_MOST]
+    names = [n for n in rows[0]["parameters"] if all(n in row["parameters"] for row in rows)] + ["creep_1h_mm"]
+    effects = sorted({effect for row in rows for effect in row["effects"]})
+    figure = Figure(figsize=(9.0, 4.0 + 0.13 * len(effects)), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    step = 0.8 / len(rows)
+    for i, row in enumerate(rows):
+        quantities = row["parameters"] | row["creep"]
+        share = [_share(quantities[n]) for n in names]
+        places = np.arange(len(names)) + (i - (len(rows) - 1) / 2) * step
+        label = f"{row['rank']}. {row['name']}, {row['duration_min']:.3g} min"
+        left.plot(share, places, "o", color=_COLOURS[i], ms=4, label=label)
+        there = [(at, row["effects"][e]) for at, e in enumerate(effects) if e in row["effects"]]
+        seen = [(at, e["delta_prior"] / e["delta_80"]) for at, e in there if e["delta_80"]]
+        if seen:
+            at, times = zip(*seen, strict=True)
+            shift = (i - (len(rows) - 1) / 2) * step
+            right.plot(times, np.array(at) + shift, "o", color=_COLOURS[i], ms=4)
+    left.set_yticks(range(len(names)), [_words(n) for n in names], fontsize=8)
+    left.set_xscale("log")
+    left.axvline(1.0, color="0.6", lw=0.8)
+    left.set_xlabel("sd after the test (median) / sd of the guess", fontsize=9)
+    right.set_yticks(range(len(effects)), [_words(e) for e in effects], fontsize=8)
+    right.set_xscale("log")
+    right.axvline(1.0, color="0.6", lw=0.8)
+    right.set_xlabel("sd of its prior / amplitude seen in 80 % of tests", fontsize=9)
+    right.set_title("effects: right of the line is seen", fontsize=9, loc="left")
+    left.set_title("parameters: farther left is better known", fontsize=9, loc="left")
+    for axis in (left, right):
+        axis.invert_yaxis()
+        axis.grid(axis="y", color="0.93", lw=6, zorder=0)
+        axis.set_axisbelow(True)
+        axis.tick_params(axis="x", labelsize=8)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    figure.savefig(target, dpi=130)
+
+
+def _share(width: dict[str, float]) -> float:
+    return width["sd_median"] / width["guess_sd"] if width["guess_sd"] else np.nan
+
+
+def _words(name: str) -> str:
+    return {"creep_1h_mm": "creep after 1 h"}.get(name, name.replace("_", " "))
