@@ -219,3 +219,11 @@ def test_a_person_is_asked_and_the_answer_holds(tmp_path):
     imported = wb.import_bench(raw, length_mm=1000, ask=ask)
     assert questions == ["the unit of time", "the unit of tension"]
     assert imported.experiments[0].tension()[0, 0] == 2.1
+
+
+def test_a_column_that_is_chosen_may_still_be_asked_for_its_unit(tmp_path):
+    raw = tmp_path / "raw.csv"
+    raw.write_text(HEADER.replace("Kraft [N]", "Kraft 1,Kraft 2") + BODY.replace("\n", ",1\n"))
+    answers = ["--map Kraft 1=tension", "--map Kraft 1=tension [kN]"]
+    imported = wb.import_bench(raw, length_mm=1000, ask=lambda question: answers.pop(0))
+    assert imported.experiments[0].tension()[0, 0] == 2100.0

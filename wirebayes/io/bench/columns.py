@@ -129,8 +129,8 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
 
 
 def _said(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]:
-    """Column, role and unit of each thing the user says; of this file's header what it has."""
-    out = []
+    """Column, role and unit of each thing the user says; what is said later of a column stands."""
+    out: dict[int, tuple[int, str, str]] = {}
     for text in mapping:
         header, equals, rest = text.rpartition("=")
         role, _, unit = rest.strip().partition(" ")
@@ -141,8 +141,8 @@ def _said(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]
             expected = f"HEADER=COLUMN or HEADER=COLUMN [UNIT], COLUMN one of {', '.join(names)}"
             raise InputError(f"--map: found {text!r}{hint}, expected {expected}")
         index, unit_in_header = _named(table, header, role)
-        out.append((index, role, unit or unit_in_header))
-    return out
+        out[index] = index, role, unit or unit_in_header
+    return list(out.values())
 
 
 def _named(table: RawTable, header: str, role: str) -> tuple[int, str]:
