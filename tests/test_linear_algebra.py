@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.linear_algebra import eigh, inv, solve
+from wirebayes.linear_algebra import cholesky, eigh, inv, solve
 from wirebayes.model import likelihoods
 from wirebayes.prediction.predictive import _regressed
 from wirebayes.wire.staircase import Linearised
@@ -27,6 +27,8 @@ def test_one_matrix_without_an_answer_leaves_the_others_theirs() -> None:
         (inv(MIXED), np.linalg.inv(GOOD)),
     ]:
         assert np.isnan(found[HAVE_NONE]).all() and np.array_equal(others(found), alone)
+    factors = cholesky(MIXED)
+    assert np.isnan(factors[HAVE_NONE]).all() and np.array_equal(others(factors), np.linalg.cholesky(GOOD))
     values, vectors = eigh(MIXED)
     assert np.isnan(values[3:5]).all() and np.isnan(vectors[3:5]).all()
     assert values[2] == pytest.approx([0.0, 0.0, 3.0], abs=1e-12)  # a singular one has eigenvalues

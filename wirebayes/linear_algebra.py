@@ -25,6 +25,12 @@ def inv(matrices: Array) -> Array:
     return out
 
 
+def cholesky(matrices: Array) -> Array:
+    """Lower Cholesky factors ``(..., d, d)``, read off the lower halves; NaN where a matrix is not positive."""
+    (out,) = _each(lambda a: (np.linalg.cholesky(a),), matrices)
+    return out
+
+
 def eigh(matrices: Array) -> tuple[Array, Array]:
     """Eigenvalues ``(..., d)`` and vectors ``(..., d, d)`` of symmetric matrices; NaN where one is not finite."""
     values, vectors = _each(np.linalg.eigh, matrices)
@@ -40,7 +46,8 @@ def log_determinant(matrices: Array) -> Array:
 def _each(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> tuple[Array, ...]:
     """Results of a numpy function for every matrix of the stack it can be computed for."""
     usable = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
-    matrices = np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
+    if not usable.all():
+        matrices = np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
     try:
         out = tuple(function(matrices, *others))
     except np.linalg.LinAlgError:  # one of them at least: find out which
@@ -53,13 +60,20 @@ def _each(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: 
 
 
 def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> NDArray[np.bool_]:
-    """Which matrices of a stack a function takes, ``(...)``, by trying one after the other."""
+    """Which matrices of a stack a function takes, ``(...)``, by trying ever smaller parts of the stack."""
     stack = matrices.shape[:-2]
-    right = [np.broadcast_to(other, (*stack, *other.shape[-2:])) for other in others]
-    out = np.ones(stack, bool)
-    for at in np.ndindex(stack):
+    flat = matrices.reshape(-1, *matrices.shape[-2:])
+    right = [np.broadcast_to(o, (*stack, *o.shape[-2:])).reshape(-1, *o.shape[-2:]) for o in others]
+    out = np.ones(len(flat), bool)
+    parts = [(0, len(flat))]
+    while parts:
+        first, last = parts.pop()
         try:
-            function(matrices[at], *(other[at] for other in right))
+            function(flat[first:last], *(other[first:last] for other in right))
         except np.linalg.LinAlgError:
-            out[at] = False
-    return out
+            if last - first == 1:
+                out[first] = False
+            else:
+                middle = (first + last) // 2
+                parts += [(first, middle), (middle, last)]
+    return out.reshape(stack)

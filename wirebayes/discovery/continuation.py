@@ -7,14 +7,13 @@ same ladders, so what is found on the way has its chance level.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import repeat
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.special import logsumexp
 
 from wirebayes.discovery.linear_scan import (
     ABSORBED,
@@ -33,7 +32,7 @@ from wirebayes.discovery.refit import occam
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.linear_algebra import solve
+from wirebayes.linear_algebra import cholesky, solve
 from wirebayes.model import likelihoods
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import Each
@@ -49,6 +48,8 @@ _NEVER = -1e300
 _MIDDLE = 6.0  # δ for which a one-sided form is tried
 _LONGEST = 3.0  # of a step, in any sampled coordinate
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
+_LARGE = 1e200  # above any sum of squares, and its square root finite
+_PIECE = 64  # rows weighed at once: what stays in the cache
 _FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
 _ENOUGH = 6  # simulations as high at which no more are asked for
 _TRIED = 3  # names
@@ -159,55 +160,67 @@ def climb(block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence
     scale = target.coordinates.scale[column]
     plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
     degrees = plain.degrees
-    nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, degrees).height + prior_density(block.target, z)
+    nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, degrees).height + plain.prior
     # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
     nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
-    nothing = np.tile(nothing, starts)
-    if readings is not None:
-        readings = [np.tile(r, (1, 1, starts)) for r in readings]
+    nothing = np.tile(np.where(np.isfinite(nothing), nothing, np.inf), starts)
     # From where to where a rung speaks: half way, by ratio, to its neighbours.
     every = np.tile(ladder.amplitudes, len(places)).repeat(len(z), axis=1)
     half = np.sqrt(every[1] / every[0])
 
-    def look(y: Array, amplitude: Array, free: list[int], steps: int) -> tuple[Array, ...]:
-        """Follow with the amplitudes (n,): the best place, the log Bayes factor there, amplitude and δ of one."""
+    def of_each(values: Array) -> Array:
+        """(n,) the largest of each data set."""
+        return np.asarray(values.reshape(starts, -1).max(axis=0))
+
+    def look(y: Array, amplitude: Array, alive: Array, free: list[int], steps: int) -> tuple[Array, ...]:
+        """Follow with the amplitudes (n,): the best place, the log Bayes factor there, amplitude and δ of one.
+
+        A data set goes on for as long as it gains something from any of its starts.
+        """
         at, near, far = (np.clip(main.neutral + amplitude * f, low, high) for f in (1.0, 1.0 / half, half))
         y = y.copy()
         y[:, column] = at / scale
         first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
         best = [y.copy(), np.full(len(y), _NEVER), at - main.neutral, np.zeros(len(y))]
+        rows = np.flatnonzero(np.tile(alive, starts))
         for step in range(steps + 1):
+            own = None if readings is None else [r[..., rows % len(z)] for r in readings]
             with np.errstate(all="ignore"):
-                both = tangent(target, y, readings, [*free, column])
-            here = _weigh(_without_last(both), both.parameters[..., -1] / scale, first, last, degrees)
-            lr = np.nan_to_num(here.height + prior_density(target, y) - nothing, nan=_NEVER, neginf=_NEVER)
-            better, gain = lr > best[1], float(np.max(lr - best[1]))
-            for kept, new in zip(best, (y, lr, at - main.neutral + here.move, here.norm), strict=True):
-                kept[better] = new[better]
-            if gain < _SETTLED:
+                both = tangent(target, y[rows], own, [*free, column])
+            here = _weigh(_without_last(both), both.parameters[..., -1] / scale, first[rows], last[rows], degrees)
+            lr = np.nan_to_num(here.height + both.prior - nothing[rows], nan=_NEVER, neginf=_NEVER)
+            gain = np.full(len(y), -np.inf)
+            gain[rows] = lr - best[1][rows]
+            better = gain[rows] > 0
+            for kept, new in zip(best, (y[rows], lr, (at - main.neutral)[rows] + here.move, here.norm), strict=True):
+                kept[rows[better]] = new[better]
+            # A step that led down, where the wire went slack say, is the last one.
+            go = np.flatnonzero(better & (of_each(gain) >= _SETTLED)[rows % len(z)])
+            if step == steps or not len(go):
                 break
-            if step < steps:
-                # A step that led down, where the wire went slack say, is the last one.
-                ahead = _follow(target, y, readings, both, here, free, degrees)
-                y = np.where(better[:, None], ahead, best[0])
+            rows, own = rows[go], None if own is None else [r[..., go] for r in own]
+            y[rows] = _follow(target, y[rows], own, both.of(go), here.of(go), free, degrees)
         return tuple(best)
 
     unseen = np.full(len(y), _NEVER), np.zeros(len(y)), np.zeros(len(y))
     found: list[Sequence[Array]] = []
     best = [y.copy(), *(v.copy() for v in unseen)]
+    alive = np.ones(len(z), bool)
     for amplitudes in every:
         # Shape constants mean nothing while the amplitude is small, and would wander.
         is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(every[-1]) * _FIRST / _LAST).all())
-        y, *rung = look(y, amplitudes, rigid if is_low else moving, _FEW if is_low else _STEPS)
+        y, *rung = look(y, amplitudes, alive, rigid if is_low else moving, _FEW if is_low else _STEPS)
         found.append(rung)
         better = rung[0] > best[1]
         for kept, new in zip(best, (y, *rung), strict=True):
             kept[better] = new[better]
+        if not is_low:
+            alive = alive & (of_each(rung[0]) >= _HOPELESS)
         beyond = np.isin(np.clip(main.neutral + amplitudes, low, high), (low, high)).all()
-        if beyond or (not is_low and rung[0].max() < _HOPELESS):
+        if beyond or not alive.any():
             found += [unseen] * (len(ladder.amplitudes) - len(found))
             break
-    found.append(look(best[0], best[2], moving, _STEPS)[1:])
+    found.append(look(best[0], best[2], np.ones(len(z), bool), moving, _STEPS)[1:])
     return Climbed(*(np.array(v).reshape(-1, len(z)) for v in zip(*found, strict=True)))
 
 
@@ -243,6 +256,10 @@ class _Weighed:
     step: Array
     ratio: Array
 
+    def of(self, rows: Array) -> "_Weighed":
+        """That of some places."""
+        return _Weighed(*(getattr(self, f.name)[rows] for f in fields(self)))
+
 
 def _weigh(
     x: Tangent,
@@ -252,36 +269,55 @@ def _weigh(
     degrees: int,
 ) -> _Weighed:
     """Integrate the noise out, as the linear scan does, the amplitude moved to its best from `near` to `far`."""
+    n = len(x.residual)
+    near, far = np.broadcast_to(near, n), np.broadcast_to(far, n)
+    pieces = [np.arange(i, min(i + _PIECE, n)) for i in range(0, n, _PIECE)]
+    parts = [_weigh_few(x.of(i), signature[i], near[i], far[i], degrees) for i in pieces]
+    return _Weighed(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(_Weighed)))
+
+
+def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: int) -> _Weighed:
     n, p = x.parameters.shape[0], x.parameters.shape[2]
     columns = np.concatenate([x.parameters, signature[..., None], x.residual[..., None]], axis=2)
     with np.errstate(invalid="ignore"):
         smooth = np.abs(columns).max(axis=(1, 2)) < _JUMP
-    columns = np.where(smooth[:, None, None], columns, 0.0)
+    columns[~smooth] = 0.0
     levels = np.swapaxes(x.left, 1, 2) @ columns
+    products = (levels[..., None] * levels[..., None, :]).reshape(*levels.shape[:2], -1)
+    # For each ratio all inner products (n, k, p + 2, p + 2): of the parameters, the signature and the residual.
+    gram = (damp(x.singular[:, None], RATIOS[:, None]) @ products).reshape(n, len(RATIOS), p + 2, p + 2)
     whole = np.swapaxes(columns, 1, 2) @ columns
-    height, move, norm, steps = [], [], [], []
-    for ratio in RATIOS:
-        gram = whole - np.swapaxes(levels, 1, 2) @ (damp(x.singular, ratio)[..., None] * levels)
-        pp, pr, pm = gram[:, :p, :p] + x.prior_precision, gram[:, :p, -1] + x.prior_gradient, gram[:, :p, p]
-        solved = solve(pp, np.stack([pr, pm], axis=-1))
-        regular = np.asarray(np.isfinite(solved).all(axis=(1, 2)))
-        solved = np.where(regular[:, None, None], solved, 0.0)
-        # Not less what a further step promises: far out, steps promise more than they keep.
-        rss = gram[:, -1, -1]
-        b = gram[:, p, -1] - (pm * solved[..., 0]).sum(axis=1)
-        c = gram[:, p, p] - (pm * solved[..., 1]).sum(axis=1)
-        c = np.where(c > ABSORBED * gram[:, p, p], c, 0.0)
-        a = np.clip(np.divide(b, c, out=np.zeros(n), where=c > 0), near, far)
-        left = np.maximum(rss - 2.0 * a * b + a**2 * c, x.least)
-        volume = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
-        height.append(np.where(regular, volume - 0.5 * degrees * np.log(left), -np.inf))
-        move.append(a)
-        norm.append(np.sqrt(c * degrees / left))
-        steps.append(solved[..., 0])
-    k, rows = np.argmax(height, axis=0), np.arange(n)
-    moved, delta, steps_ = (np.array(v)[k, rows] for v in (move, norm, steps))
-    total = np.where(smooth, logsumexp(height, axis=0), -np.inf)
-    return _Weighed(total, moved, delta, steps_, RATIOS[k])
+    whole[:, :p, :p] += x.prior_precision
+    whole[:, -1, :p] += x.prior_gradient
+    gram = whole[:, None] - gram
+    # Not less what a further step promises: far out, steps promise more than they keep.
+    rss, mm = gram[..., -1, -1].copy(), gram[..., p, p].copy()
+    # One Cholesky factor tells the volume, and of signature and residual what the parameters leave. Its last two pivots
+    # need only be positive: the one is taken back, the other not used.
+    added = np.where(mm > 0, mm, 1.0)
+    gram[..., p, p] += added
+    gram[..., -1, -1] = _LARGE
+    factor = cholesky(gram)
+    regular = np.isfinite(factor[..., 0, 0])
+    factor[~regular] = 1.0
+    pivot = factor[..., p, p]
+    b, c = factor[..., -1, p] * pivot, pivot**2 - added
+    c = np.where(c > ABSORBED * mm, c, 0.0)
+    a = np.divide(b, c, out=np.zeros_like(c), where=c > 0)
+    a = np.clip(a, near[:, None], far[:, None])
+    left = np.maximum(rss - 2.0 * a * b + a**2 * c, x.least[:, None])
+    volume = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
+    volume -= np.log(np.einsum("nkpp->nkp", factor[..., :p, :p])).sum(axis=2)
+    height = np.where(regular, volume - 0.5 * degrees * np.log(left), -np.inf)
+    rows, k = np.arange(n), np.argmax(height, axis=1)
+    best = rows, k
+    step = solve(gram[rows, k, :p, :p], gram[rows, k, -1, :p, None])[..., 0]
+    step = np.where((regular[best] & np.isfinite(step).all(axis=1))[:, None], step, 0.0)
+    peak = height[best]
+    with np.errstate(invalid="ignore"):
+        total = peak + np.log(np.exp(height - peak[:, None]).sum(axis=1))
+    total = np.where(smooth & np.isfinite(total), total, -np.inf)
+    return _Weighed(total, a[best], np.sqrt(c[best] * degrees / left[best]), step, RATIOS[k])
 
 
 def _without_last(x: Tangent) -> Tangent:
@@ -303,17 +339,19 @@ def _follow(
 ) -> Array:
     """Move the parameters a step, or as much of it as is best, or not at all."""
     step = here.step * np.minimum(1.0, _LONGEST / np.maximum(np.abs(here.step).max(axis=1, keepdims=True), 1e-300))
-    trial = np.repeat(z[None], len(_LENGTHS), axis=0)
-    trial[:, :, columns] += _LENGTHS[:, None, None] * step
-    trial = np.concatenate([z[None], trial])
-    many = len(trial)
-    flat = trial.reshape(-1, z.shape[1])
+    many = len(_LENGTHS)
+    trial = np.repeat(z[None], 1 + many, axis=0)
+    trial[1:, :, columns] += _LENGTHS[:, None, None] * step
+    flat = trial[1:].reshape(-1, z.shape[1])
     tiled = None if readings is None else [np.tile(y, (1, 1, many)) for y in readings]
-    r = residuals(target, flat, tiled).reshape(many, len(z), -1)
-    levels = np.einsum("nah,mna->mnh", x.left, r)
-    square = (r**2).sum(axis=2) - (damp(x.singular, here.ratio[:, None]) * levels**2).sum(axis=2)
+    moved = residuals(target, flat, tiled).reshape(many, len(z), -1)
+    r = np.concatenate([x.residual[None], moved])
+    levels = r.transpose(1, 0, 2) @ x.left
+    shrink = damp(x.singular, here.ratio[:, None])
+    square = (r**2).sum(axis=2) - (levels**2 @ shrink[..., None])[..., 0].T
     with np.errstate(invalid="ignore"):
-        value = prior_density(target, flat).reshape(many, -1) - 0.5 * degrees * np.log(np.maximum(square, x.least))
+        prior = np.concatenate([x.prior[None], prior_density(target, flat).reshape(many, -1)])
+        value = prior - 0.5 * degrees * np.log(np.maximum(square, x.least))
     best = np.argmax(np.where(np.isfinite(value), value, -np.inf), axis=0)
     return np.asarray(trial[best, np.arange(len(z))])
 
@@ -362,7 +400,7 @@ class Continuation:
         self._values = {c.name: float(linear[c.name][0]) for c in found}
         for c, value in self.log_bayes.items():
             self._values[c.name] = max(self._values[c.name], value)
-        self._known: dict[tuple[str, int, int], Array] = {}
+        self._known: dict[str, Array] = {}  # of each name, in the simulations climbed so far
 
     def test(self, simulated: Sequence[Replicates], test: GlobalTest) -> GlobalTest:
         """The linear global test with what the ladders add to the data and to these simulations, a block each.
@@ -382,15 +420,17 @@ class Continuation:
 
     def _chance(self, name: str, linear: Array, simulated: Sequence[Replicates]) -> Array:
         """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more than it takes."""
+        known = self._known.get(name, np.empty(0))
+        ways = [way for way in self._ways if way.effect.name == name]
         out = np.empty(0)
         while len(out) < len(linear) and (out >= self._values[name]).sum() < _ENOUGH:
-            first, last = len(out), min(len(out) + (_ROWS if len(out) else _FIRST_ROWS), len(linear))
-            if (name, first, last) not in self._known:
-                rows = slice(first, last)
-                ways = [way for way in self._ways if way.effect.name == name]
+            last = min(len(out) + (_ROWS if len(out) else _FIRST_ROWS), len(linear))
+            if last > len(known):
+                rows = slice(len(known), last)
                 climbed = self._strengths(ways, [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated])
-                self._known[name, first, last] = np.max(list(climbed.values()), axis=0)
-            out = np.append(out, np.maximum(linear[first:last], self._known[name, first, last]))
+                known = np.append(known, np.max(list(climbed.values()), axis=0))
+            out = np.maximum(linear[:last], known[:last])
+        self._known[name] = known
         return out
 
     def _strengths(self, ways: Sequence[AmplitudePath], plain: Sequence[tuple[Array, Any]]) -> dict[Candidate, Array]:

@@ -6,8 +6,8 @@ scale of the noise is integrated out, ρ is summed over a grid, so no test trust
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,11 @@ from scipy.special import logsumexp
 
 from wirebayes.discovery import smooth_reference
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.linear_algebra import eigh, solve
+from wirebayes.linear_algebra import cholesky
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.staircase import Model, linearise, simulate
+from wirebayes.wire.staircase import linearise, simulate
 
 Array = NDArray[Any]
 RATIOS = np.logspace(-2.0, 6.0, 13)
@@ -79,6 +79,8 @@ class Tangent:
     prior_gradient, prior_precision : (n, p), (n, p, p)
     floor : (n,)
         Rounding's share of the scaled variance: noise cannot be smaller.
+    prior : (n,)
+        Log density of the prior in the sampled coordinates.
     """
 
     residual: Array
@@ -89,6 +91,12 @@ class Tangent:
     prior_gradient: Array
     prior_precision: Array
     floor: Array
+    prior: Array
+
+    def of(self, rows: Array) -> Self:
+        """That of some parameter sets."""
+        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "one_sided"}
+        return replace(self, **{name: value[rows] for name, value in every.items()})
 
     @property
     def degrees(self) -> int:
@@ -191,6 +199,8 @@ class Pieces:
 
 def joined(scans: Sequence[Scan]) -> Scan:
     """Scans of consecutive rows as one."""
+    if len(scans) == 1:
+        return scans[0]
     first = scans[0].pieces
     pieces = Pieces(
         shared=np.concatenate([s.pieces.shared for s in scans], axis=1),
@@ -213,11 +223,26 @@ def joined(scans: Sequence[Scan]) -> Scan:
 def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array]:
     """Per sample the (H, R, m) signatures of the probes per unit amplitude, N, at the parameters ``z`` (1, d)."""
     problem, theta = target.problem, target.coordinates.to_natural(z)
+    alike: dict[str, list[int]] = {}
+    for k, probe in enumerate(trials):
+        alike.setdefault(probe.effect.key, []).append(k)
     out = []
-    for at, sample in enumerate(problem.samples):
+    for sample in problem.samples:
         own = problem.parameters(theta, sample)
-        each = [signature(problem, own, sample.model, at, probe)[..., 0] / probe.step for probe in trials]
-        out.append(np.stack(each, axis=-1) if each else np.zeros((*sample.protocol.time_s.shape, 0)))
+        shapes = np.zeros((*sample.protocol.time_s.shape, len(trials)))
+        plain: Array | None = None
+        for numbers in alike.values():
+            effect = trials[numbers[0]].effect
+            if getattr(effect, "test", "") not in ("", sample.name):
+                continue
+            each = {name: np.repeat(value, len(numbers)) for name, value in own.items()}
+            each |= {name: np.array([trials[k].own[name] for k in numbers]) for name in trials[numbers[0]].own}
+            with np.errstate(all="ignore"):
+                plain = simulate(sample.protocol, own, sample.model) if plain is None else plain
+                effects = (*sample.model.effects, effect)
+                added = simulate(sample.protocol, each, replace(sample.model, effects=effects)) - plain
+            shapes[..., numbers] = np.where(np.isfinite(added), added, 0.0) / [trials[k].step for k in numbers]
+        out.append(shapes)
     return out
 
 
@@ -308,101 +333,123 @@ def _tangent(target: LogPosterior, z: Array, points: Sequence[_Point], moving: l
     # K's size is what ρ measures: give it a typical column of length one. It has none where the wire is slack
     # throughout: then no setting error moves any reading.
     ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
-    left, singular, _ = np.linalg.svd(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None], full_matrices=False)
-    gradient, precision = _prior(target, z, moving)
+    left, singular = _directions(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None])
+    prior, gradient, precision = _prior(target, z, moving)
     residual = np.concatenate([p.residual for p in points], axis=1)
     residual[beyond] = np.nan
     parameters = np.concatenate([p.parameters for p in points], axis=1)
     floor = np.min([p.floor for p in points], axis=0)
-    return Tangent(residual, parameters, left, singular, ratio, gradient, precision, floor)
+    return Tangent(residual, parameters, left, singular, ratio, gradient, precision, floor, prior)
 
 
-def signature(problem: Problem, own: dict[str, Array], model: Model, at: int, probe: Probe) -> Array:
-    """(H, R, n) what a probe adds to the readings of sample `at`."""
-    sample = problem.samples[at]
-    effect = probe.effect
-    if getattr(effect, "test", "") not in ("", sample.name):
-        return np.zeros((*sample.protocol.time_s.shape, len(own["k1"])))
-    full = own | {name: np.full(len(own["k1"]), value) for name, value in probe.own.items()}
-    more = Model(model.law, model.history, (*model.effects, effect), model.tension_ref_N, model.length_ref_mm)
-    with np.errstate(all="ignore"):
-        added = simulate(sample.protocol, full, more) - simulate(sample.protocol, own, model)
-    return np.where(np.isfinite(added), added, 0.0)
+def _directions(k: Array) -> tuple[Array, Array]:
+    """Left singular vectors and values of matrices (n, N, H) with few columns, from their squares: half the work.
+
+    What is lost are digits of directions in which a setting error moves nothing to speak of: they become zero.
+    """
+    square, right = np.linalg.eigh(np.swapaxes(k, 1, 2) @ k)
+    seen = square > _LEAST_SQUARE * square[:, -1:]
+    singular = np.sqrt(np.where(seen, square, 0.0))
+    return k @ (right / np.where(seen, singular, np.inf)[:, None]), singular
 
 
 def scan(x: Expansion) -> Scan:
     """Log Bayes factors of every probe and of the flexible reference; zero for a row that has no tangent."""
-    x = _without_tangent(x)
+    n = len(x.residual)
+    if n <= _PIECE:
+        return _scan_few(_without_tangent(x))
+    pieces = [np.arange(i, min(i + _PIECE, n)) for i in range(0, n, _PIECE)]
+    return joined([_scan_few(_without_tangent(x.of(rows))) for rows in pieces])
+
+
+def _scan_few(x: Expansion) -> Scan:
+    """Arrays (n, k, ...): a parameter set, a ratio of the grid."""
     p, m = x.parameters.shape[2], x.signatures.shape[2]
     degrees, least = x.degrees, x.least
-    columns = np.concatenate([x.parameters, x.signatures, x.flexible, x.residual[..., None]], axis=2)
+    columns = np.concatenate([x.parameters, x.residual[..., None], x.signatures, x.flexible], axis=2)
     levels = np.swapaxes(x.left, 1, 2) @ columns
-    plain_product = np.swapaxes(x.parameters, 1, 2) @ columns
-    functions = slice(p + m, p + m + x.flexible.shape[2])
-    square = (columns[..., p : p + m] ** 2).sum(axis=1)
-    mr0 = np.einsum("nam,na->nm", x.signatures, x.residual)
-    rr0 = (x.residual**2).sum(axis=1)
-    ff0 = np.swapaxes(x.flexible, 1, 2) @ x.flexible
-    fr0 = np.einsum("naf,na->nf", x.flexible, x.residual)
-    plain, effects, loose, amplitude, norm = [], [], [], [], []
-    kept: dict[str, list[Array]] = {"shared": [], "rss": [], "along": [], "square": []}
-    for ratio in RATIOS:
-        weighted = damp(x.singular, ratio)[..., None] * levels
-        gram = plain_product - np.swapaxes(levels[..., :p], 1, 2) @ weighted
-        pp = gram[..., :p] + x.prior_precision
-        pr = gram[..., -1] + x.prior_gradient
-        pm, pf = gram[..., p : p + m], gram[..., functions]
-        mm = square - (levels[..., p : p + m] * weighted[..., p : p + m]).sum(axis=1)
-        mr = mr0 - (levels[..., p : p + m] * weighted[..., -1:]).sum(axis=1)
-        rr = rr0 - (levels[..., -1] * weighted[..., -1]).sum(axis=1)
-        solved = solve(pp, np.concatenate([pr[..., None], pm, pf], axis=2))
-        # There may be a ratio at which the parameters cannot be told apart: it is left out.
-        regular = np.asarray(np.isfinite(solved).all(axis=(1, 2)))
-        solved = np.where(regular[:, None, None], solved, 0.0)
-        sr, sm, sf = solved[..., 0], solved[..., 1 : m + 1], solved[..., m + 1 :]
-        rss = rr - (pr * sr).sum(axis=1) + x.prior_square
-        b = mr - np.einsum("npm,np->nm", pm, sr)
-        c = mm - (pm * sm).sum(axis=1)
-        c = np.where(c > ABSORBED * square, c, np.inf)
-        shared = -0.5 * (np.log1p(ratio * x.singular**2).sum(axis=1) + np.linalg.slogdet(pp)[1])
-        shared = np.where(regular, shared, -np.inf)
-        for key, piece in (("shared", shared), ("rss", rss), ("along", b), ("square", c)):
-            kept[key].append(piece)
-        b = np.where(x.one_sided, np.maximum(b, 0.0), b)
-        plain.append(shared - 0.5 * degrees * np.log(np.maximum(rss, least)))
-        effects.append(shared[:, None] - 0.5 * degrees * np.log(np.maximum(rss[:, None] - b**2 / c, least[:, None])))
-        amplitude.append(b / c)
-        norm.append(
-            np.sqrt(np.where(np.isfinite(c), c, 0.0) * degrees / np.maximum(rss[:, None] - b**2 / c, least[:, None]))
-        )
-        ff = ff0 - np.swapaxes(levels[..., functions], 1, 2) @ weighted[..., functions] - np.swapaxes(pf, 1, 2) @ sf
-        fr = fr0 - np.einsum("nhf,nh->nf", levels[..., functions], weighted[..., -1]) - np.einsum("npf,np->nf", pf, sr)
-        values, vectors = eigh(ff)
-        values = np.maximum(values, 0.0)
-        along = np.einsum("nfg,nf->ng", vectors, fr) ** 2
-        variance = np.maximum(rss, least) / degrees
-        for size in SIZES:
-            s2 = (size**2 * variance / np.maximum(values.sum(axis=1), 1e-300))[:, None] / variance[:, None]
-            # The process is measured in units of the noise that is left beside it.
-            left = np.maximum(rss - (along * s2 / (1.0 + s2 * values)).sum(axis=1), least)
-            loose.append(shared - 0.5 * np.log1p(s2 * values).sum(axis=1) - 0.5 * degrees * np.log(left))
-    reference = logsumexp(plain, axis=0)
-    best = np.argmax(effects, axis=0)
+    shrink = damp(x.singular[:, None], RATIOS[:, None])
+    of_m, of_f = slice(p + 1, p + 1 + m), slice(p + 1 + m, None)
+    # Inner products of the parameters with everything, at each ratio.
+    shrunk = np.swapaxes(levels[..., :p], 1, 2)[:, None] * shrink[:, :, None]
+    gram = (np.swapaxes(x.parameters, 1, 2) @ columns)[:, None] - shrunk @ levels[:, None]
+    gram[..., :p] += x.prior_precision[:, None]
+    gram[..., p] += x.prior_gradient[:, None]
+    factor = cholesky(gram[..., :p])
+    # There may be a ratio at which the parameters cannot be told apart: it is left out.
+    regular = np.isfinite(factor).all(axis=(2, 3))
+    factor[~regular] = np.eye(p)
+    # What the parameters take of each column, in coordinates in which it is a sum of squares.
+    taken = np.linalg.inv(factor) @ gram[..., p:]
+    taken[~regular] = 0.0
+    residual, signatures, flexible = taken[..., 0], taken[..., 1 : m + 1], taken[..., m + 1 :]
+
+    def whitened(plain: Array, one: Array, other: Array) -> Array:
+        """(n, k, c) products of columns, given those (n, c) without setting errors and the columns' levels."""
+        return np.asarray(plain[:, None] - shrink @ (one * other))
+
+    r, levels_m, levels_f = levels[..., p : p + 1], levels[..., of_m], levels[..., of_f]
+    square = (x.signatures**2).sum(axis=1)
+    rr = whitened((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
+    mr = whitened((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
+    mm = whitened(square, levels_m, levels_m)
+    rss = rr - (residual**2).sum(axis=2) + x.prior_square[:, None]
+    b = mr - (residual[:, :, None] @ signatures)[:, :, 0]
+    c = mm - (signatures**2).sum(axis=2)
+    c = np.where(c > ABSORBED * square[:, None], c, np.inf)
+    shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
+    shared = np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf)
+    positive = np.where(x.one_sided, np.maximum(b, 0.0), b)
+    least = least[:, None]
+    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
+    left = np.maximum(rss[..., None] - positive**2 / c, least[..., None])
+    effects = shared[..., None] - 0.5 * degrees * np.log(left)
+    ff = (np.swapaxes(x.flexible, 1, 2) @ x.flexible)[:, None] - np.swapaxes(flexible, 2, 3) @ flexible
+    ff -= (np.swapaxes(levels_f, 1, 2)[:, None] * shrink[:, :, None]) @ levels_f[:, None]
+    fr = whitened((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
+    loose = []
+    for size in SIZES:
+        log_volume, less = _taken_by(ff, fr, size)
+        # The process is measured in units of the noise that is left beside it.
+        loose.append(shared - log_volume - 0.5 * degrees * np.log(np.maximum(rss - less, least)))
+    reference = logsumexp(plain, axis=1)
+    seen = np.isfinite(reference)
+    reference = np.where(seen, reference, 0.0)
+    flexible_value = logsumexp(np.concatenate(loose, axis=1), axis=1) - np.log(len(SIZES)) - reference
+    best = np.argmax(effects, axis=1)[:, None]
+    amplitude = np.take_along_axis(b / c, best, axis=1)[:, 0]
+    at_best = np.take_along_axis(left, best, axis=1)[:, 0]
+    c_best = np.take_along_axis(c, best, axis=1)[:, 0]
+    norm = np.sqrt(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best)
     return Scan(
-        logsumexp(effects, axis=0) - reference[:, None],
-        logsumexp(loose, axis=0) - np.log(len(SIZES)) - reference,
-        np.take_along_axis(np.array(amplitude), best[None], axis=0)[0],
-        np.take_along_axis(np.array(norm), best[None], axis=0)[0],
-        Pieces(
-            np.array(kept["shared"]),
-            np.array(kept["rss"]),
-            np.array(kept["along"]),
-            np.array(kept["square"]),
-            degrees,
-            least,
-            x.one_sided,
-        ),  # fmt: skip
+        np.where(seen[:, None], logsumexp(effects, axis=1) - reference[:, None], 0.0),
+        np.where(seen, flexible_value, 0.0),
+        amplitude,
+        norm,
+        Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, least[:, 0], x.one_sided),
     )
+
+
+def _taken_by(square: Array, along: Array, size: float) -> tuple[Array, Array]:
+    """What a process of a size takes of the readings: half a log determinant (...), and of the sum of squares (...).
+
+    `square` (..., q, q) and `along` (..., q) are the inner products of its functions with themselves and the residual.
+    """
+    q = along.shape[-1]
+    share = (size**2 / np.maximum(np.einsum("...ff->...", square), 1e-300))[..., None]
+    # One Cholesky factor of I + share square, bordered by the residual's products, holds both; the corner is not used.
+    bordered = np.zeros((*along.shape[:-1], q + 1, q + 1))
+    bordered[..., :q, :q] = share[..., None] * square
+    bordered.reshape(-1, (q + 1) ** 2)[:, :: q + 2] += 1.0
+    bordered[..., q, :q] = np.sqrt(share) * along
+    bordered[..., q, q] = _LARGEST
+    factor = cholesky(bordered)
+    with np.errstate(invalid="ignore"):
+        log_volume = np.log(np.einsum("...ff->...f", factor)[..., :q]).sum(axis=-1)
+        less = (factor[..., q, :q] ** 2).sum(axis=-1)
+    # Functions that the parameters take entirely leave rounding errors.
+    seen = np.isfinite(log_volume + less)
+    return np.where(seen, log_volume, 0.0), np.where(seen, less, 0.0)
 
 
 def _without_tangent(x: Expansion) -> Expansion:
@@ -456,8 +503,8 @@ def prior_density(target: LogPosterior, z: Array) -> Array:
     return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta))
 
 
-def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Array]:
-    """Gradient and (diagonal, positive) precision of the prior in the sampled coordinates that move the mean."""
+def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Array, Array]:
+    """Log density of the prior; its gradient and (diagonal, positive) precision by the sampled coordinates `moving`."""
     h = 1e-3
     n, p = len(z), len(moving)
     values = prior_density(target, np.concatenate([z, *_shifted(z, moving, h), *_shifted(z, moving, -h)]))
@@ -469,7 +516,7 @@ def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Ar
         diagonal = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
     precision = np.zeros((n, p, p))
     precision[:, np.arange(p), np.arange(p)] = diagonal
-    return gradient, precision
+    return values[:n], gradient, precision
 
 
 def _shifted(z: Array, columns: list[int], step: float) -> list[Array]:
@@ -490,5 +537,7 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 _STEP = 1e-5
 _LARGEST = 1e100  # of any derivative: the square of a larger one overflows
+_PIECE = 8  # parameter sets scanned at once: what stays in the cache
+_LEAST_SQUARE = 1e-14  # share of the largest squared singular value: less is rounding
 _LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
 ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

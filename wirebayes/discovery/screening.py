@@ -20,7 +20,7 @@ from wirebayes.model.replicate import readings as replicate
 from wirebayes.wire.effect import Effect, EventEffect
 
 Array = NDArray[Any]
-_ROWS = 250  # replicates linearised at once
+_ROWS = 100  # replicates linearised at once
 _FLEXIBLE = "unknown"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 _AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
@@ -136,7 +136,7 @@ def replicated(
     theta = block.target.coordinates.to_natural(z)
     problem = block.target.problem
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
-    found = climb(rowwise(block.target, y), z, iterations=25, tolerance=1e-2)
+    found = climb(rowwise(block.target, y), z, iterations=25, tolerance=1e-2, curvature_at_end=False)
     shapes = forms(block.target, block.modes.z[:1], trials)
     parts = []
     for begin in range(0, n, _ROWS):
@@ -147,6 +147,8 @@ def replicated(
 
 def joined_replicates(parts: Sequence[Replicates]) -> Replicates:
     """Several lots of replicates of one block as one."""
+    if len(parts) == 1:
+        return parts[0]
     readings = [np.concatenate(y, axis=-1) for y in zip(*(p.readings for p in parts), strict=True)]
     return Replicates(joined([p.scan for p in parts]), np.concatenate([p.z for p in parts]), readings)
 

@@ -74,6 +74,7 @@ def climb(
     iterations: int = 60,
     tolerance: float = 1e-5,
     until: Callable[[Array], NDArray[np.bool_]] = lambda z: np.zeros(len(z), bool),
+    curvature_at_end: bool = True,
 ) -> Optimum:
     """Maximise a log density from every row of `start`.
 
@@ -87,6 +88,8 @@ def climb(
         Stop a row when half its squared Newton decrement is below this.
     until : function of (m, d) points to (m,) bool
         Give up the rows, after a step, for which it says so; their log density becomes -inf.
+    curvature_at_end : bool
+        Where only the places matter, the curvature may stay that of the last step: it takes half the evaluations.
 
     Returns
     -------
@@ -130,7 +133,7 @@ def climb(
         left = rows[until(z[rows])]
         done[left], value[left] = True, -np.inf
     rows = np.flatnonzero(np.isfinite(value))
-    if len(rows):
+    if len(rows) and curvature_at_end:
         _, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=2)
         eigen, vectors = _positive(-hessian)
         curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)

@@ -16,6 +16,7 @@ setting_sd     0.004 to 0.2 mm       a milling machine's screw up to a hand-set 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -145,6 +146,11 @@ def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
 
 def wire_defaults(length_mm: float) -> dict[str, Any]:
     """Distributions of the plain model's parameters for a sample of this length (see the module's table)."""
+    return dict(_wire_defaults(length_mm))
+
+
+@cache  # scipy takes as long to make eight distributions as a hundred points take to be evaluated
+def _wire_defaults(length_mm: float) -> dict[str, Any]:
     return {
         "k1": stats.lognorm(1.5, scale=2000.0),
         "B": stats.lognorm(1.2, scale=3.7e-4 * length_mm),

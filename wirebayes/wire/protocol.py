@@ -1,6 +1,8 @@
 """What was done to a wire: the sequence of holds, padded to rectangular arrays."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,3 +53,55 @@ class Protocol:
     def start_s(self) -> Floats:
         """(H,) elapsed time at which each hold begins; moves take none."""
         return np.concatenate([[0.0], np.cumsum(self.duration_s)[:-1]])
+
+    @cached_property
+    def distinct_times(self) -> tuple[Floats, tuple[slice | NDArray[np.int64], ...]]:
+        """Times of readings (T,), of an unrecorded hold its end, each once, and for every hold where its own stand."""
+        time = np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
+        times, where = np.unique(time, return_inverse=True)
+        rows = where.reshape(time.shape)
+        # A slice copies nothing, and most holds are read in the same order.
+        runs = [np.array_equal(row, np.arange(row[0], row[0] + len(row))) for row in rows]
+        return times, tuple(
+            slice(row[0], row[0] + len(row)) if run else row for row, run in zip(rows, runs, strict=True)
+        )
+
+    @cached_property
+    def last_reading(self) -> NDArray[np.int64]:
+        """(H,) column of each hold's last reading."""
+        return np.asarray(np.maximum(self.mask.sum(axis=1) - 1, 0))
+
+    @cached_property
+    def holds(self) -> tuple[dict[str, Any], ...]:
+        """What `wirebayes.wire.effect.HoldContext` says of each hold whatever the wire."""
+        start, time = self.start_s, np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
+        warming = np.zeros_like(time) if self.warming_K is None else self.warming_K
+        before = np.concatenate([[0.0], self.displacement_mm])
+        directions = _directions(self.displacement_mm)
+        out = []
+        for j, number in enumerate(self.number):
+            later = self.number[j:][self.number[j:] >= 0]
+            out.append({
+                "index": j,
+                "recorded": bool(self.recorded[j]),
+                "order": float(number) if number >= 0 else (float(later[0]) - 0.5 if later.size else np.inf),
+                "displacement_mm": float(self.displacement_mm[j]),
+                "previous_mm": float(before[j]),
+                "direction": int(directions[j]),
+                "first_direction": int(directions[0]),
+                "start_s": float(start[j]),
+                "duration_s": float(self.duration_s[j]),
+                "time_s": time[j][:, None],
+                "warming_K": warming[j][:, None],
+                "length_mm": self.length_mm,
+            })  # fmt: skip
+        return tuple(out)
+
+
+def _directions(displacement_mm: Floats) -> Floats:
+    """(H,) sign of the last move; a hold without a move keeps the one before, and a test begins upwards."""
+    out, current = np.empty(len(displacement_mm)), 1.0
+    for j, move in enumerate(np.sign(np.diff(displacement_mm, prepend=0.0))):
+        current = move or current
+        out[j] = current
+    return out

@@ -17,6 +17,7 @@ from wirebayes.wire.effect import Effect, HoldContext, Placed
 from wirebayes.wire.protocol import Protocol
 
 Theta = Mapping[str, NDArray[Any]]
+_NONE: NDArray[Any] = np.zeros((1, 1))
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 
 
@@ -109,17 +110,34 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     """
     n = np.shape(theta["k1"])[0]
     holds, width = protocol.time_s.shape
-    walk = Walk(protocol, theta, model)
+    walk = Walk(protocol, {k: np.tile(v, 2) for k, v in theta.items()} if model.effects else theta, model)
     shape = (holds, width, n)
     tension, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
     carry_by_setting, carry_by_creep = np.empty((holds, n)), np.empty((holds, n))
     creep = np.zeros((holds + 1, n))
     beside: dict[str, NDArray[Any]] = {}
-    step = walk.closed_form if not model.effects else walk.complex_step
+    if not model.effects:
+        for j in range(holds):
+            tension[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
+                walk.closed_form(j, walk.stretched(j), creep[j])
+            )
+        return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
+    # Both complex steps in one pass: the first n columns take that of the setting error, the others that of the creep.
+    of_setting, of_creep = slice(None, n), slice(n, None)
+    steps = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
     for j in range(holds):
-        tension[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j], beside = step(
-            j, walk.stretched(j), creep[j], beside
+        y, out, beside = walk.hold(j, walk.stretched(j) + steps[0], np.tile(creep[j], 2) + steps[1], beside)
+        tension[j], by_setting[j], by_creep[j] = y[:, of_creep].real, y[:, of_setting].imag, y[:, of_creep].imag
+        creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
+            out[of_creep].real,
+            out[of_setting].imag,
+            out[of_creep].imag,
         )
+        start_s, amount, k2 = walk.past[-1]
+        walk.past[-1] = (start_s, amount.real, k2.real)
+        beside = {key: value.real for key, value in beside.items()}
+    for derivative in (by_setting, by_creep, carry_by_setting, carry_by_creep):
+        derivative /= _STEP
     return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
 
 
@@ -128,10 +146,6 @@ class Walk:
 
     def __init__(self, protocol: Protocol, theta: Theta, model: Model) -> None:
         self.protocol, self.model = protocol, model
-        self.last = np.maximum(protocol.mask.sum(axis=1) - 1, 0)
-        self.time = np.where(protocol.recorded[:, None], protocol.time_s, protocol.duration_s[:, None])
-        self.start = protocol.start_s
-        self.directions = _directions(protocol.displacement_mm)
         self.past: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
         self.effects = Placed(model.effects, theta)
         self.at, self.change = self.effects.at, self.effects.change
@@ -143,10 +157,10 @@ class Walk:
         self.k2, self.N = self.theta["k2"], self.theta["N"]
         self.base = protocol.length_mm + self.theta["preload"]
         self.kept = self.creep.kept
+        self.own_time = bool(self.at.keys() & {"rate", "clock", "fraction"})
         # Holds mostly share their reading times, so the exponentials are few.
-        times, where = np.unique(self.time, return_inverse=True)
+        times, self.where = protocol.distinct_times
         self.fraction = laws.creep_fraction(times[:, None], self.k2, self.N)
-        self.where = where.reshape(self.time.shape)
 
     def stretched(self, j: int) -> NDArray[Any]:
         return self.base + self.protocol.displacement_mm[j]
@@ -166,48 +180,33 @@ class Walk:
             hold.carried = hold.carried + waited
             hold.initial_tension = self._first(position, hold.carried + extra, hold)
         amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
-        own_time = self.at.keys() & {"rate", "clock", "fraction"}
-        fraction = law.fraction(k2, hold) if own_time else self.fraction[self.where[j]]
+        fraction = law.fraction(k2, hold) if self.own_time else self.fraction[self.where[j]]
         grown = law.creep(hold.carried + amount * fraction, hold)
-        self.past.append((float(self.start[j]), amount, k2))
+        self.past.append((hold.start_s, amount, k2))
         courses = law.beside(beside, hold)
         total = sum(courses.values(), grown)
         readings = self.change("reading", self._tension(position, total, hold), hold)
-        last = self.last[j]
+        last = self.protocol.last_reading[j]
         return readings, grown[last], {key: course[last][None] for key, course in courses.items()}
-
-    def complex_step(
-        self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
-    ) -> Any:
-        """`hold` with its derivatives by setting error and carried creep."""
-        past = list(self.past)
-        y_s, out_s, _ = self.hold(j, stretched + 1j * _STEP, creep, beside)
-        self.past = past
-        y_c, out_c, after = self.hold(j, stretched, creep + 1j * _STEP, beside)
-        start_s, amount, k2 = self.past[-1]
-        self.past[-1] = (start_s, amount.real, k2.real)
-        after = {key: value.real for key, value in after.items()}
-        return y_c.real, y_s.imag / _STEP, y_c.imag / _STEP, out_c.real, out_s.imag / _STEP, out_c.imag / _STEP, after
 
     def fresh(self, j: int, stretched: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
         """Some readings (r, n) of a hold without a past, and their derivatives by the stretched length."""
         self.past = []
         uncrept = np.zeros(len(stretched))
         if not self.model.effects:
-            tension, slope, *_ = self.closed_form(j, stretched, uncrept, {}, rows)
+            tension, slope, *_ = self.closed_form(j, stretched, uncrept, rows)
             return tension, slope
         moved = self.hold(j, stretched + 1j * _STEP, uncrept, {})[0][rows]
         return moved.real, moved.imag / _STEP
 
     def closed_form(
-        self,
-        j: int,
-        stretched: NDArray[Any],
-        creep: NDArray[Any],
-        beside: dict[str, NDArray[Any]],
-        rows: slice = slice(None),
-    ) -> Any:
-        """The same without effects, of some of the readings: eqs (4)-(6) differentiated by hand."""
+        self, j: int, stretched: NDArray[Any], creep: NDArray[Any], rows: slice = slice(None)
+    ) -> tuple[NDArray[Any], ...]:
+        """A hold without effects, eqs (4)-(6) differentiated by hand.
+
+        Some of the readings (r, n) with their derivatives by setting error and carried creep, and the creep carried out
+        (n,) with the same two.
+        """
         law, length, k1 = self.model.law, self.protocol.length_mm, self.k1
         zero = length + creep
         first = k1 * laws.strain(stretched, zero, law)
@@ -218,16 +217,17 @@ class Walk:
         slope = self.U * target / safe * k1
         amount = target - self.kept * creep
         amount_s, amount_c = slope * by_s, slope * by_l - self.kept
-        fraction = self.fraction[self.where[j, rows]]
+        every = self.fraction[self.where[j]]
+        fraction = every[rows]
         zero = zero + amount * fraction
         tension = k1 * laws.strain(stretched, zero, law)
         by_s, by_l = laws.strain_slopes(stretched, zero, law)
         stiff = np.where(tension > 0, k1, 0.0)
         by_setting = stiff * (by_s + by_l * (amount_s * fraction))
         by_creep = stiff * (by_l * (1.0 + amount_c * fraction))
-        end = self.fraction[self.where[j, self.last[j]]]
+        end = every[self.protocol.last_reading[j]]
         out = creep + amount * end
-        return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end, beside
+        return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end
 
     def _first(self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
         """Tension (1, n) when the hold begins: effects see its first time only."""
@@ -243,36 +243,16 @@ class Walk:
         return np.where(strain.real > 0, self.k1 * strain, 0.0)
 
     def _context(self, j: int) -> HoldContext:
-        p = self.protocol
-        later = p.number[j:][p.number[j:] >= 0]
-        order = float(p.number[j]) if p.number[j] >= 0 else (float(later[0]) - 0.5 if later.size else np.inf)
+        length_ref_mm = self.model.length_ref_mm or self.protocol.length_mm
         return HoldContext(
-            index=j,
-            recorded=bool(p.recorded[j]),
-            order=order,
-            displacement_mm=float(p.displacement_mm[j]),
-            previous_mm=float(p.displacement_mm[j - 1]) if j else 0.0,
-            direction=int(self.directions[j]),
-            first_direction=int(self.directions[0]),
-            start_s=float(self.start[j]),
-            duration_s=float(p.duration_s[j]),
-            time_s=self.time[j][:, None],
-            warming_K=np.zeros((p.time_s.shape[1], 1)) if p.warming_K is None else p.warming_K[j][:, None],
-            length_mm=p.length_mm,
-            length_ref_mm=self.model.length_ref_mm or p.length_mm,
+            **self.protocol.holds[j],
+            length_ref_mm=length_ref_mm,
             tension_ref_N=self.model.tension_ref_N,
             theta=self.theta,
+            initial_tension=_NONE,
+            carried=_NONE,
             past=self.past,
         )
-
-
-def _directions(displacement_mm: NDArray[Any]) -> NDArray[Any]:
-    """(H,) sign of the last move; a hold without a move keeps the one before, and a test begins upwards."""
-    out, current = np.empty(len(displacement_mm)), 1.0
-    for j, move in enumerate(np.sign(np.diff(displacement_mm, prepend=0.0))):
-        current = move or current
-        out[j] = current
-    return out
 
 
 def tension_reference(tensions: Sequence[float] | NDArray[Any]) -> float:
