@@ -1,6 +1,6 @@
-"""From screened candidates to names: refit those that stand a chance, add up their evidence, weigh against unknown."""
+"""From screened candidates to names: refit those that stand a chance and add up the evidence of their forms."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,18 +10,29 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.discovery.linear_scan import Probe, Scan
-from wirebayes.discovery.refit import Refit, probabilities, refit, smallest_set
-from wirebayes.discovery.screening import Candidate, flexible_log_bayes, log_bayes
+from wirebayes.discovery.refit import Refit, refit
+from wirebayes.discovery.screening import Candidate, log_bayes
+from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import Each
 
 Array = NDArray[Any]
-_Form = tuple[str, str, tuple[int, ...], bool]  # name, key of the effect, blocks, one amplitude for all
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
-UNKNOWN_WEIGHT = 1.0  # prior odds of *something unknown* to one named effect
+Correction = Callable[[Refit], float]
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
-_MOST, _MOST_A_NAME = 16, 3
+_HOPELESS = -2.0  # nats: a block whose scan speaks against an effect is not refitted with it
+
+
+@dataclass(frozen=True)
+class _Form:
+    """One variant of an effect: its places, a linear log Bayes factor each, and the probe that has it."""
+
+    effect: Effect
+    places: tuple[_Place, ...]
+    linear: tuple[float, ...]
+    probes: tuple[int, ...]
+    promise: float
 
 
 @dataclass(frozen=True)
@@ -31,102 +42,118 @@ class NameEvidence:
     Attributes
     ----------
     log_bayes : dict
-        Of each name against no effect.
-    unknown : float
-        The same of the flexible reference.
+        Of each name against no effect, summed over its forms.
     winners : dict of name to list of Refit
-        Of its best form: one refit, or one a block.
-    shares : dict
-        Probabilities over names and *unknown*.
+        Of its best form: one refit, or one for each block that has an amplitude of its own. Only names that were
+        refitted.
+    acting : dict of name to (b,) array
+        Probability that the effect acts on each block, given that it is there.
     """
 
     log_bayes: dict[str, float]
-    unknown: float
     winners: dict[str, list[Refit]]
-    shares: dict[str, float]
-
-    @property
-    def best(self) -> str:
-        return max(self.shares, key=lambda name: self.shares[name])
-
-    @property
-    def set(self) -> list[str]:
-        return smallest_set(self.shares)
+    acting: dict[str, Array]
 
     def amplitudes(self, name: str) -> dict[int, Refit]:
         """Refit of a name by block."""
         return {b: r for r in self.winners[name] for b in r.blocks}
 
 
-def choose(
+def weigh_names(
     blocks: Sequence[LaplaceFit],
     trials: Sequence[Probe],
     candidates: Sequence[Candidate],
     scans: Sequence[Scan],
     further: Mapping[Candidate, float] = {},
     each: Each = map,
+    correction: Correction = lambda found: 0.0,
+    most: int = 16,
+    forms_a_name: int = 3,
 ) -> NameEvidence:
     """Evidence of every name, refitted where the scan, or the test from larger effects, gives it a chance.
 
-    Refits are independent of each other, and `each` may be a `map` over processes.
+    Parameters
+    ----------
+    blocks : sequence of LaplaceFit
+    trials, candidates
+        See `wirebayes.discovery.screening.candidate_probes`.
+    scans : sequence of Scan
+        Of the readings, a block each.
+    further : mapping of Candidate to float
+        Log Bayes factors of the effects that were tried from larger amplitudes.
+    each : function, optional
+        The built-in `map`, or one over processes: refits are independent of each other.
+    correction : function of Refit
+        Added to the log Bayes factor of every refit (see `wirebayes.discovery.stepwise`).
+    most, forms_a_name : int
+        Forms that are refitted at the most, and of one name.
     """
-    linear = [tuple(float(v[0]) for v in log_bayes(c, scans)) for c in candidates]
-    forms: dict[_Form, int] = {}
-    promise: dict[_Form, float] = {}
-    for i, c in enumerate(candidates):
-        effect = trials[c.probe].effect
-        form = (c.name, effect.key, c.blocks, c.shared)
-        promise[form] = max(promise.get(form, -np.inf), linear[i][0], further.get(c, -np.inf))
-        if form not in forms or linear[i][0] > linear[forms[form]][0]:
-            forms[form] = i
-    ranked = sorted(forms.items(), key=lambda item: -promise[item[0]])
-    top = promise[ranked[0][0]]
-    near = [f for f, _ in ranked if promise[f] >= top - _MARGIN - _SHARE * max(top, 0.0)][:_MOST]
-    names = {name for name, *_ in near}
-    tried: dict[_Form, list[_Place]] = {}
+    forms = _forms(trials, candidates, scans, further)
+    ranked = sorted(forms, key=lambda f: -f.promise)
+    top = ranked[0].promise
+    names = {f.effect.name for f in ranked[:most] if f.promise >= top - _MARGIN - _SHARE * max(top, 0.0)}
     tasks: dict[_Place, tuple[Effect, float, float]] = {}
-    for form, i in ranked:
+    tried: list[str] = []
+    for form in ranked:
+        name = form.effect.name
         # A name that stands a chance is refitted in its other forms too: the scan may have taken the wrong one.
-        if form[0] not in names or sum(f[0] == form[0] for f in tried) >= _MOST_A_NAME:
+        if name not in names or tried.count(name) >= forms_a_name:
             continue
-        c = candidates[i]
-        effect = trials[c.probe].effect
-        tried[form] = [(effect.key, on) for on in ([c.blocks] if c.shared else [(b,) for b in c.blocks])]
-        for place in tried[form]:
-            # Each block on its own is a form too, and need not be refitted twice.
-            _, guess, per_delta = log_bayes(Candidate(c.probe, c.name, place[1], True), scans)
-            tasks.setdefault(place, (effect, float(per_delta[0]), float(guess[0])))
+        tried.append(name)
+        best = max(form.linear)
+        for place, value, probe in zip(form.places, form.linear, form.probes, strict=True):
+            if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
+                _, guess, per_delta = log_bayes(Candidate(probe, name, place[1], True), scans)
+                tasks[place] = form.effect, float(per_delta[0]), float(guess[0])
     done = each(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
     found = dict(zip(tasks, done, strict=True))
-    refitted = {form: [found[place] for place in places] for form, places in tried.items()}
-    values: dict[str, dict[tuple[str, tuple[int, ...], bool], float]] = {}
-    for form, i in forms.items():
-        value = sum(r.log_bayes for r in refitted[form]) if form in refitted else linear[i][0]
-        values.setdefault(form[0], {})[form[1:]] = value
-    evidence = {name: _average(v, len(blocks)) for name, v in values.items()}
-    unknown = flexible_evidence(scans)
-    winners = {}
-    for name in evidence:
-        own = {form: r for form, r in refitted.items() if form[0] == name}
-        if own:
-            winners[name] = max(own.values(), key=lambda r: sum(x.log_bayes for x in r))
-    shares = probabilities({n: v for n, v in evidence.items() if n in winners}, unknown, UNKNOWN_WEIGHT)
-    return NameEvidence(evidence, unknown, winners, shares)
+    return _summed(forms, found, len(blocks), correction)
 
 
-def flexible_evidence(scans: Sequence[Scan]) -> float:
-    """Log Bayes factor of the flexible reference: on all blocks as likely as on one of them."""
-    loose = flexible_log_bayes(scans)[:, 0]
-    if len(scans) == 1:
-        return float(loose[-1])
-    return float(logsumexp([loose[-1] + np.log(0.5), *(loose[:-1] - np.log(2.0 * len(scans)))]))
+def _forms(
+    trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan], further: Mapping[Candidate, float]
+) -> list[_Form]:
+    """The variants of every effect, each place with the probe that the linear scan likes best there."""
+    best: dict[_Place, tuple[float, int]] = {}
+    effects: dict[str, Effect] = {}
+    promise: dict[str, float] = {}
+    for c in candidates:
+        effect = trials[c.probe].effect
+        effects[effect.key] = effect
+        value = float(log_bayes(c, scans)[0][0])
+        promise[effect.key] = max(promise.get(effect.key, -np.inf), value, further.get(c, -np.inf))
+        if c.shared:
+            place = effect.key, c.blocks
+            best[place] = max(best.get(place, (-np.inf, 0)), (value, c.probe), key=lambda item: item[0])
+    out = []
+    for key, effect in effects.items():
+        places = [place for place in best if place[0] == key]
+        values, which = zip(*(best[place] for place in places), strict=True)
+        out.append(_Form(effect, tuple(places), values, which, promise[key]))
+    return out
 
 
-def _average(values: dict[tuple[str, tuple[int, ...], bool], float], blocks: int) -> float:
-    """Log of the mean Bayes factor over an effect's forms: its variants equally, on all blocks as often as on one."""
-    variants = {key[0] for key in values}
-    logs = []
-    for (_, on, _), value in values.items():
-        weight = 1.0 if blocks == 1 or len(on) == blocks else 0.5 / blocks
-        logs.append(value + np.log(weight))
-    return float(logsumexp(logs) - np.log(len(variants)))
+def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int, correction: Correction) -> NameEvidence:
+    """Add up the forms of every name: its variants equally, its blocks by `over_subsets`."""
+    parts: dict[str, list[tuple[float, Array, list[Refit]]]] = {}
+    for form in forms:
+        refits = [found.get(place) for place in form.places]
+        pairs = zip(refits, form.linear, strict=True)
+        values = np.array([linear if r is None else r.log_bayes + correction(r) for r, linear in pairs])
+        total, each, chosen = over_subsets(values)
+        acting = np.zeros(blocks)
+        for share, (_, on) in zip(each, form.places, strict=True):
+            acting[list(on)] = share
+        winners = [refits[i] for i in chosen]
+        kept = [r for r in winners if r is not None] if all(r is not None for r in winners) else []
+        parts.setdefault(form.effect.name, []).append((total, acting, kept))
+    log_bayes, winners_, acting_ = {}, {}, {}
+    for name, options in parts.items():
+        totals = np.array([total for total, _, _ in options])
+        log_bayes[name] = float(logsumexp(totals) - np.log(len(totals)))
+        share = np.exp(totals - logsumexp(totals))
+        acting_[name] = np.sum([s * acting for s, (_, acting, _) in zip(share, options, strict=True)], axis=0)
+        refitted = [option for option in options if option[2]]
+        if refitted:
+            winners_[name] = max(refitted, key=lambda option: option[0])[2]
+    return NameEvidence(log_bayes, winners_, acting_)

@@ -10,6 +10,7 @@ from scipy import stats
 
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
 from wirebayes.discovery.refit import LARGEST, occam
+from wirebayes.discovery.settings import NEARLY_ONE
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
@@ -49,21 +50,44 @@ def similarity(
 
     An effect with one amplitude a block may put any size on each, so it is as alike as the best sizes make it.
     """
+    cosines = _cosines(expansions, trials, ratios)
+    names = [t.effect.name for t in trials]
+    out: dict[tuple[str, str], float] = {}
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            out[a, b] = max(out.get((a, b), 0.0), float(cosines[i, j]))
+    return out
+
+
+def copies(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> dict[str, int]:
+    """How many names are one and the same in these tests, itself included, by name.
+
+    Two names are where each form of either has a form of the other with the same signature.
+    """
+    same = _cosines(expansions, trials, ratios) > NEARLY_ONE
+    forms: dict[str, list[int]] = {}
+    for k, trial in enumerate(trials):
+        if same[k, k]:  # it shows at all
+            forms.setdefault(trial.effect.name, []).append(k)
+    both = {
+        (a, b): same[np.ix_(i, j)].any(axis=1).all() and same[np.ix_(i, j)].any(axis=0).all()
+        for a, i in forms.items()
+        for b, j in forms.items()
+    }
+    return {a: sum(bool(both[a, b]) for b in forms) for a in forms}
+
+
+def _cosines(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> Array:
+    """(m, m) |cos| of the projected signatures, zero for one that does not show."""
     parts = [projected(x, r) for x, r in zip(expansions, ratios, strict=True)]
     lengths = np.array([(p**2).sum(axis=0) for p in parts])
     products = np.array([p.T @ p for p in parts])
-    names = [t.effect.name for t in trials]
     material = np.array([t.effect.scope == "material" for t in trials]) & (len(expansions) > 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         together = products.sum(axis=0) ** 2 / (lengths.sum(axis=0)[:, None] * lengths.sum(axis=0)[None])
         loose = (products**2 / lengths[:, None, :]).sum(axis=0) / lengths.sum(axis=0)[:, None]
     square = np.nan_to_num(np.where(material[None, :], loose, together))
-    square = np.maximum(square, square.T)
-    out: dict[tuple[str, str], float] = {}
-    for i, a in enumerate(names):
-        for j, b in enumerate(names):
-            out[a, b] = max(out.get((a, b), 0.0), float(np.sqrt(min(square[i, j], 1.0))))
-    return out
+    return np.sqrt(np.minimum(np.maximum(square, square.T), 1.0))
 
 
 def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> list[str]:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.wire.effect import Effect
@@ -130,23 +129,3 @@ def _width(grid: Array, value: Array, best: int, fallback: float) -> float:
             if bend < 0:
                 return float(fallback / np.sqrt(-bend))
     return fallback
-
-
-def probabilities(log_bayes: dict[str, float], unknown: float, weight: float) -> dict[str, float]:
-    """Posterior probabilities of the names and of *unknown* (prior odds `weight` to one name), without *none*."""
-    names = list(log_bayes)
-    values = np.array([*log_bayes.values(), unknown + np.log(weight)])
-    share = np.exp(values - logsumexp(values))
-    return dict(zip([*names, "unknown"], share.tolist(), strict=True))
-
-
-def smallest_set(shares: dict[str, float], level: float = 0.9) -> list[str]:
-    """The fewest names that together hold `level` of the probability, most probable first."""
-    out: list[str] = []
-    total = 0.0
-    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
-        out.append(name)
-        total += share
-        if total >= level:
-            break
-    return out

@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.discovery import gap, name_evidence, power, residual_patterns, screening
+from wirebayes.discovery import power, residual_patterns, shrinking
 from wirebayes.discovery.global_test import examine
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand
-from wirebayes.discovery.name_evidence import NameEvidence
+from wirebayes.discovery.model_space import smallest_set
+from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA, Settings
-from wirebayes.discovery.sharing import informed
-from wirebayes.discovery.verdict import KEEP_ELPD, Accepted, decide
+from wirebayes.discovery.stepwise import Accepted, Explored, explore
+from wirebayes.discovery.verdict import Decision, Verdict, decide, verdict_of
 from wirebayes.effects import CATALOGUE
-from wirebayes.effects.unknown import Discrepancy
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
@@ -30,6 +30,7 @@ from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import Each
 
 Array = NDArray[Any]
+_VISIBLE = 0.05  # p of a residual pattern that is told of the remainder
 
 
 @dataclass(frozen=True)
@@ -106,34 +107,37 @@ def investigate(
         residual_patterns.findings(p, len(trials), d, n, ", ".join(b.names))
         for p, d, n, b in zip(gate.patterns, data, nulls, plain, strict=True)
     ]
-    if test.p > ALPHA:
-        verdict, choice, accepted = "nothing-missing", None, list[Accepted]()
-        final = plain
-    else:
+    ratios = [float(x.ratio[0]) for x in gate.expansions]
+    expansions = [_only(x, len(trials)) for x in gate.expansions]
+    decision, explored = None, None
+    if test.p <= ALPHA:
         report("naming", 0, 1)
-        choice = name_evidence.choose(plain, trials, candidates, data, gate.further, each)
-        verdict, accepted, final, choice = decide(plain, choice, settings, rng, each)
-        for a in accepted:
-            if len(a.effects) > 1 and settings.kinds[a.name].scope in screening.FILE_WIDE:
-                final = informed(final, a.effects, rng)
+        found = weigh_names(plain, trials, candidates, data, gate.further, each)
+        explored = explore(plain, found, expansions, trials, data, settings, rng, each)
+        copies = power.copies(expansions, trials, ratios)
+        decision = decide(plain, explored, copies, settings, rng, each)
         report("naming", 1, 1)
+    answers = [_answer(plain, decision, explored, i, rng) for i in range(len(plain))]
+    final = [a.stages[-1] if a.stages else block for a, block in zip(answers, plain, strict=True)]
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
-    alike = power.similarity([_only(x, len(trials)) for x in gate.expansions], trials, ratios)
+    alike = power.similarity(expansions, trials, ratios)
     out: dict[str, Any] = {}
-    for i, block in enumerate(plain):
+    for i, (block, answer) in enumerate(zip(plain, answers, strict=True)):
         report("held-out holds", i, len(plain))
-        affected = [a for a in accepted if i in a.blocks]
-        common = _common(verdict, choice, affected, plain, final[i], i, test.p, where[i], alike)
-        common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, choice, common["verdict"], alike)
-        checks = _held_out(block, final[i], verdict, rng, each)
+        common = _common(answers, i, plain, test.p, where[i], alike)
+        common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, answer, alike)
+        names = [a.name for a in answer.accepted]
+        remains = answer.verdict in ("partial", "unknown")
+        checks = shrinking.shrinking(block, answer.stages, names, remains, rng, each)
         for e, check in zip(block.experiments, checks, strict=True):
             out[e.name] = common | {
-                "held_out": check,
-                "residual_rms_N": _left_over(block, e.name),
+                "steps": check.steps,
+                "held_out": check.held_out,
+                "residual_rms_N": shrinking.left_over(block, e.name),
                 "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
             }
     report("held-out holds", len(plain), len(plain))
-    return Findings({"version": 1, "experiments": out}, tuple(final))
+    return Findings({"version": 2, "experiments": out}, tuple(final))
 
 
 @dataclass(frozen=True)
@@ -149,19 +153,83 @@ def final_models(findings: Findings) -> list[JointModel]:
     """The final model of every experiment.
 
     Samples of one material share what they are, and the amplitude of what was added. Where nothing was, each stands for
-    itself; where what is missing has no name, with the flexible discrepancy.
+    itself; where something unknown remains, with the flexible discrepancy beside what was added.
     """
     out = []
     for block in findings.final:
         reports = [findings.report["experiments"][name] for name in block.names]
-        if block.effects:
+        remains = reports[0]["verdict"] in ("partial", "unknown")
+        if block.effects and not remains:
             out.append(JointModel(block.experiments, block.effects, block.best))
             continue
-        for e, report in zip(block.experiments, reports, strict=True):
-            flexible = report["verdict"] == "unknown"
-            effects = (_discrepancy(e, float(report["residual_rms_N"])),) if flexible else ()
-            out.append(JointModel((e,), effects, block.parameters(e.name)))
+        for e in block.experiments:
+            own = shrinking.alone(block.effects, e)
+            smooth = (shrinking.discrepancy(e, shrinking.left_over(block, e.name)),) if remains else ()
+            out.append(JointModel((e,), (*own, *smooth), block.parameters(e.name)))
     return out
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What is said of one material.
+
+    Attributes
+    ----------
+    verdict : str
+    accepted : list of Accepted
+    stages : list of LaplaceFit
+        Its block with the first accepted effect, the first two, and so on.
+    shares : dict
+        Probability of each name, and of *unknown*, to have the largest share; empty where nothing is missing.
+    inclusion : dict
+    remainder : dict
+    nothing : float or None
+        Probability that nothing is missing; None where only the global test was asked.
+    """
+
+    verdict: Verdict
+    accepted: list[Accepted]
+    stages: list[LaplaceFit]
+    shares: dict[str, float]
+    inclusion: dict[str, float]
+    remainder: dict[str, Any]
+    nothing: float | None
+
+    @property
+    def best(self) -> str | None:
+        if self.verdict == "unknown":
+            return "unknown"
+        return max(self.shares, key=lambda name: self.shares[name]) if self.shares else None
+
+    @property
+    def set(self) -> list[str]:
+        members = smallest_set(self.shares)
+        return members if self.verdict != "unknown" or "unknown" in members else [*members, "unknown"]
+
+
+def _answer(
+    plain: list[LaplaceFit], decision: Decision | None, explored: Explored | None, i: int, rng: np.random.Generator
+) -> _Answer:
+    """The verdict on block `i`, and its fits with what was accepted."""
+    if decision is None or explored is None:
+        return _Answer("nothing-missing", [], [], {}, {}, {"probability": 0.0, "where": [], "p": None}, None)
+    verdict, accepted = verdict_of(decision, i)
+    found, retest = decision.posterior, decision.retest
+    patterns = retest.where[i] if retest is not None and verdict == "partial" else []
+    remainder = {
+        "probability": float(found.remainder[i]),
+        "where": [w["covariate"] for w in patterns if w["p"] <= _VISIBLE],
+        "p": None if retest is None else retest.p,
+    }
+    stages: list[LaplaceFit] = []
+    for k in range(len(accepted)):
+        effects = tuple(a.effects[i] for a in accepted[: k + 1])
+        ready = [s.blocks[i] for s in explored.fitted.values() if s.blocks[i].effects == effects]
+        own, base = ready[0] if ready else None, plain[i]
+        stages.append(own or fitted(base.experiments, effects, base.law, base.history, rng))
+    inclusion = {name: float(p[i]) for name, p in sorted(found.inclusion.items(), key=lambda item: -item[1][i])}
+    shares = {} if verdict == "nothing-missing" else found.shares[i]
+    return _Answer(verdict, accepted, stages, shares, inclusion, remainder, float(found.nothing[i]))
 
 
 def _amplitude(final: LaplaceFit, effect: Effect) -> dict[str, Any]:
@@ -173,28 +241,29 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> dict[str, Any]:
 
 
 def _common(
-    verdict: str, choice: NameEvidence | None, affected: list[Accepted], plain: list[LaplaceFit], final: LaplaceFit,
-    i: int, p: float,
-    where: list[dict[str, Any]], alike: dict[tuple[str, str], float],
+    answers: Sequence[_Answer], i: int, plain: list[LaplaceFit], p: float, where: list[dict[str, Any]],
+    alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What the experiments of one block share in the report."""
-    names = [a.name for a in affected]
-    if choice is None or (verdict != "unknown" and not names):
-        verdict, members, shares, best = "nothing-missing", [], {}, None
-    else:
-        shares, best = choice.shares, choice.best
-        members = choice.set
+    answer = answers[i]
+    names, members = [a.name for a in answer.accepted], answer.set
     named = [m for m in members if m != "unknown"]
-    shared = [n for a in affected for b in a.blocks if b != i for n in plain[b].names]
+    shared = [n for a in answer.accepted for b in a.blocks if b != i for n in plain[b].names]
+    remainder = answer.remainder
+    if answer.verdict == "unknown":
+        remainder = remainder | {"where": [w["covariate"] for w in where if w["p"] <= _VISIBLE]}
     return {
-        "verdict": verdict,
-        "effects": names if verdict == "named" else named if verdict == "ambiguous" else [],
-        "best": best,
+        "verdict": answer.verdict,
+        "effects": names if answer.verdict in ("named", "partial") else named if answer.verdict == "ambiguous" else [],
+        "best": answer.best,
         "set": members,
         "group": (power.group_of(named, alike) if named else []) + (["unknown"] if "unknown" in members else []),
         "accepted": names,
-        "amplitudes": {a.name: _amplitude(final, a.effects[i]) for a in affected},
-        "probabilities": shares,
+        "amplitudes": {a.name: _amplitude(answer.stages[-1], a.effects[i]) for a in answer.accepted},
+        "probabilities": answer.shares,
+        "probability_nothing": answer.nothing,
+        "inclusion": answer.inclusion,
+        "remainder": remainder,
         "p_global": p,
         "shared_with": list(dict.fromkeys(shared)),
         "where": where,
@@ -203,7 +272,7 @@ def _common(
 
 def _outlook(
     block: LaplaceFit, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest,
-    settings: Settings, choice: NameEvidence | None, verdict: str, alike: dict[tuple[str, str], float],
+    settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What could have been seen, what cannot be, and what to measure next."""
     best_probe: dict[str, int] = {}
@@ -221,10 +290,10 @@ def _outlook(
     possible = [c.name for c in candidates if i in c.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
     pair, weakest = None, None
-    if choice is not None and verdict in ("ambiguous", "named"):
-        rivals = [n for n in sorted(choice.winners, key=lambda n: -choice.shares.get(n, 0.0)) if n in best_probe]
+    if answer.verdict in ("ambiguous", "named", "partial"):
+        rivals = [n for n in answer.shares if n in best_probe]
         group = [n for n in rivals if n == rivals[0] or alike.get((rivals[0], n), 0.0) > power.ALIKE]
-        rivals = [n for n in rivals if n in choice.set or n in group]
+        rivals = [n for n in rivals if n in answer.set or n in group]
         if len(rivals) > 1:
             pair = (trials[best_probe[rivals[0]]], trials[best_probe[rivals[1]]])
         elif rivals:
@@ -241,91 +310,6 @@ def _outlook(
 
         weakest = trials[best_probe[max(best_probe, key=hiddenness)]]
     return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
-
-
-def _held_out(
-    block: LaplaceFit, final: LaplaceFit, verdict: str, rng: np.random.Generator, each: Each
-) -> list[dict[str, Any]]:
-    """Plain and final model on the last third of the holds, and by leaving out one hold at a time.
-
-    The flexible discrepancy beside them: an effect that predicts worse than a smooth curve does not shrink the gap.
-    """
-    train = [gap.last_third(e) for e in block.experiments]
-    if not all(train):
-        nothing: dict[str, Any] = {"rmse_N": None, "elpd": None}
-        return [
-            {
-                "holds": [],
-                "plain": nothing,
-                "final": nothing | {"elpd_difference_se": None},
-                "gap_closed": None,
-                "shrinks": False,
-            }
-            for _ in block.experiments
-        ]
-    asked: list[tuple[Any, ...]] = [(block.experiments, train, (), block)]
-    named, whole = bool(final.effects), list[LaplaceFit]()
-    n = len(train) if named or verdict == "unknown" else 0
-    if n:
-        first = [e.train(k) for e, k in zip(block.experiments, train, strict=True)]
-        unnamed = list(each(_unnamed, repeat(block), [*block.experiments, *first], rng.spawn(2 * n)))
-        alone, added = [(e,) for e in block.experiments], [(d,) for d in unnamed]
-        whole += each(fitted, alone, added[:n], repeat(block.law), repeat(block.history), rng.spawn(n))
-        asked += zip(alone, [(k,) for k in train], added[n:], repeat(block), strict=False)
-    if named:
-        asked.append((block.experiments, train, final.effects, final))
-        whole.append(final)
-    predicted = each(gap.held_out, *zip(*asked, strict=True), rng.spawn(len(asked)))
-    left_out = each(gap.leave_one_hold_out, [block, *whole] if n else [], rng.spawn(1 + len(whole)))  # at the same time
-    plain, *parts = predicted
-    flexible = [h for part in parts[:n] for h in part]
-    better = parts[-1] if named else flexible or plain
-    shrinks, loho = False, None
-    if n:
-        without, *elpd = left_out
-        loose = np.concatenate(elpd[:n])
-        difference = (elpd[-1] if named else loose) - without
-        gain, se = float(difference.sum()), float(difference.std(ddof=1) * np.sqrt(len(difference)))
-        unnamed_gain = float((loose - without).sum())
-        loho = {"elpd_difference": gain, "elpd_difference_se": se, "flexible_elpd_difference": unnamed_gain}
-        shrinks = gain > max(KEEP_ELPD, 2.0 * se) and gain >= unnamed_gain
-    out = []
-    for i, (a, b) in enumerate(zip(plain, better, strict=True)):
-        d = b.elpd - a.elpd
-        out.append({
-            "holds": a.holds,
-            "plain": _score(a),
-            "final": _score(b)
-                     | {"elpd_difference_se": float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None},
-            "flexible": _score(flexible[i]) if n else None,
-            "floor_N": float(np.sqrt(b.floor)),
-            "gap_closed": gap.gap_closed(a, b) if n else None,
-            "leave_one_hold_out": loho,
-            "shrinks": shrinks,
-        })  # fmt: skip
-    return out
-
-
-def _score(held: gap.HeldOut) -> dict[str, float]:
-    return {"rmse_N": held.rmse_N, "elpd": float(held.elpd.sum()), "coverage_90": held.inside}
-
-
-def _unnamed(block: LaplaceFit, experiment: Experiment, rng: np.random.Generator) -> Discrepancy:
-    """A discrepancy as large as what the plain model, fitted to the experiment alone, leaves over in it."""
-    plain = fitted([experiment], (), block.law, block.history, rng)
-    return _discrepancy(experiment, _left_over(plain, experiment.name))
-
-
-def _discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
-    durations = [h.duration_s for h in experiment.recorded_holds]
-    return Discrepancy(len(experiment.holds), size_N, float(np.median(durations)) or 1.0)
-
-
-def _left_over(block: LaplaceFit, name: str) -> float:
-    """Root mean square of what the best parameters leave over in an experiment's readings, N."""
-    sample = block.target.problem.samples[block.names.index(name)]
-    line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
-    return float(np.sqrt((((sample.readings - line.tension)[sample.protocol.mask]) ** 2).mean()))
 
 
 def _only(x: Expansion, m: int) -> Expansion:

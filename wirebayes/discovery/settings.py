@@ -1,4 +1,7 @@
-"""What a search for the missing effect is asked."""
+"""What a search for the missing effect is asked, and every threshold behind its verdict.
+
+How each number was set is told in docs/thresholds.rst; none was chosen with the paper's wires in sight.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,6 +11,33 @@ from wirebayes.wire.laws import ElasticLaw, History
 
 ALPHA = 0.04  # level of the global test: one clean file in twenty-five is called incomplete
 SIMULATIONS = 999  # p of .04 is then known to .006, and more are made where that is not enough
+
+# Prior over models. A single effect of any name has weight 1.
+UNKNOWN_WEIGHT = 1.0  # a remainder and no effect, to one name: a person who finds a gap is as ready for either
+MORE_EFFECTS = 0.1  # all sets of k + 1 names, to all sets of k: one thing missing is ten times likelier than two
+REMAINDER_WEIGHT = 0.5  # a remainder beside effects, to none beside the same effects
+NEARLY_ONE = 0.9999  # |cos| of signatures from which two names are one, and share its weight
+
+# Which sets are looked at.
+MOST_EFFECTS = 4  # more than four did not pay in any simulated test
+REACH = 4.0  # nats below the best: a set further down holds less than 2 % of its weight
+WORTH_A_REFIT = 1.3  # log Bayes factor by the linear scan, of an effect beside others
+WORTH_ADDING = 2.0  # the same, refitted
+MOST_BESIDE = 6  # effects refitted beside a set: what it leaves over is small, and the linear scan nearly right
+FIRST_LOOK, MOST_LOOKS = 3, 7  # sets fitted in full: at first, and in all
+
+# A remainder that is not smooth, seen by what further effects, or the global test, find beside an effect.
+LEFT_OVER = 8.0  # nats: the most that a further effect may explain of what one unknown form leaves over beside a name
+LEFT_OVER_WEIGHT = 1.0  # of such a remainder, to a further effect
+RETESTS = 299  # simulations of the second global test
+ALPHA_AFTER = 0.03  # its p at which a remainder is as likely as none
+P_SLOPE = 0.8  # below it the odds grow as p to the power -0.8, the density of p where more is missing than was added
+
+# What may be called established.
+KEEP_ELPD = 4.0  # gain of leaving out one hold at a time that an effect must bring
+INCLUSION = 0.9  # probability that the effect is missing
+REMAINS = 0.5  # probability of a remainder from which the verdict says so
+IN_SET = 0.9  # probability that the set of possible names holds together
 
 
 @dataclass(frozen=True)

@@ -1,161 +1,181 @@
-"""From the evidence of names to a verdict: company, second effects by leave-one-hold-out, and the test once more."""
+"""From the probabilities of models to a verdict for each material, in the order that the thresholds demand."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import repeat
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wirebayes.discovery import gap, name_evidence, screening
-from wirebayes.discovery.linear_scan import Probe, Scan, expand, scan
-from wirebayes.discovery.name_evidence import UNKNOWN_WEIGHT, NameEvidence
-from wirebayes.discovery.refit import probabilities
-from wirebayes.discovery.screening import Candidate
-from wirebayes.discovery.settings import Settings
-from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.wire.effect import Effect
+from wirebayes.discovery import gap, model_space, residual_patterns, screening
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.model_space import EffectSet, ModelPosterior, smallest_set
+from wirebayes.discovery.settings import (
+    ALPHA_AFTER,
+    INCLUSION,
+    KEEP_ELPD,
+    P_SLOPE,
+    REMAINS,
+    RETESTS,
+    Settings,
+)
+from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet, Key
+from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.workers import Each
 
-KEEP_ELPD = 4.0
-_ALPHA_AFTER = 0.03
-_WORTH_A_REFIT, _WORTH_ADDING = 1.3, 2.0  # log Bayes factors of a second effect: by scan, and refitted
-_MOST_EFFECTS = 2
-_NEAR, _MOST_COMPANY = 4.0, 2  # names this close to the best one are looked at again, so many
-_LEFT_OVER = 8.0  # the most that a second effect may explain of what one unknown form leaves over beside a name
-_RETESTS = 299
+Array = NDArray[Any]
+Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 
 
 @dataclass(frozen=True)
-class Accepted:
-    """An effect taken into the model.
+class Retest:
+    """The global test once more, with effects inside.
 
     Attributes
     ----------
-    name : str
-    blocks : tuple of int
-    effects : dict of int to Effect
-        Its form in each block.
+    p : float or None
+        None where nothing could be added any more.
+    where : list of list of dict
+        Residual patterns beside the effects, a list a block (`wirebayes.discovery.residual_patterns.findings`).
     """
 
-    name: str
-    blocks: tuple[int, ...]
-    effects: dict[int, Effect]
-
-
-def decide(
-    plain: list[LaplaceFit], choice: NameEvidence, settings: Settings, rng: np.random.Generator, each: Each
-) -> tuple[str, list[Accepted], list[LaplaceFit], NameEvidence]:
-    """Verdict, accepted effects in order, final blocks, and the choice as revised by pairs of effects."""
-    choice, added = _with_company(plain, choice, settings, rng, each)
-    if choice.best == "unknown":
-        return "unknown", [], plain, choice
-    blocks, done, further = added[choice.best].blocks, [added[choice.best].accepted], added[choice.best].further
-    while further is not None and len(done) < _MOST_EFFECTS:
-        name = max(further.winners, key=further.log_bayes.__getitem__)
-        if further.log_bayes[name] < _WORTH_ADDING:
-            break
-        more, extra = _add(blocks, further, name, settings, rng)
-        after, before = ([version[b] for b in extra.blocks] for version in (more, blocks))
-        elpd = [v.sum() for v in each(gap.leave_one_hold_out, after + before, rng.spawn(2 * len(after)))]
-        if sum(elpd[: len(after)]) - sum(elpd[len(after) :]) <= KEEP_ELPD:
-            break
-        blocks, done = more, [*done, extra]
-        further = _beside(blocks, settings, each)[0] if len(done) < _MOST_EFFECTS else None
-    choice = _retested(blocks, choice, settings, rng, each)
-    if choice.best == "unknown":
-        return "unknown", [], plain, choice
-    return "named" if choice.set == [choice.best] else "ambiguous", done, blocks, choice
+    p: float | None
+    where: list[list[dict[str, Any]]]
 
 
 @dataclass(frozen=True)
-class _Added:
-    """The blocks with a name in them, and what would come next: None where nothing has a chance."""
+class Decision:
+    """What the models say of every material.
 
-    blocks: list[LaplaceFit]
-    accepted: Accepted
-    further: NameEvidence | None
-
-
-def _beside(blocks: list[LaplaceFit], settings: Settings, each: Each) -> tuple[NameEvidence | None, float]:
-    """What could be added to fitted blocks, if anything has a chance, and the flexible reference's evidence."""
-    trials, candidates, scans = _scanned(blocks, settings)
-    loose = name_evidence.flexible_evidence(scans)
-    if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) < _WORTH_A_REFIT:
-        return None, loose
-    return name_evidence.choose(blocks, trials, candidates, scans, each=each), loose
-
-
-def _with_company(
-    plain: list[LaplaceFit], choice: NameEvidence, settings: Settings, rng: np.random.Generator, each: Each
-) -> tuple[NameEvidence, dict[str, _Added]]:
-    """The likeliest names once more, each together with a second effect, and together with the flexible reference.
-
-    The best of the new choice, unless it is *unknown*, is among those added.
-
-    A pair has prior odds of a tenth to one effect, shared by all second effects, and counts for the name. A name that
-    needs the flexible reference beside it is only like what is missing: that counts for *unknown*. So does a small
-    second effect, twice as much as for a pair: what a name leaves over of a form like it is small, a second effect of
-    its own need not be.
+    Attributes
+    ----------
+    posterior : ModelPosterior
+    best : FittedSet or None
+        The most probable set of effects, fitted; None where that is the plain model.
+    retest : Retest or None
+        With the best set inside.
+    gains : dict of name to (b,) array
+        Gain of leaving out one hold at a time that each effect of the best set brought when it was added.
     """
-    names = sorted(choice.winners, key=lambda n: -choice.log_bayes[n])
-    names = [n for n in names if choice.log_bayes[n] > choice.log_bayes[names[0]] - _NEAR][:_MOST_COMPANY]
-    odds = np.log(0.1) - np.log(len(settings.kinds))
-    evidence, unknown = dict(choice.log_bayes), choice.unknown
-    known: dict[str, _Added] = {}
-    with_one = each(_add, repeat(plain), repeat(choice), names, repeat(settings), rng.spawn(len(names)))
-    for name, (blocks, accepted) in zip(names, with_one, strict=True):
-        further, loose = _beside(blocks, settings, each)
-        known[name] = _Added(blocks, accepted, further)
-        beside = loose + np.log(0.5 / len(names))
-        unknown = float(np.logaddexp(unknown, choice.log_bayes[name] + beside))
-        if further is None:
+
+    posterior: ModelPosterior
+    best: FittedSet | None
+    retest: Retest | None
+    gains: dict[str, Array]
+
+
+def decide(
+    plain: list[LaplaceFit],
+    explored: Explored,
+    copies: Mapping[str, int],
+    settings: Settings,
+    rng: np.random.Generator,
+    each: Each,
+) -> Decision:
+    """Weigh the sets, leave out those whose last effect does not predict, and test the best one once more."""
+    sets, gains = list(explored.sets), dict[Key, Array]()
+    count, blocks = len(settings.kinds), len(plain)
+    while True:
+        without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
+        found = model_space.posterior(sets, without, beside, blocks)
+        if not found.best.names:
+            return Decision(found, None, None, {})
+        best = explored.fitted.get(found.best.key)
+        if best is None:  # known by a chain of refits alone
+            sets.remove(found.best)
             continue
-        pair = max((further.log_bayes[n] for n in further.winners), default=-np.inf)
-        evidence[name] = float(np.logaddexp(evidence[name], choice.log_bayes[name] + odds + pair))
-        alike = choice.log_bayes[name] + odds + np.log(2.0) + min(pair, _LEFT_OVER)
-        unknown = float(np.logaddexp(unknown, alike))
-    return _weighed(replace(choice, log_bayes=evidence, unknown=unknown)), known
+        key = best.effects.key
+        if key not in gains:
+            gains[key] = _gain(plain, best, explored, rng, each)
+        if len(key) == 1 or gains[key].sum() > KEEP_ELPD:
+            break
+        sets = [s for s in sets if not key <= s.key]
+    retest = _retested(best, settings, rng, each)
+    if retest.p is not None and retest.p <= ALPHA_AFTER:
+        i = sets.index(found.best)
+        extra = without[i] - P_SLOPE * np.log(retest.p / ALPHA_AFTER)
+        beside = _more_beside(sets, beside, i, float(extra))
+        found = model_space.posterior(sets, without, beside, blocks)
+        if not found.best.names:
+            return Decision(found, None, retest, {})
+        best = explored.fitted.get(found.best.key, best)
+    path = [explored.fitted.get(frozenset(best.effects.names[: n + 1])) for n in range(len(best.effects.names))]
+    for step in path:
+        if step is not None and step.effects.key not in gains:
+            gains[step.effects.key] = _gain(plain, step, explored, rng, each)
+    own = {s.accepted[-1].name: gains[s.effects.key] for s in path if s is not None}
+    return Decision(found, best, retest, own)
 
 
-def _retested(
-    blocks: list[LaplaceFit], choice: NameEvidence, settings: Settings, rng: np.random.Generator, each: Each
-) -> NameEvidence:
-    """The global test again, with what was accepted inside: a name that leaves too much over gives way to *unknown*.
+def _gain(plain: list[LaplaceFit], best: FittedSet, explored: Explored, rng: np.random.Generator, each: Each) -> Array:
+    """(b,) gain in leave-one-hold-out elpd that the last effect of a set brings in each block it acts on."""
+    earlier = explored.fitted.get(frozenset(best.effects.names[:-1]))
+    before = plain if earlier is None else earlier.blocks
+    on = list(best.accepted[-1].blocks)
+    fits = [version[b] for version in (best.blocks, before) for b in on]
+    elpd = [float(v.sum()) for v in each(gap.leave_one_hold_out, fits, rng.spawn(len(fits)))]
+    out = np.zeros(len(plain))
+    out[on] = np.subtract(elpd[: len(on)], elpd[len(on) :])
+    return out
 
-    At `_ALPHA_AFTER` both are as likely; below it the odds grow as p to the power -0.8, the density that p has where
-    more is missing than was added.
-    """
-    trials, candidates, scans = _scanned(blocks, settings)
+
+def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, each: Each) -> Retest:
+    """The global test with the set inside, and where its residuals still depend on something."""
+    trials, candidates, _ = best.scanned
     if not candidates:
-        return choice
-    simulated = each(screening.replicated, blocks, repeat(trials), repeat(_RETESTS), rng.spawn(len(blocks)))
+        return Retest(None, [[] for _ in best.blocks])
+    simulated = list(each(_simulated, best.blocks, repeat(trials), rng.spawn(len(best.blocks))))
     nulls = [s.scan for s in simulated]
-    p = screening.global_test(candidates, scans, nulls).p
-    if p > _ALPHA_AFTER:
-        return choice
-    against = choice.log_bayes[choice.best] - 0.8 * np.log(p / _ALPHA_AFTER)
-    return _weighed(replace(choice, unknown=float(np.logaddexp(choice.unknown, against))))
+    data, where = [], []
+    for block, null in zip(best.blocks, nulls, strict=True):
+        listed, columns = residual_patterns.patterns(block.target.problem)
+        data.append(scan(expand(block.target, block.modes.z[:1], trials, columns=columns)))
+        where.append(residual_patterns.findings(listed, len(trials), data[-1], null, ", ".join(block.names)))
+    return Retest(screening.global_test(candidates, data, nulls).p, where)
 
 
-def _scanned(blocks: list[LaplaceFit], settings: Settings) -> tuple[list[Probe], list[Candidate], list[Scan]]:
-    """What could be added to fitted blocks, and its linear scan on each."""
-    trials, candidates = screening.candidate_probes(blocks, settings.kinds)
-    return trials, candidates, [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+def _simulated(block: LaplaceFit, trials: Any, rng: np.random.Generator) -> screening.Replicates:
+    columns = residual_patterns.patterns(block.target.problem)[1]
+    return screening.replicated(block, trials, RETESTS, rng, columns)
 
 
-def _weighed(choice: NameEvidence) -> NameEvidence:
-    """The probabilities of a choice whose evidence has changed."""
-    shares = probabilities({n: choice.log_bayes[n] for n in choice.winners}, choice.unknown, UNKNOWN_WEIGHT)
-    return replace(choice, shares=shares)
+def _more_beside(sets: Sequence[EffectSet], beside: Array, i: int, extra: float) -> Array:
+    """Log weights with more for a remainder beside set `i`, or for a remainder alone.
+
+    What is left beside a name may mean that it is the wrong name: the smooth remainder tells whether the name is needed
+    where one is in the model anyway, so the two share in proportion to their weights there.
+    """
+    alone = next(k for k, s in enumerate(sets) if not s.names)
+    share = 1.0 / (1.0 + np.exp(np.clip(beside[alone] - beside[i], -50.0, 50.0)))
+    out = beside.copy()
+    out[i] = np.logaddexp(out[i], extra + np.log(share))
+    out[alone] = np.logaddexp(out[alone], extra + np.log1p(-share) if share < 1.0 else -np.inf)
+    return out
 
 
-def _add(
-    blocks: list[LaplaceFit], choice: NameEvidence, name: str, settings: Settings, rng: np.random.Generator
-) -> tuple[list[LaplaceFit], Accepted]:
-    """The blocks refitted with a name's best form."""
-    out, effects = list(blocks), {}
-    for b, r in choice.amplitudes(name).items():
-        effects[b] = r.effect
-        near = r.theta[r.blocks.index(b)]
-        every = (*blocks[b].effects, r.effect)
-        out[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near)
-    return out, Accepted(name, tuple(effects), effects)
+def established(decision: Decision, block: int) -> list[Accepted]:
+    """Effects of the best set that are there beyond doubt in a material, in the order in which they were added."""
+    if decision.best is None:
+        return []
+    return [
+        a for a in decision.best.accepted
+        if block in a.blocks
+        and decision.posterior.inclusion[a.name][block] >= INCLUSION
+        and decision.gains[a.name].sum() > KEEP_ELPD
+    ]  # fmt: skip
+
+
+def verdict_of(decision: Decision, block: int) -> tuple[Verdict, list[Accepted]]:
+    """The verdict on a material that the global test has not cleared, and the effects accepted there."""
+    found = decision.posterior
+    shares = found.shares[block]
+    if found.nothing[block] > 0.5 or not shares:
+        return "nothing-missing", []
+    if found.remainder[block] > REMAINS:
+        sure = established(decision, block)
+        return ("partial", sure) if sure else ("unknown", [])
+    acting = [] if decision.best is None else [a for a in decision.best.accepted if block in a.blocks]
+    if not acting:
+        return "unknown", []
+    return "named" if len(smallest_set(shares)) == 1 else "ambiguous", acting

@@ -1,0 +1,175 @@
+"""Probabilities over models: sets of effects, each with or without a smooth remainder in each material.
+
+A set is judged with everything it explains, so a name is credited for what it takes off the remainder, and the
+remainder's probability is part of the answer.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, logsumexp
+
+from wirebayes.discovery.settings import IN_SET, MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+from wirebayes.discovery.subsets import over_subsets
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class EffectSet:
+    """A set of effects and its evidence.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Largest share of the disagreement first; empty for the plain model.
+    log_bayes : float
+        Against the plain model, without remainder.
+    acting : dict of name to (b,) array
+        Probability that the effect acts on each material, given the set.
+    remainder : (b,) array or None
+        Log Bayes factor of a remainder in each material, beside the set; None where it was not looked for.
+    """
+
+    names: tuple[str, ...]
+    log_bayes: float
+    acting: Mapping[str, Array]
+    remainder: Array | None
+
+    @property
+    def key(self) -> frozenset[str]:
+        return frozenset(self.names)
+
+    @property
+    def first(self) -> str:
+        """The name with the largest share, empty where there is none."""
+        return self.names[0] if self.names else ""
+
+
+@dataclass(frozen=True)
+class ModelPosterior:
+    """What the models say together, none having been excluded by the global test.
+
+    Attributes
+    ----------
+    sets : tuple of EffectSet
+    without, beside : (s,) array
+        Probability of each set without a remainder, and with one.
+    nothing : (b,) array
+        Probability that nothing is missing in a material.
+    remainder : (b,) array
+        Probability of a remainder in a material.
+    inclusion : dict of name to (b,) array
+        Probability that an effect acts in a material.
+    shares : list of dict
+        For each material, the probability of each name to be the effect with the largest share of the disagreement, and
+        of *unknown*, a remainder and no effect; given that something is missing there.
+    """
+
+    sets: tuple[EffectSet, ...]
+    without: Array
+    beside: Array
+    nothing: Array
+    remainder: Array
+    inclusion: dict[str, Array]
+    shares: list[dict[str, float]]
+
+    @property
+    def best(self) -> EffectSet:
+        """The most probable set of those that begin with the most probable first name, with or without a remainder."""
+        weights = self.without + self.beside
+        first: dict[str, float] = {}
+        for s, weight in zip(self.sets, weights, strict=True):
+            first[s.first] = first.get(s.first, 0.0) + float(weight)
+        leading = max(first, key=lambda name: first[name])
+        return max(zip(weights, self.sets, strict=True), key=lambda item: item[0] * (item[1].first == leading))[1]
+
+
+def log_prior(size: int, names: int) -> float:
+    """Log weight of one set of `size` effects of a catalogue of `names`; that of a single effect is zero.
+
+    All sets of one size together have `MORE_EFFECTS` times the weight of those that are one smaller.
+    """
+    if size < 2:
+        return 0.0
+    sets = gammaln(names + 1) - gammaln(size + 1) - gammaln(names - size + 1)
+    return float((size - 1) * np.log(MORE_EFFECTS) + np.log(names) - sets)
+
+
+def log_weights(
+    sets: Sequence[EffectSet], names: int, copies: Mapping[str, int], other: Mapping[frozenset[str], float] = {}
+) -> tuple[Array, Array]:
+    """(s,) unnormalised log probabilities of each set without a remainder and with one.
+
+    Parameters
+    ----------
+    sets : sequence of EffectSet
+    names : int
+        Names in the catalogue.
+    copies : mapping of name to int
+        How many names leave the same signature in these tests, and share the weight of one.
+    other : mapping of set to float
+        Log Bayes factor of a remainder that is not smooth, beside a set.
+    """
+    without, beside = [], []
+    for s in sets:
+        prior = log_prior(len(s.names), names) - sum(np.log(copies.get(n, 1)) for n in s.names)
+        smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
+        if s.names:
+            without.append(prior + s.log_bayes)
+            more = np.logaddexp(smooth, other.get(s.key, -np.inf))
+            beside.append(prior + s.log_bayes + np.log(REMAINDER_WEIGHT) + more)
+        else:
+            without.append(-np.inf)  # nothing at all: the global test has excluded it
+            beside.append(np.log(UNKNOWN_WEIGHT) + smooth)
+    return np.array(without), np.array(beside)
+
+
+def posterior(sets: Sequence[EffectSet], without: Array, beside: Array, blocks: int) -> ModelPosterior:
+    """Normalise, and sum over the sets for each material.
+
+    Parameters
+    ----------
+    sets : sequence of EffectSet
+    without, beside : (s,) arrays
+        As `log_weights` returns them.
+    blocks : int
+        Number of materials.
+    """
+    total = logsumexp([*without, *beside])
+    p_without, p_beside = np.exp(without - total), np.exp(beside - total)
+    nothing, remainder = np.zeros(blocks), np.zeros(blocks)
+    inclusion: dict[str, Array] = {}
+    shares: list[dict[str, float]] = [{} for _ in range(blocks)]
+    for s, bare, more in zip(sets, p_without, p_beside, strict=True):
+        remains = np.ones(blocks) if s.remainder is None else over_subsets(s.remainder)[1]
+        remainder += more * remains
+        idle = np.ones(blocks)  # no effect before acts here
+        for name in s.names:
+            acts = s.acting[name]
+            inclusion[name] = inclusion.get(name, np.zeros(blocks)) + (bare + more) * acts
+            for b in range(blocks):
+                shares[b][name] = shares[b].get(name, 0.0) + float((bare + more) * idle[b] * acts[b])
+            idle = idle * (1.0 - acts)
+        nothing += bare * idle + more * (1.0 - remains) * idle
+        for b in range(blocks):
+            shares[b]["unknown"] = shares[b].get("unknown", 0.0) + float(more * remains[b] * idle[b])
+    for b, here in enumerate(shares):
+        missing = sum(here.values())
+        shares[b] = {n: v / missing for n, v in sorted(here.items(), key=lambda item: -item[1])} if missing > 0 else {}
+    return ModelPosterior(tuple(sets), p_without, p_beside, nothing, remainder, inclusion, shares)
+
+
+def smallest_set(shares: Mapping[str, float], level: float = IN_SET) -> list[str]:
+    """The fewest names that together hold `level` of the probability, most probable first."""
+    out: list[str] = []
+    total = 0.0
+    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
+        out.append(name)
+        total += share
+        if total >= level:
+            break
+    return out

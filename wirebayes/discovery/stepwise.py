@@ -1,0 +1,260 @@
+"""The search through sets of effects: forward from each set within reach of the best, every set kept.
+
+The evidence of a set is a chain of refits, each effect refitted beside those before it. The prior of an amplitude is
+fixed once, on the plain fit, so the order of the chain does not matter.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.discovery import screening
+from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
+from wirebayes.discovery.model_space import EffectSet, log_prior
+from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
+from wirebayes.discovery.refit import Refit, occam
+from wirebayes.discovery.screening import FILE_WIDE, Candidate
+from wirebayes.discovery.settings import (
+    FIRST_LOOK,
+    LEFT_OVER,
+    LEFT_OVER_WEIGHT,
+    MOST_BESIDE,
+    MOST_EFFECTS,
+    MOST_LOOKS,
+    REACH,
+    REMAINDER_WEIGHT,
+    WORTH_A_REFIT,
+    WORTH_ADDING,
+    Settings,
+)
+from wirebayes.discovery.sharing import informed
+from wirebayes.discovery.smooth_credit import beside_smooth
+from wirebayes.inference.laplace_fit import LaplaceFit, column_of, fitted
+from wirebayes.wire.effect import Effect
+from wirebayes.workers import Each
+
+Array = NDArray[Any]
+Key = frozenset[str]
+_Units = Mapping[tuple[str, tuple[int, ...]], float]
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """An effect taken into the model.
+
+    Attributes
+    ----------
+    name : str
+    blocks : tuple of int
+    effects : dict of int to Effect
+        Its form in each block.
+    """
+
+    name: str
+    blocks: tuple[int, ...]
+    effects: dict[int, Effect]
+
+
+@dataclass(frozen=True)
+class FittedSet:
+    """A set of effects, fitted, with what could be added to it.
+
+    Attributes
+    ----------
+    effects : EffectSet
+    blocks : list of LaplaceFit
+    accepted : tuple of Accepted
+        In the order in which they were added.
+    further : NameEvidence or None
+        Of one more effect; None where none has a chance.
+    scanned : tuple
+        Probes, candidates and scans of the blocks.
+    """
+
+    effects: EffectSet
+    blocks: list[LaplaceFit]
+    accepted: tuple[Accepted, ...]
+    further: NameEvidence | None
+    scanned: tuple[list[Probe], list[Candidate], list[Scan]]
+
+
+@dataclass(frozen=True)
+class Explored:
+    """The sets that were looked at.
+
+    Attributes
+    ----------
+    sets : tuple of EffectSet
+        The plain model with its remainder first.
+    fitted : dict of set to FittedSet
+        Those that were fitted in full.
+    left_over : dict of set to float
+        Log Bayes factor of a remainder that is not smooth beside a set, from what a further effect would explain.
+    """
+
+    sets: tuple[EffectSet, ...]
+    fitted: dict[Key, FittedSet]
+    left_over: dict[Key, float]
+
+
+@dataclass
+class _Frontier:
+    """Sets known by evidence alone, and which of them have been fitted."""
+
+    names: int
+    known: dict[Key, EffectSet] = field(default_factory=dict)
+    parents: dict[Key, tuple[Key, str]] = field(default_factory=dict)
+    credit: dict[Key, float] = field(default_factory=dict)
+
+    def add(self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf) -> None:
+        """A set that a refit found, unless another order of the same names found a better one."""
+        names = (*parent.names, name)
+        key = frozenset(names)
+        value = parent.log_bayes + found.log_bayes[name]
+        if key not in self.known or self.known[key].log_bayes < value:
+            acting = {**parent.acting, name: found.acting[name]}
+            self.known[key] = EffectSet(names, value, acting, None)
+            self.parents[key] = parent.key, name
+        self.credit[key] = max(self.credit.get(key, -np.inf), credit)
+
+    def promise(self, key: Key) -> float:
+        """The largest log weight that a set may come to, by what is known so far."""
+        with_remainder = self.credit[key] + np.log(REMAINDER_WEIGHT)
+        return log_prior(len(key), self.names) + float(np.logaddexp(self.known[key].log_bayes, with_remainder))
+
+
+def explore(
+    plain: list[LaplaceFit],
+    found: NameEvidence,
+    expansions: Sequence[Expansion],
+    trials: Sequence[Probe],
+    scans: Sequence[Scan],
+    settings: Settings,
+    rng: np.random.Generator,
+    each: Each,
+) -> Explored:
+    """Fit the sets of effects that may hold a good share of the probability.
+
+    Parameters
+    ----------
+    plain : list of LaplaceFit
+    found : NameEvidence
+        Of single effects.
+    expansions, trials, scans
+        Of the plain blocks, as the global test has them.
+    settings : Settings
+    rng : numpy Generator
+    each : function
+        The built-in `map`, or one over processes; the sets are the same.
+    """
+    units = _units(found)
+    smooth = np.array([float(s.flexible[0]) for s in scans])
+    root = EffectSet((), 0.0, {}, smooth)
+    frontier = _Frontier(len(settings.kinds))
+    credits = _credits(expansions, trials)
+    for name in found.winners:
+        credit = float(np.maximum(smooth + credits.get(name, -np.inf), 0.0).sum()) if name in credits else -np.inf
+        frontier.add(root, name, found, credit)
+    done: dict[Key, FittedSet] = {}
+    start = FittedSet(root, plain, (), found, ([], [], []))
+    while len(done) < MOST_LOOKS:
+        best = max((frontier.promise(key) for key in frontier.known), default=-np.inf)
+        open_ = [k for k in frontier.known if k not in done and frontier.promise(k) > best - REACH]
+        open_ = sorted(open_, key=lambda k: (-frontier.promise(k), sorted(k)))
+        # as many at once whatever the number of cores, so that the sets are the same
+        wave = open_[: FIRST_LOOK if not done else 2][: MOST_LOOKS - len(done)]
+        if not wave:
+            break
+        parents = [done.get(frontier.parents[k][0], start) for k in wave]
+        names = [frontier.parents[k][1] for k in wave]
+        fitted_sets = each(_fit, parents, names, repeat(settings), repeat(units), rng.spawn(len(wave)))
+        for key, new in zip(wave, fitted_sets, strict=True):
+            known = frontier.known[key]
+            beside = float(np.maximum(new.effects.remainder, 0.0).sum())
+            done[key] = FittedSet(
+                EffectSet(known.names, known.log_bayes, known.acting, new.effects.remainder),
+                new.blocks, new.accepted, new.further, new.scanned,
+            )  # fmt: skip
+            frontier.known[key] = done[key].effects
+            frontier.credit[key] = known.log_bayes + beside
+            if new.further is None or len(key) >= MOST_EFFECTS:
+                continue
+            for further in new.further.winners:
+                if new.further.log_bayes[further] > 0.0:
+                    frontier.add(done[key].effects, further, new.further)
+    one_more = np.log(LEFT_OVER_WEIGHT / REMAINDER_WEIGHT)
+    left_over = {
+        key: one_more + log_prior(len(key) + 1, frontier.names) - log_prior(len(key), frontier.names)
+        + min(max(s.further.log_bayes[n] for n in s.further.winners), LEFT_OVER)
+        for key, s in done.items() if s.further is not None and s.further.winners
+    }  # fmt: skip
+    return Explored((root, *frontier.known.values()), done, left_over)
+
+
+def _units(found: NameEvidence) -> _Units:
+    """Amplitude that amounts to δ = 1 for each effect on its blocks, as the refit beside nothing else found it."""
+    return {(r.effect.key, r.blocks): r.sd for refits in found.winners.values() for r in refits}
+
+
+def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[str, Array]:
+    """(b,) log Bayes factor of each name beside a smooth remainder, linearly, the better of its forms."""
+    out: dict[str, Array] = {}
+    values = np.array([beside_smooth(x)[: len(trials)] for x in expansions])
+    for k, probe in enumerate(trials):
+        here = values[:, k] + occam(probe.one_sided)
+        out[probe.effect.name] = np.maximum(out.get(probe.effect.name, -np.inf), here)
+    return out
+
+
+def _fit(parent: FittedSet, name: str, settings: Settings, units: _Units, rng: np.random.Generator) -> FittedSet:
+    """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
+    assert parent.further is not None
+    blocks, effects = list(parent.blocks), {}
+    for b, r in parent.further.amplitudes(name).items():
+        effects[b] = r.effect
+        near = r.theta[r.blocks.index(b)]
+        every = (*blocks[b].effects, r.effect)
+        blocks[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near)
+    if len(effects) > 1 and settings.kinds[name].scope in FILE_WIDE:
+        blocks = informed(blocks, effects, rng)
+    trials, candidates = screening.candidate_probes(blocks, settings.kinds)
+    scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+    further = None
+    if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
+        further = weigh_names(
+            blocks, trials, candidates, scans, correction=lambda r: _to_plain_prior(r, blocks, units),
+            most=MOST_BESIDE, forms_a_name=1,
+        )  # fmt: skip
+        if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
+            further = None
+    remainder = np.array([float(s.flexible[0]) for s in scans])
+    accepted = (*parent.accepted, Accepted(name, tuple(effects), effects))
+    return FittedSet(
+        EffectSet((*parent.effects.names, name), 0.0, {}, remainder), blocks, accepted, further,
+        (trials, candidates, scans),
+    )  # fmt: skip
+
+
+def _to_plain_prior(found: Refit, blocks: Sequence[LaplaceFit], units: _Units) -> float:
+    """What turns a refit's log Bayes factor beside other effects into one with priors as the plain fit set them.
+
+    The refit's own prior is uniform in what the amplitude does beside those effects, and theirs are the catalogue's.
+    """
+    unit = units.get((found.effect.key, found.blocks))
+    change = float(np.log(found.sd / unit)) if unit is not None and unit > 0 and found.sd > 0 else 0.0
+    for b, theta in zip(found.blocks, found.theta, strict=True):
+        problem, plain = blocks[b].problem_with(found.effect), blocks[b].target.problem
+        before = blocks[b].target.coordinates.to_natural(blocks[b].modes.z[:1])[0]
+        for effect in blocks[b].effects:
+            amplitude = effect.columns()[0]
+            if any(amplitude in e.priors for e in blocks[b].experiments):
+                continue  # what other materials know of a shared amplitude is no prior of this kind
+            old, new = column_of(plain, effect), column_of(problem, effect)
+            density = plain.prior.distributions[plain.names[old]].logpdf
+            shift = float(density(before[old]) - density(theta[new]))
+            change += shift if np.isfinite(shift) else 0.0
+    return change

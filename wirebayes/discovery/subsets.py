@@ -1,0 +1,52 @@
+"""Evidence of something that may act on any of several materials: every number of them, and each choice, alike.
+
+The share of materials in which it acts is unknown and uniform, so the materials support each other: where most show it,
+it is expected in the next.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+Array = NDArray[Any]
+
+
+def over_subsets(values: Array) -> tuple[float, Array, list[int]]:
+    """Sum over all non-empty subsets of materials.
+
+    Parameters
+    ----------
+    values : (b,) array
+        Log Bayes factor of each material on its own.
+
+    Returns
+    -------
+    The log Bayes factor against none of them, the probability (b,) that each belongs to the subset, and the most
+    probable subset.
+    """
+    values = np.asarray(values, float)
+    b = len(values)
+    weights = _log_weights(b)
+    total = float(np.logaddexp.reduce(weights + _symmetric(values)[1:]))
+    without = np.array([_symmetric(np.delete(values, i))[:b] for i in range(b)])  # of 0 to b - 1 others
+    each = np.exp(values + np.logaddexp.reduce(weights + without, axis=1) - total)
+    order = np.argsort(-values, kind="stable")
+    most = int(np.argmax(weights + np.cumsum(values[order])))
+    return total, np.minimum(each, 1.0), sorted(int(i) for i in order[: most + 1])
+
+
+def _log_weights(b: int) -> Array:
+    """(b,) log prior probability of one subset of each size from 1 to b."""
+    n = np.arange(1, b + 1)
+    return np.asarray(-np.log(b) - (gammaln(b + 1) - gammaln(n + 1) - gammaln(b - n + 1)))
+
+
+def _symmetric(values: Array) -> Array:
+    """(b + 1,) log of the sum over subsets of each size of the product of the exponentials of `values` (b,)."""
+    out = np.full(len(values) + 1, -np.inf)
+    out[0] = 0.0
+    for i, value in enumerate(values):
+        out[1 : i + 2] = np.logaddexp(out[1 : i + 2], out[: i + 1] + value)
+    return out
