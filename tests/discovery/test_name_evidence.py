@@ -8,7 +8,7 @@ import pytest
 from scipy import integrate, stats
 
 from tests.simulated import simulated_tests
-from wirebayes.discovery import name_evidence, refit, screening, verdict
+from wirebayes.discovery import name_evidence, refit, screening
 from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, probes
 from wirebayes.discovery.power import amplitude_80
 from wirebayes.discovery.screening import Candidate

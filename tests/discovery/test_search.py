@@ -190,7 +190,7 @@ class ScrewWobble(Effect):
     arguments = ["discover", str(tmp_path / "experiments.toml"), "--output", str(out), "--own-effects", str(own)]
     assert cli.main(arguments) == 0
     found = json.loads((out / "discovery.json").read_text())
-    assert found["version"] == 1 and found["experiments"]["simulated"]["best"] == "screw_wobble"
+    assert found["version"] == 2 and found["experiments"]["simulated"]["best"] == "screw_wobble"
     for model in ("plain", "final"):
         assert json.loads((out / "simulated" / model / "summary.json").read_text())["converged"]
     assert "screw_wobble.a" in json.loads((out / "simulated" / "final" / "summary.json").read_text())["parameters"]
