@@ -26,7 +26,7 @@ def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
 
 
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
-    found = stored(Findings, tmp_path, "discovery.json", {"version": 1, "experiments": {"a": SLIP, "b": CLEAN}})
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
     assert answer.answer(found) == [
         "a: ambiguous: grip_slip, toe (p = 0.001)",
         "  grip_slip at hold 4 0.31 [0.25, 0.38] mm",
@@ -35,6 +35,12 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
         "b: nothing is missing (p = 0.4)",
     ]
     assert answer.next_step(found) == "a: Unload. b: Hold longer."
+
+
+def test_a_part_that_has_a_name_is_said_with_the_rest_that_has_none(tmp_path: Path) -> None:
+    part = SLIP | {"verdict": "partial", "effects": ["grip_slip"]}
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": part}})
+    assert answer.answer(found)[0] == "a: grip_slip is missing, and something that has no name here (p = 0.001)"
 
 
 def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:
@@ -67,7 +73,7 @@ def test_a_calibration_offers_no_lengths_unless_it_converged(tmp_path: Path) -> 
 
 
 def test_json_is_the_summary_and_quiet_is_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = stored(Findings, tmp_path, "discovery.json", {"version": 1, "experiments": {"b": CLEAN}})
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"b": CLEAN}})
     (tmp_path / "report.html").write_text("")
     known = Findings(found.place, computed=False)
     answer.conclude(known, as_json=True)

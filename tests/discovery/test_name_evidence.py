@@ -87,22 +87,23 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
     assert found.log_bayes == pytest.approx(log_evidence(9.0, one_sided), abs=0.02)
 
 
-def test_something_unknown_is_believed_as_readily_as_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Even odds before the test: with equal evidence *unknown* is as probable as the name, with less it is less."""
-    trials = probes(named("strain_stiffening"))[:1]
-    candidate = Candidate(0, "strain_stiffening", (0,), True)
-    value = log_evidence(8.0, False)
+def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve holds at which a grip may have slipped are one name: its evidence is their mean, not their sum."""
+    trials = [p for hold in range(1, 13) for p in probes(named(f"grip_slip@{hold}"))[:1]]
+    candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
 
     def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float) -> refit.Refit:
-        return refit.Refit(effect, tuple(which), value, 8.0, 1.0, ())
+        return refit.Refit(effect, tuple(which), 9.0 if effect.hold == 7 else -30.0, 8.0, 1.0, ())
 
     monkeypatch.setattr(name_evidence, "refit", refitted)
-    for ahead in (-2.0, 0.0, 3.0):
-        data = scan_of(np.array([8.0]), False, flexible=value + ahead)
-        chosen = name_evidence.choose([SimpleNamespace()], trials, [candidate], [data])  # type: ignore[list-item]
-        assert chosen.shares["unknown"] == pytest.approx(1.0 / (1.0 + np.exp(-ahead)))
-        # weighed once more when second effects have been tried
-        assert verdict._weighed(chosen).shares == pytest.approx(chosen.shares)
+    pieces = scan_of(np.array([8.0]), False)
+    data = Scan(
+        np.where(np.arange(12) == 6, 32.0, 0.0)[None], pieces.flexible, np.full((1, 12), 8.0 / NORM),
+        np.full((1, 12), NORM), Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
+    )  # fmt: skip
+    found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
+    assert found.log_bayes["grip_slip"] == pytest.approx(9.0 - np.log(12.0), abs=1e-3)
+    assert found.winners["grip_slip"][0].effect.hold == 7 and found.acting["grip_slip"] == pytest.approx([1.0])
 
 
 @pytest.mark.parametrize("one_sided", [True, False])

@@ -131,7 +131,9 @@ def _effects(summary: dict[str, Any]) -> list[str]:
 
 def _finding(name: str, report: dict[str, Any]) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
-    said = f"{_NAMED[verdict]}" if verdict in _NAMED else f"{verdict}: {effects}"
+    said = _NAMED.get(verdict, f"{verdict}: {effects}")
+    if verdict == "partial":
+        said = f"{effects} is missing, and something that has no name here"
     lines = [f"{name}: {said} (p = {report['p_global']:.2g})"]
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"

@@ -14,12 +14,14 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    drawn,
     embedded,
     number,
     pictures_in,
     span,
 )
 from wirebayes.report.pages.paper_summary import listed
+from wirebayes.report.pictures.discover import waterfall
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -44,6 +46,8 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
         "unknown": "Something is missing that no effect in the catalogue explains.",
         "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}.",
         "named": f"What is missing: {listed([_words(e) for e in v['effects']])}.",
+        "partial": f"{listed([_words(e) for e in v['effects']]).capitalize()} is missing, and something else that no "
+        "effect in the catalogue explains.",
     }
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
@@ -59,11 +63,35 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
         blocks.append(Pictures([Picture(embedded(file), f"Readings of {name} against the plain and the final model.")]))
     if (folder / name).is_dir() and (others := pictures_in(folder / name)):
         blocks.append(Pictures(others))
+    if len(v.get("steps", [])) > 1 and v["steps"][0]["rmse_N"] is not None:
+        figure = waterfall(v)
+        said = (
+            "Rms error on held-out holds: of the plain model, what each named effect takes off in turn, and what is "
+            "left above the noise."
+        )
+        blocks.append(Pictures([Picture(drawn(figure), said, said)]))
+        lines = [[_words(s["model"]), *(number(s[k]) for k in ("rmse_N", "elpd", "coverage_90"))] for s in v["steps"]]
+        caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
+        blocks.append(Table(["model", "rms error (N)", "elpd", "readings in 90 % bands"], lines, caption))
     if v.get("probabilities"):
         ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
-        lines = [[_words(effect), number(round(p, 4), 2)] for effect, p in ranked]
-        caption = "Probability of being the first missing effect, given that one is missing."
-        blocks.append(Table(["candidate", "probability"], lines, caption))
+        inclusion = v.get("inclusion", {})
+        lines = [
+            [
+                _words(effect),
+                number(round(p, 4), 2),
+                number(round(inclusion[effect], 4), 2) if effect in inclusion else "–",
+            ]
+            for effect, p in ranked
+        ]
+        rest = v.get("remainder", {}).get("probability")
+        caption = (
+            "First column: probability of having the largest share of the gap, given that something is missing. "
+            "Second: probability of being missing at all, alone or beside others."
+        )
+        if rest is not None:
+            caption += f" Something without a name remains beside them with probability {number(round(rest, 4), 2)}."
+        blocks.append(Table(["candidate", "largest share", "missing at all"], lines, caption))
     if v.get("power"):
         lines = [[_words(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
         caption = "The smallest amplitude of each effect that this test detects with 80 % power."
@@ -94,6 +122,8 @@ def _gap(v: dict[str, Any]) -> str:
     plain, final = (number(held[model]["rmse_N"], 2) for model in ("plain", "final"))
     holds = listed([str(h) for h in held["holds"]])
     text = f"On the unused holds {holds} the rms error goes from {plain} to {final} N"
+    if v["verdict"] == "partial":
+        text += " with a smooth discrepancy beside the named effects"
     if v.get("accepted") and held.get("flexible"):
         text += f"; a smooth curve instead of a named effect reaches {number(held['flexible']['rmse_N'], 2)}"
     return text + "."

@@ -1,6 +1,7 @@
 """Pictures of a discovery: readings against the plain and the final model, and what the plain one leaves over where."""
 
 import textwrap
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
@@ -18,7 +20,7 @@ from wirebayes.results import store
 from wirebayes.wire.staircase import Linearised, linearise
 
 Array = NDArray[Any]
-_MEASURED, _BAND, _HELD = "#1b1b1b", "#4c78a8", "#f2e6d0"
+_MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
 
 
 def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_effects: Path | None = None) -> None:
@@ -36,7 +38,8 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
         The user's Python file of effects.
     """
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
-    added = " + ".join(verdict["accepted"]) or {"unknown": "something unknown"}.get(verdict["verdict"], "nothing")
+    unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
+    added = " + ".join([*verdict["accepted"], *unknown]) or "nothing"
     titles = {"plain": "plain model", "final": f"with {added}"}
     for axis, model in zip(axes, titles, strict=True):
         _residuals(axis, store.load(folder / model, own_effects=own_effects), verdict["held_out"]["holds"])
@@ -47,6 +50,34 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     figure.savefig(target, dpi=130)
     plt.close(figure)
+
+
+def waterfall(verdict: dict[str, Any]) -> Figure:
+    """The rms error on held-out holds, from the plain model down: a bar for each named effect, and for what is left.
+
+    Parameters
+    ----------
+    verdict : dict
+        The experiment's part of ``discovery.json``, with at least one accepted effect.
+    """
+    steps, floor = verdict["steps"], verdict["held_out"]["floor_N"]
+    heights = [s["rmse_N"] for s in steps]
+    names = ["plain model", *(s["model"].replace("_", " ") for s in steps[1:]), "left", "noise"]
+    bars = [(0.0, heights[0], _MEASURED)]
+    bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
+    bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
+    figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
+    for x, (low, high, colour) in enumerate(bars):
+        axis.bar(x, max(high - low, 0.002 * max(heights)), bottom=low, color=colour, width=0.7)
+        axis.text(x, high, f"{high:.3g}", ha="center", va="bottom", fontsize=8)
+    ends = [heights[0], *heights[1:], floor]
+    for x, height in enumerate(ends):
+        axis.plot([x + 0.35, x + 0.65], [height, height], color="0.4", lw=0.8)
+    axis.set_xticks(range(len(names)), [textwrap.fill(n, 16) for n in names], fontsize=9)
+    axis.set_ylabel("rms error on held-out holds (N)")
+    axis.margins(y=0.12)
+    axis.spines[["top", "right"]].set_visible(False)
+    return figure
 
 
 def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Path | None = None) -> None:

@@ -1,0 +1,120 @@
+"""Sets of effects with and without a remainder: the prior's arithmetic, and what the sums mean."""
+
+from itertools import combinations
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery.model_space import EffectSet, log_prior, log_weights, posterior, smallest_set
+from wirebayes.discovery.stepwise import Accepted
+from wirebayes.discovery.verdict import Decision, verdict_of
+
+ONE = np.ones(1)
+NONE = np.full(1, -20.0)  # a remainder that the readings speak against
+
+
+def a_set(names: str, log_bayes: float, remainder: Any = NONE) -> EffectSet:
+    return EffectSet(tuple(names), log_bayes, dict.fromkeys(names, ONE), remainder)
+
+
+def judged(sets: list[EffectSet], names: int = 20, copies: dict[str, int] | None = None) -> Any:
+    return posterior(sets, *log_weights(sets, names, copies or {}), blocks=1)
+
+
+def test_each_further_effect_is_ten_times_less_likely_whatever_the_catalogue_holds() -> None:
+    for names in (4, 20):
+        weights = [sum(np.exp(log_prior(size, names)) for _ in combinations(range(names), size)) for size in (1, 2, 3)]
+        assert weights == pytest.approx([names, 0.1 * names, 0.01 * names])
+
+
+def test_something_unknown_is_believed_as_readily_as_one_name() -> None:
+    """Even odds before the test: with equal evidence *unknown* is as probable as the name, with less it is less."""
+    for ahead in (-2.0, 0.0, 3.0):
+        found = judged([a_set("", 0.0, np.array([8.0 + ahead])), a_set("a", 8.0)])
+        assert found.shares[0]["unknown"] == pytest.approx(1.0 / (1.0 + np.exp(-ahead)))
+
+
+def test_a_remainder_beside_a_name_has_half_the_weight_of_none() -> None:
+    found = judged([a_set("", 0.0), a_set("a", 30.0, np.array([2.0]))])
+    assert found.remainder[0] == pytest.approx(0.5 * np.exp(2.0) / (1.0 + 0.5 * np.exp(2.0)))
+    assert found.shares[0]["a"] == pytest.approx(1.0)  # with the remainder beside it, too, it has the largest share
+
+
+def test_inclusion_counts_every_set_and_the_first_name_has_the_share() -> None:
+    found = judged([a_set("", 0.0), a_set("a", 10.0), a_set("ab", 16.0), a_set("c", 9.0)])
+    pair = np.exp(16.0 + log_prior(2, 20))
+    total = np.exp(10.0) + pair + np.exp(9.0)
+    assert found.inclusion["a"][0] == pytest.approx((np.exp(10.0) + pair) / total)
+    assert found.inclusion["b"][0] == pytest.approx(pair / total)
+    assert found.shares[0]["a"] == pytest.approx(found.inclusion["a"][0])
+    assert found.shares[0]["b"] == 0.0
+    assert found.best.names == ("a", "b")
+
+
+def test_the_same_effect_under_two_names_makes_it_no_likelier() -> None:
+    """A catalogue that lists an effect twice names something with the same probability as one that lists it once."""
+    unknown = a_set("", 0.0, np.array([10.0]))
+    once = judged([unknown, a_set("a", 10.0)], 20)
+    twice = judged([unknown, a_set("a", 10.0), a_set("b", 10.0)], 21, {"a": 2, "b": 2})
+    assert twice.shares[0]["unknown"] == pytest.approx(once.shares[0]["unknown"])
+
+
+def test_materials_are_judged_each_by_what_acts_there() -> None:
+    acting = {"a": np.array([1.0, 0.0])}
+    sets = [EffectSet((), 0.0, {}, np.array([-20.0, 6.0])), EffectSet(("a",), 30.0, acting, np.array([-20.0, 6.0]))]
+    found = posterior(sets, *log_weights(sets, 20, {}), blocks=2)
+    assert found.inclusion["a"] == pytest.approx([1.0, 0.0])
+    # a remainder in the second of two materials: half of the weight for one of them, a quarter for this one
+    odds = 0.5 * 0.25 * np.exp(6.0)
+    assert found.remainder == pytest.approx([0.0, odds / (1.0 + odds)], abs=1e-6)
+    assert found.nothing == pytest.approx([0.0, 1.0 / (1.0 + odds)], abs=1e-6)
+
+
+def test_the_smallest_set_holds_what_it_must() -> None:
+    assert smallest_set({"a": 0.9, "b": 0.1}) == ["a"]
+    assert smallest_set({"a": 0.89, "b": 0.06, "c": 0.05}) == ["a", "b"]
+
+
+def decision(shares: dict[str, float], inclusion: float, remainder: float, gain: float, nothing: float = 0.0) -> Any:
+    found = SimpleNamespace(
+        shares=[shares], inclusion={"a": np.array([inclusion])}, remainder=np.array([remainder]),
+        nothing=np.array([nothing]),
+    )  # fmt: skip
+    best = SimpleNamespace(accepted=(Accepted("a", (0,), {}),))
+    return Decision(found, best, None, {"a": np.array([gain])})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("inclusion", "remainder", "gain", "verdict", "accepted"),
+    [
+        (1.0, 0.49, 50.0, "named", 1),
+        (1.0, 0.51, 50.0, "partial", 1),
+        (0.91, 0.51, 4.1, "partial", 1),
+        (0.89, 0.51, 50.0, "unknown", 0),  # not established: it may be another name
+        (1.0, 0.51, 3.9, "unknown", 0),  # it does not predict
+    ],
+)
+def test_verdicts_turn_at_their_thresholds(
+    inclusion: float, remainder: float, gain: float, verdict: str, accepted: int
+) -> None:
+    said, effects = verdict_of(decision({"a": 1.0}, inclusion, remainder, gain), 0)
+    assert said == verdict and len(effects) == accepted
+
+
+def test_two_names_in_the_set_are_ambiguous_and_a_material_may_lack_nothing() -> None:
+    assert verdict_of(decision({"a": 0.89, "b": 0.11}, 0.89, 0.1, 50.0), 0)[0] == "ambiguous"
+    assert verdict_of(decision({"a": 0.91, "b": 0.09}, 0.91, 0.1, 50.0), 0)[0] == "named"
+    assert verdict_of(decision({"a": 1.0}, 0.3, 0.1, 50.0, nothing=0.51), 0) == ("nothing-missing", [])
+    assert verdict_of(decision({"a": 1.0}, 0.3, 0.1, 50.0, nothing=0.49), 0)[0] == "named"
+
+
+def test_what_is_left_beside_a_name_counts_for_the_name_as_far_as_the_smooth_curve_needs_it() -> None:
+    from wirebayes.discovery.verdict import _more_beside
+
+    sets = [a_set("", 0.0), a_set("a", 10.0)]
+    for ahead in (-3.0, 0.0, 3.0):  # of the name with a smooth remainder, over the remainder alone
+        more = np.exp(_more_beside(sets, np.array([-40.0, -40.0 + ahead]), 1, 5.0))
+        assert more.sum() == pytest.approx(np.exp(5.0))
+        assert more[1] / more[0] == pytest.approx(np.exp(ahead))

@@ -1,0 +1,91 @@
+"""Sets of effects: their evidence does not depend on the order in which they were found."""
+
+import numpy as np
+import pytest
+
+from tests.simulated import simulated_tests
+from wirebayes.discovery import screening, stepwise
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.model_space import EffectSet
+from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.settings import Settings
+from wirebayes.discovery.smooth_credit import beside_smooth
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.simulation.synthetic import Bench, Truth
+
+WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
+UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
+
+
+def plain_fit(bench: Bench, truth: dict[str, float], names: tuple[str, ...]) -> list[LaplaceFit]:
+    experiments = simulated_tests([bench], Truth(WIRE | truth, [named(n) for n in names]), seed=3)
+    return [fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))]
+
+
+@pytest.mark.parametrize(
+    ("truth", "bench"),
+    [
+        ({"strain_stiffening.c": 6.0, "memory.omega": 0.5}, Bench(displacements_mm=UP_AND_DOWN)),
+        ({"toe.c": 0.001, "sensor_nonlinearity.a": 0.004}, Bench()),
+    ],
+)
+def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], bench: Bench) -> None:
+    first, second = (name.split(".")[0] for name in truth)
+    plain = plain_fit(bench, truth, (first, second))
+    settings = Settings(kinds={n: CATALOGUE[n] for n in (first, second)})
+    trials, candidates = screening.candidate_probes(plain, settings.kinds)
+    scans = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]
+    found = weigh_names(plain, trials, candidates, scans)
+    units = stepwise._units(found)
+    root = stepwise.FittedSet(EffectSet((), 0.0, {}, None), plain, (), found, ([], [], []))
+    values, bare = [], []
+    for one, other in ((first, second), (second, first)):
+        added = stepwise._fit(root, one, settings, units, np.random.default_rng(1))
+        beside = weigh_names(
+            added.blocks, *added.scanned, correction=lambda r, b=added.blocks: stepwise._to_plain_prior(r, b, units)
+        )  # fmt: skip
+        values.append(found.log_bayes[one] + beside.log_bayes[other])
+        bare.append(found.log_bayes[one] + weigh_names(added.blocks, *added.scanned).log_bayes[other])
+    assert values[0] == pytest.approx(values[1], abs=0.3)
+    assert abs(bare[0] - bare[1]) > 0.3  # with priors that follow the fit they would differ
+
+
+def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() -> None:
+    """Against the dense covariance of readings that hold the remainder as noise, its size and the noise's known."""
+    from wirebayes.discovery import linear_scan, smooth_credit
+
+    block = plain_fit(Bench(), {"toe.c": 0.001}, ("toe",))[0]
+    trials, _ = screening.candidate_probes([block], {"toe": CATALOGUE["toe"]})
+    x = expand(block.target, block.modes.z[:1], trials)
+    ratio, size = 10.0, 8.0
+    found = {}
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (linear_scan, smooth_credit):
+            patch.setattr(module, "RATIOS", np.array([ratio]))
+            patch.setattr(module, "SIZES", np.array([size]))
+        found = beside_smooth(x)
+    k = x.left[0] * x.singular[0]
+    noise = np.eye(len(k)) + ratio * k @ k.T
+    whiten = np.linalg.inv(np.linalg.cholesky(noise))
+    # the prior of the parameters as further rows of a regression
+    root = np.linalg.cholesky(x.prior_precision[0]).T
+    parameters = np.vstack([whiten @ x.parameters[0], root])
+    aside = np.linalg.solve(root.T, x.prior_gradient[0])
+    basis, _ = np.linalg.qr(parameters)
+
+    def free(columns: np.ndarray, below: np.ndarray) -> np.ndarray:
+        whole = np.vstack([whiten @ columns, below])
+        return np.asarray(whole - basis @ (basis.T @ whole))
+
+    functions = free(x.flexible[0], np.zeros((len(root), x.flexible.shape[2])))
+    signature = free(x.signatures[0], np.zeros((len(root), x.signatures.shape[2])))
+    residual = free(x.residual[0][:, None], aside[:, None])[:, 0]
+    s2 = size**2 / (functions**2).sum()
+    inverse = np.linalg.inv(np.eye(len(functions)) + s2 * functions @ functions.T)
+    rss = residual @ inverse @ residual
+    for m in range(signature.shape[1]):
+        s = signature[:, m]
+        b, c = s @ inverse @ residual, s @ inverse @ s
+        b = max(b, 0.0) if x.one_sided[m] else b
+        assert found[m] == pytest.approx(-0.5 * x.degrees * np.log((rss - b**2 / c) / rss), rel=1e-6, abs=1e-8)
