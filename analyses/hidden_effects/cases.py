@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 
 from .catalogue import EFFECTS, FOREIGN, Candidate, draw, effect, fits, members
-from .delta import Geometry, geometry, signature, solve_amplitude
+from .delta import Geometry, conditional, geometry, signature, solve_amplitude, solve_together
 from .files import logged_temperature, write_experiments, write_json
 from .noise import measure
 from .rig import Array, Rig
 from .truth import PROTOCOLS, draw_rig
 
 GENERATION = 1  # raised with every change that makes other data of the same specification: old answers then lapse
-KINDS = ("clean", "single", "pair", "without", "foreign", "gross")
+KINDS = ("clean", "single", "pair", "without", "foreign", "gross", "two", "three", "mixed")
+TOGETHER = ("two", "three", "mixed")  # kinds whose delta is conditional on the other effects
+LONG = ("unloading", "dense", "uneven")  # protocols that tell more than the paper's
 DELTAS = (3.0, 5.0, 10.0, 20.0)
 ATTEMPTS = 60  # rigs tried before an effect counts as out of reach of a protocol
 
@@ -73,12 +75,13 @@ class Plan:
     foreign_deltas: tuple[float, ...]
     foreign_protocols: int
     gross: int
+    together: int  # of each of two, three, and one known beside one foreign
 
 
 SIZES = {
-    "tiny": Plan(8, (10.0,), 1, 1, 2, (), 0, (), 0, 0),
-    "small": Plan(48, (5.0, 10.0, 20.0), 2, 1, 12, (10.0,), 1, (10.0,), 1, 8),
-    "full": Plan(640, DELTAS, len(PROTOCOLS), 1, 80, (10.0, 20.0), 3, (8.0, 20.0), 4, 40),
+    "tiny": Plan(8, (10.0,), 1, 1, 2, (), 0, (), 0, 0, 0),
+    "small": Plan(48, (5.0, 10.0, 20.0), 2, 1, 12, (10.0,), 1, (10.0,), 1, 8, 24),
+    "full": Plan(640, DELTAS, len(PROTOCOLS), 1, 80, (10.0, 20.0), 3, (8.0, 20.0), 4, 40, 160),
 }
 
 
@@ -120,6 +123,15 @@ def specs(
         options = [name for name in EFFECTS if able(name, protocol)]
         first, second = rng.choice(len(options), 2, replace=False)
         found.append(Spec("pair", protocol, (options[first], options[second]), 12.0, i, seed))
+    for kind in TOGETHER:
+        rng = np.random.default_rng([seed, TOGETHER.index(kind)])
+        for i in range(plan.together):
+            protocol = LONG[i // 2 % 3] if i % 2 else "paper"
+            options = [name for name in EFFECTS if able(name, protocol)]
+            drawn = [options[k] for k in rng.choice(len(options), 3 if kind == "three" else 2, replace=False)]
+            if kind == "mixed":
+                drawn[1] = list(FOREIGN)[int(rng.integers(len(FOREIGN)))]
+            found.append(Spec(kind, protocol, tuple(drawn), 10.0, i, seed))
     chosen = set(names) | set(FOREIGN)
     return [s for s in found if s.kind in kinds and s.protocol in protocols and set(s.names) <= chosen]
 
@@ -133,7 +145,10 @@ def build(spec: Spec) -> Case | None:
             continue
         geo = geometry(rig)
         candidates = [draw(effect(name), rig, rng) for name in spec.names]
-        sizes = [solve_amplitude(geo, c, spec.delta) for c in candidates]
+        if spec.kind in TOGETHER:
+            sizes = solve_together(geo, candidates, spec.delta)
+        else:
+            sizes = [solve_amplitude(geo, c, spec.delta) for c in candidates]
         if np.any(np.isnan(sizes)):
             continue
         law = "gross" if spec.kind == "gross" else ("heavy" if rng.random() < 0.15 else "gaussian")
@@ -148,7 +163,8 @@ def truth(case: Case) -> dict[str, Any]:
     """The sealed truth as plain data; amplitudes carry their sign, holds their number in the file."""
     rig = case.rig
     effects = []
-    for candidate, size in case.hidden:
+    sizes = conditional(case.geo, list(case.hidden)) if case.hidden else []
+    for (candidate, size), alone in zip(case.hidden, sizes, strict=True):
         hold = candidate.hold
         bench = rig.benches[candidate.benches[0]]
         effects.append(
@@ -160,6 +176,7 @@ def truth(case: Case) -> dict[str, Any]:
                 "shapes": {k: v for k, v in candidate.shapes if k != "hold"},
                 "experiments": [rig.benches[b].name for b in candidate.benches],
                 "delta": case.spec.delta,
+                "conditional_delta": float(alone),
             }
         )
     total = float(np.linalg.norm(signature(case.geo, [list(case.hidden)]))) if case.hidden else 0.0

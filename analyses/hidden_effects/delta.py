@@ -128,3 +128,32 @@ def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float, tolerance
         if error.min() < tolerance:
             return float(grid[np.argmin(error)])
     return float("nan")  # delta jumps over the value asked for
+
+
+def conditional(geo: Geometry, hidden: list[tuple[Candidate, float]]) -> Array:
+    """(k,) delta of each of several effects after the plain parameters and the other effects have taken their part."""
+    rows = [hidden, *([e for e in hidden if e is not one] for one in hidden)]
+    whole, *without = signature(geo, rows)
+    parts = np.array([whole - w for w in without])
+    found = []
+    for i, part in enumerate(parts):
+        others = np.delete(parts, i, axis=0).T
+        left = part - others @ np.linalg.lstsq(others, part, rcond=None)[0] if others.size else part
+        found.append(float(np.linalg.norm(left)))
+    return np.array(found)
+
+
+def solve_together(
+    geo: Geometry, candidates: list[Candidate], delta: float, tolerance: float = 0.1, rounds: int = 6
+) -> list[float]:
+    """Amplitudes of several effects with the same conditional delta each; nan when no sensible ones have it."""
+    wanted = np.full(len(candidates), delta)
+    for _ in range(rounds):
+        sizes = [solve_amplitude(geo, c, float(w)) for c, w in zip(candidates, wanted, strict=True)]
+        if np.any(np.isnan(sizes)):
+            break
+        found = conditional(geo, list(zip(candidates, sizes, strict=True)))
+        if np.all(np.abs(found / delta - 1.0) < tolerance):
+            return sizes
+        wanted = wanted * np.clip(delta / np.maximum(found, 1e-9), 0.3, 3.0)
+    return [float("nan")] * len(candidates)

@@ -115,6 +115,8 @@ def judge(case: Case, draws: int = 200) -> dict[str, Any]:
         worst = max(others, default=0.0)
         result["separable"] = bool(np.linalg.norm(z) * np.sqrt(max(1 - worst**2, 0.0)) > SEPARABLE)
     result["bench"] = case.rig.benches[int(np.argmax(share))].name
+    if case.spec.kind == "two":
+        result["optimal_two"] = optimal_two(case, candidates, curves, result["groups"], draws)
     if case.spec.kind in ("single", "without") and case.hidden:
         result["optimal"] = _optimal(case, candidates, sizes, curves, set(result["groups"][0]), draws)
     return result
@@ -147,3 +149,46 @@ def _optimal(
         "set_size": float(sets.sum(axis=1).mean()),
         "coverage": float(sets[:, target].mean()),
     }
+
+
+def optimal_two(
+    case: Case, candidates: list[Candidate], curves: Array, groups: list[list[str]], draws: int = 200
+) -> dict[str, float]:
+    """How often an ideal judge who knows that two effects hide, and the noise, names both.
+
+    Every pair of candidates, each of its direction at the hidden delta and with an amplitude of any size, integrated in
+    closed form; pairs of names equally likely, then their candidates.
+
+    Returns
+    -------
+    Rate of the right pair, and of one from each group.
+    """
+    geo, rng = case.geo, np.random.default_rng(int(case.spec.key, 16))
+    units = np.array([nearest_direction(curve, case.spec.delta) for curve in curves])
+    names = list(dict.fromkeys(c.name for c in candidates))
+    owner = np.array([names.index(c.name) for c in candidates])
+    first, second = (index for index in np.triu_indices(len(units), 1))
+    apart = owner[first] != owner[second]
+    first, second = first[apart], second[apart]
+    cosine = np.einsum("ar,ar->a", units[first], units[second])
+    left = np.maximum(1.0 - cosine**2, 1e-6)
+    pair = np.minimum(owner[first], owner[second]) * len(names) + np.maximum(owner[first], owner[second])
+    each, where = np.unique(pair, return_inverse=True)
+    weight = -0.5 * np.log(left) - np.log(np.bincount(where)[where])
+    z = signature(geo, [list(case.hidden)])[0]
+    right = together = 0
+    hidden = {c.name for c, _ in case.hidden}
+    for _ in range(draws):
+        noise = rng.normal(size=len(z))
+        along = units @ (z + noise - geo.basis @ (geo.basis.T @ noise))
+        a, b = along[first], along[second]
+        height = 0.5 * (a**2 + b**2 - 2.0 * cosine * a * b) / left + weight
+        top = np.full(len(each), -np.inf)
+        np.maximum.at(top, where, height)
+        total = np.bincount(where, np.exp(height - top[where]), len(each))
+        best = int(each[np.argmax(top + np.log(total))])
+        said = [names[best // len(names)], names[best % len(names)]]
+        right += set(said) == hidden
+        orders = (said, said[::-1])
+        together += any(one in groups[0] and other in groups[1] for one, other in orders)
+    return {"right": right / draws, "group": together / draws}

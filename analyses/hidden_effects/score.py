@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .cases import TOGETHER
 from .rates import Row, closed, comparable, pooled, rate
 
 NOTHING = "nothing-missing"
+CONDITIONAL = 8.0  # delta beside the other effects from which one is expected to be named
 VISIBLE = 0.8  # share of delta that must survive a refit of the plain model for a case to count as visible
 
 
@@ -44,6 +46,12 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "in_set": bool(names) and names[0] in (spoken.get("set") or []),
         "set_size": len(spoken.get("set") or []),
         "accepted": list(spoken.get("accepted") or []),
+        "groups": groups,
+        "conditional": [e.get("conditional_delta") for e in truth["effects"]],
+        "remains": spoken["verdict"] in ("partial", "unknown"),
+        "verdict": spoken["verdict"],
+        "remainder": (spoken.get("remainder") or {}).get("probability"),
+        "optimal_two": judged.get("optimal_two") or {},
         "right_hold": None if hold is None or found_hold is None else found_hold == hold,
         "separable": judged.get("separable"),
         "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],
@@ -128,6 +136,10 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
         "by_effect": breakdown(single, "effect"),
         "by_protocol": breakdown(single, "protocol"),
         "pairs": _pairs([r for r in rows if r["kind"] == "pair"]),
+        "together": {kind: _together([r for r in rows if r["kind"] == kind]) for kind in TOGETHER},
+        "false_names": rate(bool(false_names(r)) for r in rows if r["kind"] != "without"),
+        "partial_on_single": rate(r["verdict"] == "partial" for r in single),
+        "remainder_calibration": calibration(rows),
         "clean_by_protocol": {
             p: rate(r["any_alarm"] for r in rows if r["kind"] == "clean" and r["protocol"] == p)
             for p in dict.fromkeys(r["protocol"] for r in rows if r["kind"] == "clean")
@@ -153,6 +165,52 @@ def _pairs(rows: list[Row]) -> dict[str, Any]:
         "both_accepted": rate(set(r["names"]) <= set(r["accepted"]) for r in rows if r["detected"]),
         "something_else_accepted": rate(bool(set(r["accepted"]) - set(r["names"])) for r in rows if r["detected"]),
     }
+
+
+def false_names(row: Row) -> list[str]:
+    """Accepted names outside the group of everything that is hidden."""
+    return [name for name in row["accepted"] if not any(name in group for group in row["groups"])]
+
+
+def _together(rows: list[Row]) -> dict[str, Any]:
+    """Several effects at once: which of those that stay visible beside the others are accepted, by protocol."""
+    out: dict[str, Any] = {}
+    for label, part in (
+        ("all", rows),
+        ("paper", [r for r in rows if r["protocol"] == "paper"]),
+        ("long", [r for r in rows if r["protocol"] != "paper"]),
+    ):
+        seen = [r for r in part if r["detected"]]
+        visible = [[d is not None and d >= CONDITIONAL for d in r["conditional"]] for r in part]
+        found = [[any(a in group for a in r["accepted"]) for group in r["groups"]] for r in part]
+        best = [r["optimal_two"]["group"] for r in part if r["optimal_two"]]
+        out[label] = {
+            "detected": rate(r["detected"] for r in part),
+            "all_accepted": rate(all(f) for f, v in zip(found, visible, strict=True) if all(v)),
+            "known_accepted": rate(f[0] for f, v in zip(found, visible, strict=True) if v[0]),
+            "first_is_one_of_them": rate(
+                any(r["accepted"][0] in g for g in r["groups"]) for r in seen if r["accepted"]
+            ),
+            "remainder_reported": rate(r["remains"] for r in part),
+            "false_name": rate(bool(false_names(r)) for r in part),
+            "optimal_both": float(np.mean(best)) if best else None,
+        }
+    return out
+
+
+def calibration(rows: list[Row]) -> list[dict[str, Any]]:
+    """How often something is left beside the names where its probability is said to lie in each of five bins.
+
+    Something is left where an effect is foreign, was removed, or is hidden and neither it nor one like it was accepted.
+    """
+    out = []
+    for low in (0.0, 0.2, 0.4, 0.6, 0.8):
+        part = [r for r in rows if r["detected"] and r["remainder"] is not None and r["names"]]
+        part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] == 1.0)]
+        left = [not all(any(a in g for a in r["accepted"]) for g in r["groups"]) for r in part]
+        said = float(np.mean([r["remainder"] for r in part])) if part else None
+        out.append({"from": low, "said": said, "found": rate(left)})
+    return out
 
 
 def _seconds(values: list[float]) -> dict[str, float] | None:

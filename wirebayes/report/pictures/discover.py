@@ -62,14 +62,16 @@ def waterfall(verdict: dict[str, Any]) -> Figure:
     """
     steps, floor = verdict["steps"], verdict["held_out"]["floor_N"]
     heights = [s["rmse_N"] for s in steps]
-    names = ["plain model", *(s["model"].replace("_", " ") for s in steps[1:]), "left", "noise"]
+    names = ["plain model", *(s["model"].replace("_", " ") for s in steps[1:]), "left over", "noise"]
     bars = [(0.0, heights[0], _MEASURED)]
     bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
     bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
     figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
-    for x, (low, high, colour) in enumerate(bars):
+    labels = [f"{heights[0]:.3g} N", *(f"{b - a:+.2g} N".replace("-", "−") for a, b in pairwise(heights))]
+    labels += [f"{max(heights[-1] - floor, 0.0):.2g} N", f"{floor:.2g} N"]
+    for x, ((low, high, colour), label) in enumerate(zip(bars, labels, strict=True)):
         axis.bar(x, max(high - low, 0.002 * max(heights)), bottom=low, color=colour, width=0.7)
-        axis.text(x, high, f"{high:.3g}", ha="center", va="bottom", fontsize=8)
+        axis.text(x, high, label, ha="center", va="bottom", fontsize=8)
     ends = [heights[0], *heights[1:], floor]
     for x, height in enumerate(ends):
         axis.plot([x + 0.35, x + 0.65], [height, height], color="0.4", lw=0.8)
