@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wirebayes import cli, workers
 from wirebayes.discovery import gap, linear_scan, power, screening
@@ -16,7 +17,7 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, write
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Amplitude, Effect
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
@@ -85,6 +86,45 @@ def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_
     gain, se, flexible = held["leave_one_hold_out"].values()
     assert held["shrinks"] == (gain > max(4.0, 2.0 * se)) and gain == flexible
     assert held["flexible"].items() <= held["final"].items()
+
+
+def test_two_effects_are_both_named_and_each_step_closes_some_of_the_gap(tmp_path: Path) -> None:
+    effects = [named("toe"), named("lost_motion")]
+    bench = Bench(displacements_mm=UP_AND_DOWN)
+    found = answer(made(tmp_path, [bench], {"toe.c": 0.0015, "lost_motion.w": 0.08}, effects))
+    assert found["verdict"] == "named" and found["effects"] == found["accepted"] == ["toe", "lost_motion"]
+    assert min(found["inclusion"][name] for name in found["effects"]) > 0.9 and found["remainder"]["probability"] < 0.2
+    assert [step["model"] for step in found["steps"]] == ["plain", "toe", "lost_motion"]
+    rmse = [step["rmse_N"] for step in found["steps"]]
+    assert rmse[0] > 1.5 * rmse[1] > 2.0 * rmse[2]
+    assert found["steps"][-1] == {"model": "lost_motion"} | {
+        k: v for k, v in found["held_out"]["final"].items() if k != "elpd_difference_se"
+    }
+
+
+class _Thread(Effect):
+    """A screw whose pitch wobbles: in no catalogue."""
+
+    name, place, scope = "thread", "position", "instrument"
+    amplitudes = (Amplitude("w", "mm", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The screw's pitch wobbles."
+
+    def apply(self, value, own, hold):
+        return value + own["w"] * np.sin(2.0 * np.pi * hold.displacement_mm / 3.3)
+
+
+def test_what_has_a_name_is_named_beside_what_has_none(tmp_path: Path) -> None:
+    bench = Bench(displacements_mm=UP_AND_DOWN)
+    experiments = made(tmp_path, [bench], {"toe.c": 0.0015, "thread.w": 0.06}, [named("toe"), _Thread()])
+    found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=FEW))
+    report = found.report["experiments"]["simulated"]
+    assert found.report["version"] == 2
+    assert report["verdict"] == "partial" and report["accepted"] == report["effects"] == ["toe"]
+    assert report["inclusion"]["toe"] > 0.9 and report["remainder"]["probability"] > 0.5
+    assert "displacement" in report["remainder"]["where"] and report["remainder"]["p"] < 0.03
+    assert report["next_measurement"].startswith("To learn more of what remains")
+    (final,) = final_models(found)
+    assert [e.name for e in final.effects] == ["toe", "discrepancy"]
 
 
 def test_findings_do_not_depend_on_how_many_processes_there_are(

@@ -10,7 +10,7 @@ from tests.model.dense import normal
 from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.prediction.table import HEADER, table
+from wirebayes.prediction.table import HEADER, mixture_table, table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
@@ -37,3 +37,24 @@ def test_quantiles_are_those_of_the_known_normal() -> None:
         assert row["sd_N"] / width == pytest.approx(1.0, abs=0.03)
         for name, level in (("q05_N", 0.05), ("q50_N", 0.5), ("q95_N", 0.95)):
             assert (row[name] - middle) / width == pytest.approx(stats.norm.ppf(level), abs=0.06)
+
+
+def test_undecided_models_answer_as_often_as_they_are_probable() -> None:
+    """Two wires whose bands do not meet: the quantiles are those of a mixture of two normals, worked out by hand."""
+    bench = Bench(displacements_mm=(2, 4, 7), resolution_N=0.02)
+    experiment = simulated_tests([bench], Truth(WIRE), seed=1)[0]
+    sample, protocol = build([experiment]).samples[0], experiment.protocol()
+    question = PredictionRequest(protocol, 0, np.ones(3, bool), np.full(3, np.nan))
+    members, parts = [], []
+    for share, stiffness in ((0.7, 900.0), (0.3, 1200.0)):
+        wire = WIRE | {"k1": stiffness}
+        stored = Stored({name: np.full(DRAWS, value) for name, value in wire.items()}, sample, "chain")
+        members.append((share, SimpleNamespace(stored=stored, question=question, holds=experiment.holds)))
+        r, covariance, _ = normal(protocol, wire, Model(), experiment.tension(), 0.02)
+        parts.append((share, experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))))
+    rows = [dict(zip(HEADER, row, strict=True)) for row in mixture_table(members, draws=DRAWS)]  # type: ignore[arg-type]
+    for i, row in enumerate(rows):
+        assert row["mean_N"] == pytest.approx(sum(share * mean[i] for share, mean, _ in parts), abs=0.01)
+        for name, level in (("q05_N", 0.05), ("q95_N", 0.95)):
+            below = sum(share * stats.norm.cdf(row[name], mean[i], sd[i]) for share, mean, sd in parts)
+            assert below == pytest.approx(level, abs=0.005)

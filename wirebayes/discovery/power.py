@@ -1,6 +1,6 @@
 """What could have been seen: detectable amplitudes, look-alikes, what this protocol hides, and what to measure next."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ Array = NDArray[Any]
 ALIKE = 0.95
 _POWER_ROWS = 300  # simulations behind an 80 % amplitude
 _WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
+_TRIED = "unloading, longer holds, finer steps, another length"
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
@@ -220,29 +221,47 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
 
 def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
     """The plan that tells two candidates apart best, or shows one effect best, by projected signatures."""
-    problem = block.target.problem
     trials = list(pair) if pair else [weakest] if weakest else []
     if not trials:
         return "No candidate remains; repeating the same holds would narrow the parameters."
-    planned = [_another_length(problem)]
-    for plans in zip(*(alternatives(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
-        protocols = [plan.protocol for plan in plans]
-        empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
-        planned.append((plans[0].words, with_protocols(problem, protocols, empty)))
-    here = _separation(block.target, block, trials)
-    scored = [(_separation(replace_problem(block.target, other), block, trials), words) for words, other in planned]
-    best, words = max(scored)
-    ratio = best / here if here > 0 else np.inf
+    words, ratio = _best_plan(block, lambda target: _separation(target, block, trials))
     names = " from ".join(t.effect.name for t in trials)
     if ratio < _WORTH:
         aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"
-        tried = "unloading, longer holds, finer steps, another length"
-        return f"None of the tests considered ({tried}) would {aim} independently."
+        return f"None of the tests considered ({_TRIED}) would {aim} independently."
     if pair:
         known = np.isfinite(ratio) and ratio < 1e3
         gain = f" {ratio:.1f} times as much as now" if known else "; at present they do not"
         return f"To distinguish {names}: {words}. Their signatures would then differ{gain}."
     return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
+
+
+def next_for_remainder(block: LaplaceFit) -> str:
+    """The plan in which a smooth remainder of the same size in newtons would stand out most."""
+    words, ratio = _best_plan(block, lambda target: _remainder_seen(target, block))
+    if ratio < _WORTH:
+        return f"None of the tests considered ({_TRIED}) would show more of what remains; repeat this one."
+    return f"To learn more of what remains: {words}. It would stand out {ratio:.1f} times as much as now."
+
+
+def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tuple[str, float]:
+    """Words of the plan with the largest value, and that value over the present test's."""
+    problem = block.target.problem
+    planned = [_another_length(problem)]
+    for plans in zip(*(alternatives(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
+        protocols = [plan.protocol for plan in plans]
+        empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
+        planned.append((plans[0].words, with_protocols(problem, protocols, empty)))
+    here = value(block.target)
+    best, words = max((value(replace_problem(block.target, other)), words) for words, other in planned)
+    return words, best / here if here > 0 else np.inf
+
+
+def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:
+    """Typical length, in standard deviations of a reading, of a smooth remainder of one newton after projection."""
+    x = expand(target, block.modes.z[:1], [])
+    smooth = replace(x, signatures=x.flexible, one_sided=np.zeros(x.flexible.shape[2], bool))
+    return float(np.sqrt((projected(smooth, float(x.ratio[0])) ** 2).sum()))
 
 
 def replace_problem(target: LogPosterior, problem: Any) -> LogPosterior:

@@ -20,7 +20,7 @@ from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.discovery.stepwise import Accepted, Explored, explore
-from wirebayes.discovery.verdict import Decision, Verdict, decide, verdict_of
+from wirebayes.discovery.verdict import Alternative, Decision, Verdict, alternatives, decide, verdict_of
 from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
@@ -43,10 +43,13 @@ class Findings:
         The content of ``discovery.json``.
     final : tuple of LaplaceFit
         The samples of each material, gross errors struck out, with the effects that were accepted.
+    undecided : tuple of list of Alternative
+        For each material the models that the readings leave undecided, the final one first; empty where nothing is.
     """
 
     report: dict[str, Any]
     final: tuple[LaplaceFit, ...]
+    undecided: tuple[list[Alternative], ...] = ()
 
 
 def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = CATALOGUE) -> dict[str, type[Effect]]:
@@ -137,7 +140,13 @@ def investigate(
                 "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
             }
     report("held-out holds", len(plain), len(plain))
-    return Findings({"version": 2, "experiments": out}, tuple(final))
+    undecided = [
+        alternatives(decision, explored, i, stages_end, answer.verdict)
+        if decision is not None and explored is not None and answer.verdict in ("ambiguous", "partial")
+        else []
+        for i, (answer, stages_end) in enumerate(zip(answers, final, strict=True))
+    ]
+    return Findings({"version": 2, "experiments": out}, tuple(final), tuple(undecided))
 
 
 @dataclass(frozen=True)
@@ -159,13 +168,28 @@ def final_models(findings: Findings) -> list[JointModel]:
     for block in findings.final:
         reports = [findings.report["experiments"][name] for name in block.names]
         remains = reports[0]["verdict"] in ("partial", "unknown")
-        if block.effects and not remains:
-            out.append(JointModel(block.experiments, block.effects, block.best))
-            continue
-        for e in block.experiments:
-            own = shrinking.alone(block.effects, e)
-            smooth = (shrinking.discrepancy(e, shrinking.left_over(block, e.name)),) if remains else ()
-            out.append(JointModel((e,), (*own, *smooth), block.parameters(e.name)))
+        out += _sampled(block, remains)
+    return out
+
+
+def alternative_models(findings: Findings) -> list[list[tuple[float, JointModel]]]:
+    """For each experiment the other models that stay undecided beside its final one, with their probabilities."""
+    out = []
+    for others in findings.undecided:
+        for other in others[1:]:
+            out.append([(other.probability, m) for m in _sampled(other.block, other.remains)])
+    return out
+
+
+def _sampled(block: LaplaceFit, remains: bool) -> list[JointModel]:
+    """What is sampled for a block, with a smooth discrepancy beside its effects where something remains."""
+    if block.effects and not remains:
+        return [JointModel(block.experiments, block.effects, block.best)]
+    out = []
+    for e in block.experiments:
+        own = shrinking.alone(block.effects, e)
+        smooth = (shrinking.discrepancy(e, shrinking.left_over(block, e.name)),) if remains else ()
+        out.append(JointModel((e,), (*own, *smooth), block.parameters(e.name)))
     return out
 
 
@@ -309,7 +333,11 @@ def _outlook(
             )
 
         weakest = trials[best_probe[max(best_probe, key=hiddenness)]]
-    return {"power": seen, "not_identifiable": hidden, "next_measurement": power.next_measurement(block, pair, weakest)}
+    if answer.verdict in ("partial", "unknown"):
+        proposal = power.next_for_remainder(answer.stages[-1] if answer.stages else block)
+    else:
+        proposal = power.next_measurement(block, pair, weakest)
+    return {"power": seen, "not_identifiable": hidden, "next_measurement": proposal}
 
 
 def _only(x: Expansion, m: int) -> Expansion:

@@ -38,6 +38,7 @@ KEEP_ELPD = 4.0  # gain of leaving out one hold at a time that an effect must br
 INCLUSION = 0.9  # probability that the effect is missing
 REMAINS = 0.5  # probability of a remainder from which the verdict says so
 IN_SET = 0.9  # probability that the set of possible names holds together
+MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 3, 0.05  # undecided models sampled beside the final one, and their probability
 
 
 @dataclass(frozen=True)

@@ -107,6 +107,7 @@ class _Frontier:
 
     names: int
     known: dict[Key, EffectSet] = field(default_factory=dict)
+    fitted: dict[Key, FittedSet] = field(default_factory=dict)
     parents: dict[Key, tuple[Key, str]] = field(default_factory=dict)
     credit: dict[Key, float] = field(default_factory=dict)
 
@@ -115,7 +116,7 @@ class _Frontier:
         names = (*parent.names, name)
         key = frozenset(names)
         value = parent.log_bayes + found.log_bayes[name]
-        if key not in self.known or self.known[key].log_bayes < value:
+        if key not in self.known or (key not in self.fitted and self.known[key].log_bayes < value):
             acting = {**parent.acting, name: found.acting[name]}
             self.known[key] = EffectSet(names, value, acting, None)
             self.parents[key] = parent.key, name
@@ -159,7 +160,7 @@ def explore(
     for name in found.winners:
         credit = float(np.maximum(smooth + credits.get(name, -np.inf), 0.0).sum()) if name in credits else -np.inf
         frontier.add(root, name, found, credit)
-    done: dict[Key, FittedSet] = {}
+    done = frontier.fitted
     start = FittedSet(root, plain, (), found, ([], [], []))
     while len(done) < MOST_LOOKS:
         best = max((frontier.promise(key) for key in frontier.known), default=-np.inf)

@@ -15,12 +15,15 @@ from wirebayes.discovery.settings import (
     ALPHA_AFTER,
     INCLUSION,
     KEEP_ELPD,
+    LEAST_ALTERNATIVE,
+    MOST_ALTERNATIVES,
     P_SLOPE,
     REMAINS,
     RETESTS,
     Settings,
 )
 from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet, Key
+from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.workers import Each
 
@@ -179,3 +182,47 @@ def verdict_of(decision: Decision, block: int) -> tuple[Verdict, list[Accepted]]
     if not acting:
         return "unknown", []
     return "named" if len(smallest_set(shares)) == 1 else "ambiguous", acting
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One of several models between which the readings do not decide.
+
+    Attributes
+    ----------
+    block : LaplaceFit
+    remains : bool
+        Whether something unknown remains beside its effects.
+    probability : float
+    """
+
+    block: LaplaceFit
+    remains: bool
+    probability: float
+
+
+def alternatives(
+    decision: Decision, explored: Explored, i: int, final: LaplaceFit, verdict: Verdict
+) -> list[Alternative]:
+    """The final model of block `i` and the others that share the probability with it, at most `MOST_ALTERNATIVES`."""
+    found = decision.posterior
+    blocks: dict[tuple[str, bool], LaplaceFit] = {}
+    weights: dict[tuple[str, bool], float] = {}
+    for s, bare, more in zip(found.sets, found.without, found.beside, strict=True):
+        fit = explored.fitted.get(s.key)
+        if fit is None or not fit.blocks[i].effects:
+            continue
+        remains = 1.0 if s.remainder is None else over_subsets(s.remainder)[1][i]
+        key = "+".join(sorted(e.key for e in fit.blocks[i].effects))
+        for rest, weight in ((False, bare + more * (1.0 - remains)), (True, more * remains)):
+            blocks.setdefault((key, rest), fit.blocks[i])
+            weights[key, rest] = weights.get((key, rest), 0.0) + float(weight)
+    own = "+".join(sorted(e.key for e in final.effects)), verdict == "partial"
+    blocks[own] = final
+    weights.setdefault(own, 0.0)
+    others = sorted((k for k in weights if k != own and weights[k] >= LEAST_ALTERNATIVE), key=lambda k: -weights[k])
+    kept = [own, *others[:MOST_ALTERNATIVES]]
+    total = sum(weights[k] for k in kept)
+    if total <= 0.0 or len(kept) == 1:
+        return []
+    return [Alternative(blocks[k], k[1], weights[k] / total) for k in kept]

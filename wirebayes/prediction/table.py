@@ -24,11 +24,32 @@ def table(asked: ProtocolRequest, seed: int = 0, draws: int = DRAWS) -> list[lis
     draws : int
         Posterior draws used, evenly spread over the stored ones.
     """
+    return mixture_table([(1.0, asked)], seed, draws)
+
+
+def mixture_table(
+    members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0, draws: int = DRAWS
+) -> list[list[Any]]:
+    """The same of several models, each as often among the draws as it is probable.
+
+    Parameters
+    ----------
+    members : sequence of (probability, ProtocolRequest)
+        One protocol asked of each model; the probabilities sum to one.
+    seed : int
+    draws : int
+        In all.
+    """
+    rng = np.random.default_rng(seed_of(seed, "predict", members[0][1].stored.sample.name))
+    parts = []
+    for probability, asked in members:
+        stored, n = asked.stored, max(round(probability * draws), 2)
+        theta = stored.theta
+        theta = theta[np.unique(np.linspace(0, len(theta) - 1, n).round().astype(int))]
+        parts.append(predict(stored.problem, theta, stored.sample, asked.question, rng))
+    drawn = np.concatenate(parts, axis=-1)
+    asked = members[0][1]
     stored, question = asked.stored, asked.question
-    theta = stored.theta
-    theta = theta[np.unique(np.linspace(0, len(theta) - 1, draws).round().astype(int))]
-    rng = np.random.default_rng(seed_of(seed, "predict", stored.sample.name))
-    drawn = predict(stored.problem, theta, stored.sample, question, rng)
     rows: list[list[Any]] = []
     for hold, at in zip(asked.holds, np.flatnonzero(question.asked), strict=True):
         here = drawn[at, : len(hold.time_s)]

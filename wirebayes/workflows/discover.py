@@ -7,12 +7,19 @@ from typing import get_args
 
 from wirebayes import __version__
 from wirebayes.discovery import search
-from wirebayes.discovery.search import JointModel, catalogue_without, final_models, investigate
+from wirebayes.discovery.search import (
+    JointModel,
+    alternative_models,
+    catalogue_without,
+    final_models,
+    investigate,
+)
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.results.jobs import Job, run
+from wirebayes.results.mixture import write_mixture
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import without_script, workers
 from wirebayes.workflows.options import (
@@ -28,6 +35,8 @@ from wirebayes.workflows.options import (
     words,
 )
 from wirebayes.workflows.results import Findings, Place
+
+_OTHERS = "undecided"  # folder of the models that a final one shares the probability with
 
 
 def discover(
@@ -120,7 +129,8 @@ def discover(
 
 
 def write_findings(found: search.Findings, output: Path, own_effects: Path | None) -> None:
-    """Beside the fits in a folder: pictures, and ``discovery.json`` with the amplitudes of the final posteriors."""
+    """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes."""
+    _mixtures(found, output)
     _pictures(found, output, own_effects)
     _posterior_amplitudes(found, output)
     write_json(output / "discovery.json", found.report)
@@ -128,15 +138,37 @@ def write_findings(found: search.Findings, output: Path, own_effects: Path | Non
 
 def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
     """Plain fit of every experiment, and the final ones."""
-    plain = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
+    models = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
+    models += [("final", model) for model in final_models(found)]
+    models += [(f"final/{_OTHERS}/{k}", m) for k, (_, m) in _others(found)]
     out = []
-    for kind, model in [*plain, *(("final", m) for m in final_models(found))]:
+    for kind, model in models:
         folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
         keys = tuple(f.key for f in model.effects)
         provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
         out.append(Job(folders[0], model.experiments, keys, own_effects, law, history, "chain", 1.0, provenance,
                        model.near, folders))  # fmt: skip
     return out
+
+
+def _others(found: search.Findings) -> list[tuple[int, tuple[float, JointModel]]]:
+    """The undecided models beside the final ones, each with its number among those of its experiments."""
+    out, count = [], dict[str, int]()
+    for models in alternative_models(found):
+        k = 1 + count.get(models[0][1].experiments[0].name, 0)
+        count |= {e.name: k for _, model in models for e in model.experiments}
+        out += [(k, pair) for pair in models]
+    return out
+
+
+def _mixtures(found: search.Findings, output: Path) -> None:
+    """Say beside each final posterior which other models it shares the probability with."""
+    for block, others in zip(found.final, found.undecided, strict=True):
+        for e in block.experiments if others else ():
+            keys = [[f.key for f in other.block.effects] + ["discrepancy"] * other.remains for other in others]
+            folders = [".", *(f"{_OTHERS}/{k}" for k in range(1, len(others)))]
+            weights = [other.probability for other in others]
+            write_mixture(output / e.name / "final", list(zip(folders, weights, keys, strict=True)))
 
 
 def _posterior_amplitudes(found: search.Findings, output: Path) -> None:

@@ -10,8 +10,9 @@ from wirebayes.io.arrays import is_table, protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.prediction.request import asked_of
-from wirebayes.prediction.table import HEADER, dataset, table
+from wirebayes.prediction.table import HEADER, dataset, mixture_table
 from wirebayes.results import store
+from wirebayes.results.mixture import members_of
 from wirebayes.results.store import Stored
 from wirebayes.workflows.options import PathLike, check_choice, check_seed, path_of
 from wirebayes.workflows.results import Findings, Posterior, Posteriors
@@ -77,40 +78,49 @@ def predict(
     own = path_of(own_effects)
     if model is not None:
         check_choice("model", model, ("plain", "final"))
-    stored = stored_posterior(posterior, experiment, model, own)
+    members = stored_posteriors(posterior, experiment, model, own)
     if is_table(protocol):
         cells = protocol_of_columns(protocol)
     elif isinstance(protocol, str | os.PathLike):
         cells = protocol_table(Path(protocol))
     else:
         raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
-    asked = asked_of(cells, stored, fresh=fresh)
+    asked = [(probability, asked_of(cells, stored, fresh=fresh)) for probability, stored in members]
     seed = check_seed(seed)
     if output is not None:
         check_file(Path(output))
-    rows = table(asked, seed)
+    rows = mixture_table(asked, seed)
     if output is not None:
         write_csv(Path(output), HEADER, rows)
-    return dataset(rows, {"prediction": asked.sentence, "seed": seed})
+    sentence = asked[0][1].sentence
+    if len(asked) > 1:
+        sentence += f"; averaged over the {len(asked)} models that the readings leave undecided, by their probability"
+    return dataset(rows, {"prediction": sentence, "seed": seed})
 
 
-def stored_posterior(
+def stored_posteriors(
     posterior: PathLike | Posterior | Posteriors | Findings,
     experiment: str | None = None,
     model: str | None = None,
     own_effects: Path | None = None,
-) -> Stored:
-    """Draws and model of one experiment, from what `predict` is given."""
+) -> list[tuple[float, Stored]]:
+    """Draws and models of one experiment with their probabilities, from what `predict` is given.
+
+    More than one where `discover` left undecided which effects are missing.
+    """
     if isinstance(posterior, str | os.PathLike):
-        return find_posterior(Path(posterior), experiment, model, own_effects)
+        name, folder = find_posterior(Path(posterior), experiment, model)
+        return [(p, store.load(place, name, own_effects)) for p, place in members_of(folder)]
     if isinstance(posterior, Findings):
         posteriors: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
-        return one_of(posteriors, experiment).stored()
-    if isinstance(posterior, Posteriors):
-        return one_of(posterior, experiment).stored()
-    if not isinstance(posterior, Posterior):
+        one, experiment = one_of(posteriors, experiment), None
+    elif isinstance(posterior, Posteriors):
+        one, experiment = one_of(posterior, experiment), None
+    elif isinstance(posterior, Posterior):
+        one = posterior
+    else:
         raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
-    return posterior.stored(experiment)
+    return [(p, store.load(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
 
 
 def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:
@@ -123,10 +133,8 @@ def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Poste
     return posteriors[name]
 
 
-def find_posterior(
-    folder: Path, experiment: str | None = None, model: str | None = None, own_effects: Path | None = None
-) -> Stored:
-    """The posterior of an experiment in a folder of fit or discover, or in the folder that holds it itself.
+def find_posterior(folder: Path, experiment: str | None = None, model: str | None = None) -> tuple[str, Path]:
+    """An experiment's name and the folder of its posterior, in one of fit or discover or in that folder itself.
 
     Raises
     ------
@@ -150,8 +158,8 @@ def find_posterior(
     places = {place.name: place for place in found[name]}
     if model is None:
         if len(places) == 1:
-            return store.load(next(iter(places.values())), name, own_effects)
+            return name, next(iter(places.values()))
         model = "final"
     if model not in places:
         raise InputError(f"--model {model}: {folder} has no such posterior of {name}; discover writes plain and final")
-    return store.load(places[model], name, own_effects)
+    return name, places[model]

@@ -1,0 +1,29 @@
+"""Which models an undecided answer stands for: their probabilities and where their posteriors lie."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from wirebayes.io.run_folder import read_json, write_json
+
+FILE = "mixture.json"
+
+
+def write_mixture(folder: Path, members: Sequence[tuple[str, float, Sequence[str]]]) -> None:
+    """Write which models a final posterior is one of.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the final posterior.
+    members : sequence of (folder, probability, effects)
+        Folders below `folder`, ``.`` for the final posterior itself; the probabilities sum to one.
+    """
+    rows = [{"folder": f, "probability": p, "effects": list(effects)} for f, p, effects in members]
+    write_json(folder / FILE, {"members": rows})
+
+
+def members_of(folder: Path) -> list[tuple[float, Path]]:
+    """Probability and folder of every model that a posterior stands for; itself alone where nothing is undecided."""
+    if not (folder / FILE).is_file():
+        return [(1.0, folder)]
+    return [(float(m["probability"]), folder / m["folder"]) for m in read_json(folder / FILE)["members"]]
