@@ -102,26 +102,26 @@ def test_two_effects_are_both_named_and_each_step_closes_some_of_the_gap(tmp_pat
     }
 
 
-class _Thread(Effect):
-    """A screw whose pitch wobbles: in no catalogue."""
+class _Wave(Effect):
+    """The sensor's zero swings with the elapsed time: in no catalogue."""
 
-    name, place, scope = "thread", "position", "instrument"
-    amplitudes = (Amplitude("w", "mm", 0.0, stats.norm(0.0, 0.1)),)
-    sentence = "The screw's pitch wobbles."
+    name, place, scope = "wave", "reading", "environment"
+    amplitudes = (Amplitude("a", "N", 0.0, stats.norm(0.0, 0.1)),)
+    sentence = "The sensor's zero swings."
 
     def apply(self, value, own, hold):
-        return value + own["w"] * np.sin(2.0 * np.pi * hold.displacement_mm / 3.3)
+        return value + own["a"] * np.sin(2.0 * np.pi * (hold.start_s + hold.time_s) / 1100.0)
 
 
 def test_what_has_a_name_is_named_beside_what_has_none(tmp_path: Path) -> None:
     bench = Bench(displacements_mm=UP_AND_DOWN)
-    experiments = made(tmp_path, [bench], {"toe.c": 0.0015, "thread.w": 0.06}, [named("toe"), _Thread()])
+    experiments = made(tmp_path, [bench], {"toe.c": 0.0015, "wave.a": 0.015}, [named("toe"), _Wave()])
     found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=FEW))
     report = found.report["experiments"]["simulated"]
     assert found.report["version"] == 2
     assert report["verdict"] == "partial" and report["accepted"] == report["effects"] == ["toe"]
     assert report["inclusion"]["toe"] > 0.9 and report["remainder"]["probability"] > 0.5
-    assert "displacement" in report["remainder"]["where"] and report["remainder"]["p"] < 0.03
+    assert "elapsed time" in report["remainder"]["where"] and report["remainder"]["p"] < 0.03
     assert report["next_measurement"].startswith("To learn more of what remains")
     (final,) = final_models(found)
     assert [e.name for e in final.effects] == ["toe", "discrepancy"]
