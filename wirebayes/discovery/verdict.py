@@ -13,10 +13,12 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior, smallest_set
 from wirebayes.discovery.settings import (
     ALPHA_AFTER,
+    GIVE_WAY,
     INCLUSION,
     KEEP_ELPD,
     LEAST_ALTERNATIVE,
     MOST_ALTERNATIVES,
+    MOST_RETESTS,
     P_SLOPE,
     REMAINS,
     RETESTS,
@@ -95,10 +97,17 @@ def decide(
             break
         sets = [s for s in sets if not key <= s.key]
     retest = _retested(best, settings, rng, each)
-    if retest.p is not None and retest.p <= ALPHA_AFTER:
-        i = sets.index(found.best)
-        extra = without[i] - P_SLOPE * np.log(retest.p / ALPHA_AFTER)
-        beside = _more_beside(sets, beside, i, float(extra))
+    if _fails(retest):
+        passing = _complete(found, explored, best, settings, rng, each)
+        if passing is not None:
+            dropped = {key for key, other in explored.fitted.items() if other is best or key in passing.failed}
+            sets = [s for s in sets if s.key not in dropped]
+            best, retest = passing.best, passing.retest
+            without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
+        else:
+            i = next(k for k, s in enumerate(sets) if s.key == best.effects.key)
+            extra = float(without[i] - P_SLOPE * np.log((retest.p or 1.0) / ALPHA_AFTER))
+            beside = _more_beside(sets, beside, i, extra)
         found = model_space.posterior(sets, without, beside, blocks)
         if not found.best.names:
             return Decision(found, None, retest, {})
@@ -109,6 +118,42 @@ def decide(
             gains[step.effects.key] = _gain(plain, step, explored, rng, each)
     own = {s.accepted[-1].name: gains[s.effects.key] for s in path if s is not None}
     return Decision(found, best, retest, own)
+
+
+def _fails(retest: Retest) -> bool:
+    return retest.p is not None and retest.p <= ALPHA_AFTER
+
+
+@dataclass(frozen=True)
+class _Passing:
+    """A set that leaves nothing over, its test, and the sets that were tried before it."""
+
+    best: FittedSet
+    retest: Retest
+    failed: set[Key]
+
+
+def _complete(
+    found: ModelPosterior,
+    explored: Explored,
+    best: FittedSet,
+    settings: Settings,
+    rng: np.random.Generator,
+    each: Each,
+) -> _Passing | None:
+    """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none."""
+    weights = {s.key: float(w) for s, w in zip(found.sets, found.without + found.beside, strict=True)}
+    least = weights[best.effects.key] * np.exp(-GIVE_WAY)
+    near = [k for k, w in sorted(weights.items(), key=lambda item: -item[1]) if k in explored.fitted and w > least]
+    failed: set[Key] = set()
+    for key in near[:MOST_RETESTS]:
+        if explored.fitted[key] is best:
+            continue
+        retest = _retested(explored.fitted[key], settings, rng, each)
+        if not _fails(retest):
+            return _Passing(explored.fitted[key], retest, failed)
+        failed.add(key)
+    return None
 
 
 def _gain(plain: list[LaplaceFit], best: FittedSet, explored: Explored, rng: np.random.Generator, each: Each) -> Array:
