@@ -22,6 +22,7 @@ from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings,
 from wirebayes.planning.ranking import Judged, ranked, too_long
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
 from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
+from wirebayes.results import store
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -239,7 +240,8 @@ def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: 
 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
     discovered = bool(list(folder.glob("**/plain/posterior.nc")))
-    stored = find_posterior(folder, name, "plain" if discovered else None, own)
+    which, place = find_posterior(folder, name, "plain" if discovered else None)
+    stored = store.load(place, which, own)
     if stored.likelihood == "hold":
         said = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
         raise InputError(f"{folder}: {said}")
