@@ -133,15 +133,18 @@ def executor(
             client.wait_for_workers(1, timeout=_PATIENCE_S)
         except TimeoutError:
             raise InputError(f"--scheduler {scheduler}: found no workers there, expected one or more") from None
-        try:
-            versions = client.run(_version)
-        except Exception as error:  # whatever keeps a worker from importing this package
-            said = f"found workers that cannot import wirebayes ({error}), expected version {__version__} on each"
-            raise InputError(f"--scheduler {scheduler}: {said}") from None
-        for worker, version in versions.items():
-            if version != __version__:
-                said = f"found wirebayes {version} on {worker}, expected {__version__}, as here"
+        versions = client.run(_version, on_error="return")
+        # a worker that has just died is still on the scheduler's list, and no reason to stop
+        there = {worker: found for worker, found in versions.items() if not isinstance(found, OSError)}
+        for worker, found in there.items():
+            if isinstance(found, BaseException):
+                said = f"found no wirebayes on {worker} ({found}), expected version {__version__} on each"
                 raise InputError(f"--scheduler {scheduler}: {said}")
+            if found != __version__:
+                said = f"found wirebayes {found} on {worker}, expected {__version__}, as here"
+                raise InputError(f"--scheduler {scheduler}: {said}")
+        if not there:
+            raise InputError(f"--scheduler {scheduler}: found no workers there, expected one or more")
         yield client.get_executor(pure=False)
 
 

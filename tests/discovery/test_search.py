@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import stats
 
+from analyses.hidden_effects.cases import SIZES, seal, specs
 from wirebayes import cli, workers
 from wirebayes.discovery import gap, linear_scan, power, screening
 from wirebayes.discovery.search import discover, final_models, investigate
@@ -17,7 +17,7 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, write
-from wirebayes.wire.effect import Amplitude, Effect
+from wirebayes.wire.effect import Effect
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
@@ -102,26 +102,18 @@ def test_two_effects_are_both_named_and_each_step_closes_some_of_the_gap(tmp_pat
     }
 
 
-class _Wave(Effect):
-    """The sensor's zero swings with the elapsed time: in no catalogue."""
-
-    name, place, scope = "wave", "reading", "environment"
-    amplitudes = (Amplitude("a", "N", 0.0, stats.norm(0.0, 0.1)),)
-    sentence = "The sensor's zero swings."
-
-    def apply(self, value, own, hold):
-        return value + own["a"] * np.sin(2.0 * np.pi * (hold.start_s + hold.time_s) / 1100.0)
-
-
 def test_what_has_a_name_is_named_beside_what_has_none(tmp_path: Path) -> None:
-    bench = Bench(displacements_mm=UP_AND_DOWN)
-    experiments = made(tmp_path, [bench], {"toe.c": 0.0015, "wave.a": 0.015}, [named("toe"), _Wave()])
+    """A line that straightens first, on a sensor with hysteresis, which is in no catalogue."""
+    wanted = ("toe", "sensor_hysteresis")
+    spec = next(s for s in specs(SIZES["small"], 94, ("mixed",)) if s.names == wanted)
+    assert seal(spec, tmp_path / "cases", tmp_path / "sealed")
+    experiments = read_experiments(tmp_path / "cases" / spec.key / "experiment.toml")
     found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=FEW))
-    report = found.report["experiments"]["simulated"]
+    report = found.report["experiments"][experiments[0].name]
     assert found.report["version"] == 2
     assert report["verdict"] == "partial" and report["accepted"] == report["effects"] == ["toe"]
     assert report["inclusion"]["toe"] > 0.9 and report["remainder"]["probability"] > 0.5
-    assert "elapsed time" in report["remainder"]["where"] and report["remainder"]["p"] < 0.03
+    assert report["remainder"]["where"] and report["remainder"]["p"] < 0.03
     assert report["next_measurement"].startswith("To learn more of what remains")
     (final,) = final_models(found)
     assert [e.name for e in final.effects] == ["toe", "discrepancy"]
@@ -208,7 +200,7 @@ def test_a_user_finds_an_effect_of_their_own(tmp_path: Path) -> None:
     own.write_text('''
 import numpy as np
 from scipy import stats
-from wirebayes.wire.effect import Amplitude, Effect
+from wirebayes.wire.effect import Effect
 
 
 class ScrewWobble(Effect):

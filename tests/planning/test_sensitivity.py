@@ -63,7 +63,7 @@ def test_nothing_to_look_for_leaves_what_is_absorbed():
 def test_an_amplitude_said_to_be_seen_in_four_of_five_tests_is():
     """Forty tests with steady creep of that size, each judged by the test that `discover` opens with."""
     amplitude = seen(UP, simulations=300).effects["steady_creep"].amplitude_80
-    truth = Truth({**CENTRE, "steady_creep.c": amplitude}, (CATALOGUE["steady_creep"](),))
+    truth = Truth({**CENTRE, "steady_creep.a": amplitude}, (CATALOGUE["steady_creep"](),))
     found = 0
     for i in range(40):
         (sample,) = draw([UP], truth, 100 + i).problem.samples
