@@ -157,7 +157,7 @@ def as_finished(
     ----------
     pool : Executor
     function : function of one piece of work
-    work : iterable of (key, piece)
+    work : iterable of pairs
     at_once : int
         Most pieces handed over and not finished: more would only fill the memory of whoever keeps the list.
     """
