@@ -70,7 +70,9 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
             "left above the noise."
         )
         blocks.append(Pictures([Picture(drawn(figure), said, said)]))
-        lines = [[_words(s["model"]), *(number(s[k]) for k in ("rmse_N", "elpd", "coverage_90"))] for s in v["steps"]]
+        names = [_words(s["model"]) if s is v["steps"][0] else f"+ {_words(s['model'])}" for s in v["steps"]]
+        scores = [[number(s[k]) for k in ("rmse_N", "elpd", "coverage_90")] for s in v["steps"]]
+        lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
         caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
         blocks.append(Table(["model", "rms error (N)", "elpd", "readings in 90 % bands"], lines, caption))
     if v.get("probabilities"):
