@@ -10,7 +10,8 @@ from scipy import stats
 
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
 from wirebayes.discovery.refit import LARGEST, occam
-from wirebayes.discovery.settings import NEARLY_ONE
+from wirebayes.discovery.screening import Candidate, GlobalTest
+from wirebayes.discovery.settings import ALPHA, NEARLY_ONE
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
@@ -42,6 +43,29 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
         middle = 0.5 * (low + high)
         low, high = (low, middle) if seen(middle) else (middle, high)
     return high
+
+
+def detectable(
+    null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate], level: GlobalTest, block: int = 0
+) -> dict[str, tuple[int, float | None]]:
+    """For each effect that a block can show, its best probe and the amplitude that is detected in 80 % of tests.
+
+    Parameters
+    ----------
+    null : Scan
+        Of simulated data sets of the block, refitted.
+    trials, candidates
+        See `wirebayes.discovery.screening.candidate_probes`.
+    level : GlobalTest
+        What chance reaches over all blocks.
+    block : int
+    """
+    best: dict[str, int] = {}
+    strength = np.median(null.norm, axis=0)
+    for c in candidates:
+        if block in c.blocks and (c.name not in best or strength[c.probe] > strength[best[c.name]]):
+            best[c.name] = c.probe
+    return {name: (k, amplitude_80(null, trials[k], k, level.threshold(name, ALPHA))) for name, k in best.items()}
 
 
 def similarity(

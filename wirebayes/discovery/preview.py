@@ -1,7 +1,7 @@
 """What a test can and cannot tell, before a fit or a search is run: parameters by a short run, effects by their size.
 
-An effect is measured by δ, how far it moves the readings beyond what the plain model's own parameters can follow, in
-units of the noise (`wirebayes.discovery.linear_scan`).
+An effect is seen where the global test of `discover` would detect it in 80 % of tests like this one, simulated at the
+rough fit and refitted (`wirebayes.discovery.power`).
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.discovery.linear_scan import Probe, expand, probes, scan
+from wirebayes.discovery import power, screening
+from wirebayes.discovery.linear_scan import expand
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
@@ -20,7 +21,7 @@ from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
 
-SEEN = 5.0  # δ that `discover` detects in four cases of five (57 of 74 sealed cases of that size)
+SIMULATIONS = 199  # the level that one in twenty-five passes by chance is then the eighth largest
 UNUSUAL = 2.0  # standard deviations of an effect's prior: few wires show it as large
 UNTOLD, TOLD = 0.3, 0.9  # contraction below which the prior answers, and from which on the data do
 
@@ -35,7 +36,7 @@ class Preview:
         Of each: ``q05``, ``q50``, ``q95``, ``prior_q05``, ``prior_q95``, and ``told_by``: data, data and prior, or
         prior.
     effects : dict
-        Of each: ``amplitude_80``, about the smallest that would be detected in four cases of five, its ``unit``, and
+        Of each: ``amplitude_80``, the smallest that would be detected in four tests of five, its ``unit``, and
         whether the test ``shows`` it: yes (at usual sizes), if unusually large, or no, and the ``reason``.
     warnings : list of str
         What is odd about what was fitted.
@@ -66,7 +67,7 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
         name: _told(theta[:, i], before[:, i], name in problem.prior.logarithmic)
         for i, name in enumerate(problem.names)
     }
-    return Preview(parameters, _effects(block, experiment, kinds), [sentence for sentence in said if sentence])
+    return Preview(parameters, _effects(block, kinds, rng), [sentence for sentence in said if sentence])
 
 
 def _told(draws: Array, before: Array, positive: bool) -> dict[str, Any]:
@@ -82,26 +83,27 @@ def _told(draws: Array, before: Array, positive: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _effects(block: LaplaceFit, experiment: Experiment, kinds: Mapping[str, type[Effect]]) -> dict[str, dict[str, Any]]:
+def _effects(
+    block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.random.Generator
+) -> dict[str, dict[str, Any]]:
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
-    trials: list[tuple[str, Probe]] = []
-    for name, kind in kinds.items():
-        trials += [(name, p) for variant in kind.variants([experiment.protocol()]) for p in probes(variant)]
-    x = expand(block.target, block.modes.z[:1], [probe for _, probe in trials])
-    if x.degrees < 1:
+    trials, candidates = screening.candidate_probes([block], kinds)
+    if expand(block.target, block.modes.z[:1], []).degrees < 1:
         return {name: _hidden(kind, "fewer readings than parameters") for name, kind in kinds.items()}
-    best: dict[str, float] = {}
-    for (name, _), norm in zip(trials, scan(x).norm[0], strict=True):
-        best[name] = max(best.get(name, 0.0), float(norm))
+    if not candidates:
+        return {name: _hidden(kind, kind.shows) for name, kind in kinds.items()}
+    null = screening.replicated(block, trials, SIMULATIONS, rng).scan
+    found = power.detectable(null, trials, candidates, screening.chance_level(candidates, [null]))
     return {
-        name: _shown(kind, best[name]) if name in best else _hidden(kind, kind.shows) for name, kind in kinds.items()
+        name: _shown(kind, found[name][1]) if name in found else _hidden(kind, kind.shows)
+        for name, kind in kinds.items()
     }
 
 
-def _shown(kind: type[Effect], norm: float) -> dict[str, Any]:
-    if norm == 0.0:
+def _shown(kind: type[Effect], amplitude: float | None) -> dict[str, Any]:
+    if amplitude is None:
         return _hidden(kind, "taken up by the model's own parameters")
-    main, amplitude = kind.amplitudes[0], SEEN / norm
+    main = kind.amplitudes[0]
     shows = "yes" if amplitude <= UNUSUAL * float(main.prior.std()) else "if unusually large"
     return {"shows": shows, "amplitude_80": amplitude, "unit": main.unit, "reason": None}
 

@@ -209,8 +209,14 @@ class GlobalTest:
         return float(np.quantile(self.chance[name], 1.0 - min(share, 1.0)))
 
 
+def chance_level(candidates: Sequence[Candidate], null: Sequence[Scan]) -> GlobalTest:
+    """What chance reaches in simulations, with no readings to compare."""
+    chance = by_name(candidates, null)
+    return GlobalTest(chance, {}, np.max([surprises(value) for value in chance.values()], axis=0))
+
+
 def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Sequence[Scan]) -> GlobalTest:
     """Compare the data's most surprising name with the simulations'."""
-    chance = by_name(candidates, null)
-    found = {name: surprise(float(value[0]), chance[name]) for name, value in by_name(candidates, data).items()}
-    return GlobalTest(chance, found, np.max([surprises(value) for value in chance.values()], axis=0))
+    level = chance_level(candidates, null)
+    found = {name: surprise(float(v[0]), level.chance[name]) for name, v in by_name(candidates, data).items()}
+    return replace(level, surprises=found)

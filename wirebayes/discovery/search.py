@@ -299,17 +299,11 @@ def _outlook(
     settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float],
 ) -> dict[str, Any]:  # fmt: skip
     """What could have been seen, what cannot be, and what to measure next."""
-    best_probe: dict[str, int] = {}
-    strength = np.median(null.norm, axis=0)
-    for c in candidates:
-        if i in c.blocks and (c.name not in best_probe or strength[c.probe] > strength[best_probe[c.name]]):
-            best_probe[c.name] = c.probe
+    found = power.detectable(null, trials, candidates, test, i)
+    best_probe = {name: k for name, (k, _) in found.items()}
     seen = {
-        name: {
-            "amplitude_80": power.amplitude_80(null, trials[k], k, test.threshold(name, ALPHA)),
-            "unit": trials[k].effect.amplitudes[0].unit,
-        }
-        for name, k in best_probe.items()
+        name: {"amplitude_80": amplitude, "unit": trials[k].effect.amplitudes[0].unit}
+        for name, (k, amplitude) in found.items()
     }
     possible = [c.name for c in candidates if i in c.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from wirebayes.discovery import power, screening
 from wirebayes.discovery.linear_scan import expand
-from wirebayes.discovery.screening import GlobalTest
-from wirebayes.discovery.settings import ALPHA
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.transform import LogPosterior
@@ -111,19 +109,13 @@ def sensitivity(
     if not candidates:
         return Sensitivity(hidden=tuple(hidden))
     null = screening.replicated(block, trials, simulations, rng).scan
-    chance = screening.by_name(candidates, [null])
-    level = GlobalTest(chance, {}, np.max([screening.surprises(v) for v in chance.values()], axis=0))
+    level = screening.chance_level(candidates, [null])
     x = expand(block.target, block.modes.z[:1], trials)
     alike = power.similarity([x], trials, [float(x.ratio[0])])
     strength = np.median(null.norm, axis=0)
-    best: dict[str, int] = {}
-    for c in candidates:
-        if c.name not in best or strength[c.probe] > strength[best[c.name]]:
-            best[c.name] = c.probe
     effects = {}
-    for name, k in best.items():
+    for name, (k, seen) in power.detectable(null, trials, candidates, level).items():
         main = trials[k].effect.amplitudes[0]
-        seen = power.amplitude_80(null, trials[k], k, level.threshold(name, ALPHA))
         confused = tuple(n for n in power.group_of([name], alike) if n != name)
         delta = None if seen is None else seen * float(strength[k])
         effects[name] = EffectPower(seen, main.unit, delta, float(strength[k] * main.prior.std()), confused)
