@@ -21,6 +21,7 @@ test-full: lint
 
 lint: .venv/test.stamp
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 
 calibration: .venv/run.stamp
