@@ -260,6 +260,42 @@ def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(chang
     assert "90 %" in page.words
 
 
+CHECKED = {
+    "material": "line", "length_mm": 1000.0, "recorded_holds": 2, "unrecorded_holds": 1, "readings": 6,
+    "duration_s": 360.0, "warnings": ["Hold 2 repeats hold 1."],
+    "holds": [{"number": None, "displacement_mm": 5.0, "start_s": 0.0, "duration_s": 120.0, "readings": 0,
+               "first_s": None, "first_N": None, "last_N": None}],
+    "parameters": {"k1": {"q05": 1.0, "q50": 2.0, "q95": 3.0, "prior_q05": 0.5, "prior_q95": 9.0, "told_by": "prior"}},
+    "effects": {
+        "toe": {"shows": "yes", "amplitude_80": 0.00123, "unit": "-", "reason": None},
+        "guide_friction": {"shows": "no", "amplitude_80": None, "unit": "-", "reason": "unloading branch"},
+    },
+}  # fmt: skip
+
+
+def test_the_page_of_a_check_says_what_is_odd_and_what_the_test_cannot_tell(tmp_path):
+    content = {"experiments": {"wire-a": CHECKED}}
+    page = read(write(folder_of(tmp_path / "out", "check", check=content)))
+    assert "Hold 2 repeats hold 1." in page.words and "0.00123" in page.words
+    assert (
+        "Effects it cannot show: guide friction." in page.words and "Parameters it says nothing of: k1." in page.words
+    )
+
+
+def test_the_page_of_an_import_says_what_was_done(tmp_path):
+    about = {
+        "raw": "bench.xlsx",
+        "holds": 3,
+        "readings": 9,
+        "length_mm": 1000.0,
+        "notes": ["decimal comma"],
+        "warnings": [],
+    }
+    content = {"experiments": {"wire-a": about}}
+    page = read(write(folder_of(tmp_path / "out", "import", **{"import": content})))
+    assert "From bench.xlsx." in page.words and "Decimal comma." in page.words
+
+
 def test_a_gap_below_the_floor_is_a_dash(tmp_path):
     content = DISCOVERY | {"held_out": DISCOVERY["held_out"] | {"gap_closed": None}, "p_global": None}
     page = read(write(folder_of(tmp_path / "out", "discover", discovery={"experiments": {"wire-a": content}})))

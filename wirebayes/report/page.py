@@ -15,6 +15,8 @@ from wirebayes.report.blocks import Page
 # who knows how to tell a command's results; each module has ``page(folder, configuration)``
 _TELLERS = {
     "reproduce": "wirebayes.report.pages.reproduce",
+    "import": "wirebayes.report.pages.check",
+    "check": "wirebayes.report.pages.check",
     "fit": "wirebayes.report.pages.fit",
     "batch": "wirebayes.report.pages.batch",
     "compare": "wirebayes.report.pages.compare",

@@ -1,0 +1,93 @@
+"""The pages of ``wirebayes import`` and ``wirebayes check``: what was understood of a test, and what it can tell."""
+
+from pathlib import Path
+from typing import Any
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    embedded,
+    number,
+    span,
+)
+
+_TOLD = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """The content of ``check.json`` or ``import.json``, a section for each experiment."""
+    imported = configuration["command"] == "import"
+    found = read_json(folder / ("import.json" if imported else "check.json"))["experiments"]
+    sections = [
+        Section(name, (_imported(e) if imported else _checked(e)) + _picture(folder, name)) for name, e in found.items()
+    ]
+    if imported:
+        return Page(
+            "What was imported", "A file of a bench, as it was understood: look at it before you fit.", sections
+        )
+    lead = "What was understood of the readings, what is odd about them, and what such a test can and cannot tell."
+    return Page("What this test can tell", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _imported(e: dict[str, Any]) -> list[Block]:
+    about = [
+        f"From {e['raw']}.",
+        f"{e['holds']} holds, {e['readings']} readings.",
+        f"Length {number(e['length_mm'])} mm.",
+    ]
+    notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
+    odd = e["warnings"] or ["Nothing."]
+    return [Columns([Points("What it is", about), Points("What was done", notes), Points("What is odd", odd)])]
+
+
+def _checked(e: dict[str, Any]) -> list[Block]:
+    about = [
+        f"{e['material']}, {number(e['length_mm'])} mm.",
+        f"{e['recorded_holds']} recorded holds, {e['unrecorded_holds']} unrecorded, {e['readings']} readings.",
+        f"{number(e['duration_s'] / 60.0)} min in all.",
+    ]
+    hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]
+    blind = [f"Effects it cannot show: {', '.join(_words(name) for name in hidden)}."] if hidden else []
+    prior = [name for name, p in e["parameters"].items() if p["told_by"] == "prior"]
+    blind += [f"Parameters it says nothing of: {', '.join(prior)}."] if prior else []
+    columns = [Points("What it is", about), Points("What is odd", e["warnings"] or ["Nothing."])]
+    blocks: list[Block] = [Columns([*columns, Points("What it cannot tell", blind or ["Nothing to report."])])]
+    rows = [
+        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]), _TOLD[p["told_by"]]]
+        for name, p in e["parameters"].items()
+    ]
+    caption = "A first estimate by a short run of the sampler; fit gives the posterior."
+    blocks.append(Table(["parameter", "median", "90 % interval", "prior's 90 %", "told by"], rows, caption))
+    seen = [
+        [_words(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]
+        for name, effect in e["effects"].items()
+        if effect["shows"] != "no"
+    ]
+    caption = "The smallest amplitude of each effect that discover would detect in four tests of five like this one."
+    blocks.append(Table(["effect", "amplitude", "unit", "shows"], seen, caption))
+    holds = [
+        [str(h["number"] or "–"), number(h["displacement_mm"]), number(h["start_s"]), number(h["duration_s"]),
+         str(h["readings"]), number(h["first_N"]), number(h["last_N"])]
+        for h in e["holds"]
+    ]  # fmt: skip
+    header = ["hold", "displacement (mm)", "begins (s)", "lasts (s)", "readings", "first (N)", "last (N)"]
+    blocks.append(Table(header, holds, "The holds as they were read; one without a number was not recorded."))
+    return blocks
+
+
+def _picture(folder: Path, name: str) -> list[Block]:
+    file = folder / f"{name}.png"
+    if not file.is_file():
+        return []
+    return [Pictures([Picture(embedded(file), f"Displacement and tension of {name} over the whole test.")])]
+
+
+def _words(effect: str) -> str:
+    return effect.replace("_", " ")
