@@ -200,7 +200,7 @@ def test_a_user_finds_an_effect_of_their_own(tmp_path: Path) -> None:
     own.write_text('''
 import numpy as np
 from scipy import stats
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Amplitude, Effect
 
 
 class ScrewWobble(Effect):
