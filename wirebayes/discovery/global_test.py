@@ -115,7 +115,7 @@ def examine(
     while True:
         report("simulations", len(simulated), len(blocks))
         n = len(simulated[0].z) if simulated else simulations  # as many again each time
-        more = list(each(_simulated, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
+        more = list(each(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
         pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
         simulated = [screening.joined_replicates(parts) for parts in pairs]
         nulls = [s.scan for s in simulated]
@@ -139,7 +139,8 @@ def is_close(p: float, alpha: float, simulations: int) -> bool:
     return bool(min(binom.cdf(larger, simulations, alpha), binom.sf(larger - 1, simulations, alpha)) > CLOSE)
 
 
-def _simulated(block: LaplaceFit, trials: list[Probe], n: int, rng: np.random.Generator) -> Replicates:
+def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, rng: np.random.Generator) -> Replicates:
+    """Data sets simulated at a block's fit and refitted, scanned for probes and for residual patterns."""
     return screening.replicated(block, trials, n, rng, residual_patterns.patterns(block.target.problem)[1])
 
 

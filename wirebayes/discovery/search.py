@@ -120,7 +120,7 @@ def investigate(
         copies = power.copies(expansions, trials, ratios)
         decision = decide(plain, explored, copies, settings, rng, each)
         report("naming", 1, 1)
-    answers = [_answer(plain, decision, explored, i, rng) for i in range(len(plain))]
+    answers = [_answer(plain, decision, explored, i, where[i], rng) for i in range(len(plain))]
     final = [a.stages[-1] if a.stages else block for a, block in zip(answers, plain, strict=True)]
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
     alike = power.similarity(expansions, trials, ratios)
@@ -172,13 +172,9 @@ def final_models(findings: Findings) -> list[JointModel]:
     return out
 
 
-def alternative_models(findings: Findings) -> list[list[tuple[float, JointModel]]]:
-    """For each experiment the other models that stay undecided beside its final one, with their probabilities."""
-    out = []
-    for others in findings.undecided:
-        for other in others[1:]:
-            out.append([(other.probability, m) for m in _sampled(other.block, other.remains)])
-    return out
+def alternative_models(findings: Findings) -> list[list[JointModel]]:
+    """The other models that stay undecided beside the final ones, each as what is sampled for it."""
+    return [_sampled(other.block, other.remains) for others in findings.undecided for other in others[1:]]
 
 
 def _sampled(block: LaplaceFit, remains: bool) -> list[JointModel]:
@@ -232,14 +228,17 @@ class _Answer:
 
 
 def _answer(
-    plain: list[LaplaceFit], decision: Decision | None, explored: Explored | None, i: int, rng: np.random.Generator
-) -> _Answer:
+    plain: list[LaplaceFit], decision: Decision | None, explored: Explored | None, i: int,
+    where: list[dict[str, Any]], rng: np.random.Generator,
+) -> _Answer:  # fmt: skip
     """The verdict on block `i`, and its fits with what was accepted."""
     if decision is None or explored is None:
         return _Answer("nothing-missing", [], [], {}, {}, {"probability": 0.0, "where": [], "p": None}, None)
     verdict, accepted = verdict_of(decision, i)
     found, retest = decision.posterior, decision.retest
-    patterns = retest.where[i] if retest is not None and verdict == "partial" else []
+    # beside the effects where some are accepted, else what the plain model leaves over
+    beside = retest.where[i] if retest is not None else []
+    patterns = {"partial": beside, "unknown": where}.get(verdict, [])
     remainder = {
         "probability": float(found.remainder[i]),
         "where": [w["covariate"] for w in patterns if w["p"] <= _VISIBLE],
@@ -273,9 +272,6 @@ def _common(
     names, members = [a.name for a in answer.accepted], answer.set
     named = [m for m in members if m != "unknown"]
     shared = [n for a in answer.accepted for b in a.blocks if b != i for n in plain[b].names]
-    remainder = answer.remainder
-    if answer.verdict == "unknown":
-        remainder = remainder | {"where": [w["covariate"] for w in where if w["p"] <= _VISIBLE]}
     return {
         "verdict": answer.verdict,
         "effects": names if answer.verdict in ("named", "partial") else named if answer.verdict == "ambiguous" else [],
@@ -287,7 +283,7 @@ def _common(
         "probabilities": answer.shares,
         "probability_nothing": answer.nothing,
         "inclusion": answer.inclusion,
-        "remainder": remainder,
+        "remainder": answer.remainder,
         "p_global": p,
         "shared_with": list(dict.fromkeys(shared)),
         "where": where,

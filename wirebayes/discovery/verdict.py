@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery import gap, model_space, residual_patterns, screening
+from wirebayes.discovery.global_test import simulated_with_patterns
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior, smallest_set
 from wirebayes.discovery.settings import (
@@ -173,7 +174,9 @@ def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, eac
     trials, candidates, _ = best.scanned
     if not candidates:
         return Retest(None, [[] for _ in best.blocks])
-    simulated = list(each(_simulated, best.blocks, repeat(trials), rng.spawn(len(best.blocks))))
+    simulated = list(
+        each(simulated_with_patterns, best.blocks, repeat(trials), repeat(RETESTS), rng.spawn(len(best.blocks)))
+    )
     nulls = [s.scan for s in simulated]
     data, where = [], []
     for block, null in zip(best.blocks, nulls, strict=True):
@@ -181,11 +184,6 @@ def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, eac
         data.append(scan(expand(block.target, block.modes.z[:1], trials, columns=columns)))
         where.append(residual_patterns.findings(listed, len(trials), data[-1], null, ", ".join(block.names)))
     return Retest(screening.global_test(candidates, data, nulls).p, where)
-
-
-def _simulated(block: LaplaceFit, trials: Any, rng: np.random.Generator) -> screening.Replicates:
-    columns = residual_patterns.patterns(block.target.problem)[1]
-    return screening.replicated(block, trials, RETESTS, rng, columns)
 
 
 def _more_beside(sets: Sequence[EffectSet], beside: Array, i: int, extra: float) -> Array:

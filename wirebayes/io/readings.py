@@ -76,6 +76,25 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def read_bytes(path: Path) -> bytes:
+    """The content of a file.
+
+    Raises
+    ------
+    InputError
+        Missing or unreadable.
+    """
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: found no such file, expected a readable file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: found a folder, expected a file") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{path}: cannot be read ({reason}), expected a readable file") from None
+
+
 def read_text(path: Path, expected: str = "text") -> str:
     """The text of a UTF-8 file, without its byte-order mark; `expected` says what an empty file should hold.
 
@@ -84,15 +103,7 @@ def read_text(path: Path, expected: str = "text") -> str:
     InputError
         Missing, unreadable, empty, or not UTF-8 (names the line of the first bad byte).
     """
-    try:
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: found no such file, expected a readable file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: found a folder, expected a file") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{path}: cannot be read ({reason}), expected a readable file") from None
+    raw = read_bytes(path)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

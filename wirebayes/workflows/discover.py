@@ -140,7 +140,7 @@ def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effec
     """Plain fit of every experiment, and the final ones."""
     models = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
     models += [("final", model) for model in final_models(found)]
-    models += [(f"final/{_OTHERS}/{k}", m) for k, (_, m) in _others(found)]
+    models += [(f"final/{_OTHERS}/{k}", m) for k, m in _others(found)]
     out = []
     for kind, model in models:
         folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
@@ -151,13 +151,13 @@ def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effec
     return out
 
 
-def _others(found: search.Findings) -> list[tuple[int, tuple[float, JointModel]]]:
+def _others(found: search.Findings) -> list[tuple[int, JointModel]]:
     """The undecided models beside the final ones, each with its number among those of its experiments."""
     out, count = [], dict[str, int]()
     for models in alternative_models(found):
-        k = 1 + count.get(models[0][1].experiments[0].name, 0)
-        count |= {e.name: k for _, model in models for e in model.experiments}
-        out += [(k, pair) for pair in models]
+        k = 1 + count.get(models[0].experiments[0].name, 0)
+        count |= {e.name: k for model in models for e in model.experiments}
+        out += [(k, model) for model in models]
     return out
 
 

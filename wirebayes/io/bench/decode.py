@@ -4,6 +4,7 @@ import codecs
 from pathlib import Path
 
 from wirebayes.errors import InputError
+from wirebayes.io.readings import read_bytes
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
@@ -20,15 +21,7 @@ def read_raw(path: Path) -> bytes:
     InputError
         It is absent, empty or cannot be read.
     """
-    try:
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: found no such file, expected a readable file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: found a folder, expected a file") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{path}: cannot be read ({reason}), expected a readable file") from None
+    raw = read_bytes(path)
     if not raw.strip():
         raise InputError(f"{path}, line 1: found an empty file, expected a header and readings")
     return raw
