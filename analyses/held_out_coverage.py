@@ -57,8 +57,8 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
-    with workers() as each:
-        results = list(each(one, [(asked.seed, number) for number in range(asked.sets)]))
+    with workers() as parallel_map:
+        results = list(parallel_map(one, [(asked.seed, number) for number in range(asked.sets)]))
     print(f"{asked.sets} simulated sets, {sum(not r[2] for r in results)} of them not converged")
     for name, place in (("free", 0), ("given the first reading", 1)):
         shares = 100 * np.array([r[place] for r in results])

@@ -14,7 +14,7 @@ from wirebayes.interrupt import held_back, watch_silently
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
-Each = Callable[..., Iterable[Any]]  # as the built-in `map`
+ParallelMap = Callable[..., Iterable[Any]]  # as the built-in `map`
 _PATIENCE_S = 10.0  # for a scheduler and its first worker to answer: a cluster's network takes a second at most
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -49,7 +49,7 @@ def without_script() -> Iterator[None]:
 
 
 @contextmanager
-def workers(most: int | None = None, prepare: Callable[[], object] | None = None) -> Iterator[Each]:
+def workers(most: int | None = None, prepare: Callable[[], object] | None = None) -> Iterator[ParallelMap]:
     """A `map` over processes, as many as there are cores.
 
     There are processes on one core, too: a copy that was sent may be laid out otherwise in memory, and what is computed

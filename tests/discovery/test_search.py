@@ -127,8 +127,10 @@ def test_findings_do_not_depend_on_how_many_processes_there_are(
     reports = []
     for cores in (1, 2):
         monkeypatch.setattr(workers, "cores", lambda cores=cores: cores)
-        with workers.workers() as each:
-            reports.append(investigate(experiments, Settings(kinds=kinds, simulations=FEW), 0, each=each).report)
+        with workers.workers() as parallel_map:
+            reports.append(
+                investigate(experiments, Settings(kinds=kinds, simulations=FEW), 0, parallel_map=parallel_map).report
+            )
     assert json.dumps(reports[0]) == json.dumps(reports[1])
 
 

@@ -16,7 +16,7 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.leave_one_hold_out import loho
+from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out
 from wirebayes.results import store
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=12)
@@ -185,10 +185,10 @@ def test_statistics(stored: dict[str, tuple[Path, Fit]], kind: str) -> None:
 def test_loo_is_leaving_one_hold_out(
     stored: dict[str, tuple[Path, Fit]], kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """ArviZ's figures are those of `loho` before it refits: each hold given all others, not only those before it."""
+    """Before it refits: each hold given all others, not only those before it."""
     monkeypatch.setattr("wirebayes.prediction.leave_one_hold_out.LARGEST_K", np.inf)
     folder, fitted = stored[kind]
-    ours = loho(fitted)
+    ours = leave_each_hold_out(fitted)
     data = opened(stored, kind)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

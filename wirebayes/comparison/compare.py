@@ -17,7 +17,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
-from wirebayes.prediction.leave_one_hold_out import loho, standard_error
+from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out, standard_error
 from wirebayes.workers import workers
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ def _scores(task: Task, seed: int, policy: Policy) -> dict[str, Any]:
 
     full = fitted(task.train_holds or recorded)
     again = replace(policy, ess=policy.ess / 2, most_steps=min(policy.most_steps, 400))
-    left = loho(full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again)
+    left = leave_each_hold_out(full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again)
     early = full if task.train_holds else fitted(first)
     content: dict[str, Any] = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],
@@ -145,8 +145,8 @@ def run(
     for task in todo:
         (directory / task.file).parent.mkdir(parents=True, exist_ok=True)
     work = partial(_store, directory=directory, seed=seed, policy=policy)
-    with workers(len(todo)) as each:
-        for done, _ in enumerate(each(work, todo), 1):
+    with workers(len(todo)) as parallel_map:
+        for done, _ in enumerate(parallel_map(work, todo), 1):
             report("models", done, len(todo))
 
 

@@ -35,7 +35,7 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import cholesky, solve
 from wirebayes.model import likelihoods
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Array = NDArray[Any]
 _FIRST, _LAST = 1.5, 24.0  # δ of the rungs
@@ -146,11 +146,15 @@ def climb(block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence
     block : LaplaceFit
     ladder : AmplitudePath
     z : (n, d) array
-        The plain fits of n data sets, sampled coordinates. The ladder is also begun at the block's sober fit.
+        The plain fits of n data sets, sampled coordinates. The ladder is also begun at the best fit with setting
+        errors as expected.
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
-    main, places = ladder.effect.amplitudes[0], [z, *(np.broadcast_to(s, z.shape) for s in block.sober)]
+    main, places = (
+        ladder.effect.amplitudes[0],
+        [z, *(np.broadcast_to(s, z.shape) for s in block.modes_with_expected_setting_error)],
+    )
     starts = len(ladder.probes) * len(places)
     low, high = (float(v) for v in main.prior.support())
     target, column, y = _with_effect(block, ladder, places)
@@ -380,7 +384,7 @@ class Continuation:
     ----------
     blocks, trials, candidates, data
         See `ladders`.
-    each : function, optional
+    parallel_map : function, optional
         The built-in `map`, or one over processes.
     """
 
@@ -390,9 +394,9 @@ class Continuation:
         trials: Sequence[Probe],
         candidates: Sequence[Candidate],
         data: Sequence[Scan],
-        each: Each = map,
+        parallel_map: ParallelMap = map,
     ) -> None:
-        self._blocks, self._each = blocks, each
+        self._blocks, self._each = blocks, parallel_map
         self._ways = ladders(blocks, trials, candidates, data)
         found = self._strengths(self._ways, [(b.modes.z[:1], None) for b in blocks])
         self.log_bayes = {c: float(v[0]) for c, v in found.items()}  # of every candidate that has a ladder

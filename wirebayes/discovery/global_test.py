@@ -20,7 +20,7 @@ from wirebayes.discovery.settings import ALPHA
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Report = Callable[[str, float, float], None]
 PLAIN_TO_SEE = 0.002  # p of the linear scan at which no test from larger effects could change the verdict
@@ -71,7 +71,7 @@ def examine(
     *,
     alpha: float = ALPHA,
     report: Report = lambda name, done, total: None,
-    each: Each = map,
+    parallel_map: ParallelMap = map,
 ) -> Gate:
     """Test whether fitted blocks leave anything unexplained.
 
@@ -87,7 +87,7 @@ def examine(
     alpha : float
         The level p will be compared with.
     report : function of (what, done, total)
-    each : function, optional
+    parallel_map : function, optional
         The built-in `map`, or one over processes; the result is the same.
 
     Raises
@@ -115,7 +115,7 @@ def examine(
     while True:
         report("simulations", len(simulated), len(blocks))
         n = len(simulated[0].z) if simulated else simulations  # as many again each time
-        more = list(each(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
+        more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
         pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
         simulated = [screening.joined_replicates(parts) for parts in pairs]
         nulls = [s.scan for s in simulated]
@@ -123,7 +123,7 @@ def examine(
         beyond_linear = test.p > max(PLAIN_TO_SEE, 1.0 / (1 + simulations))
         if beyond_linear:
             report("larger effects", 0, 1)
-            larger = larger or Continuation(blocks, trials, candidates, data, each)
+            larger = larger or Continuation(blocks, trials, candidates, data, parallel_map)
             test = larger.test(simulated, test)
             report("larger effects", 1, 1)
         if len(test.null) >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):

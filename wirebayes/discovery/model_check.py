@@ -23,7 +23,7 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.run_folder import write_json
 from wirebayes.results.jobs import Job
-from wirebayes.workers import Each, workers
+from wirebayes.workers import ParallelMap, workers
 
 _SHOWN = 3  # most surprising effects that are listed
 
@@ -106,7 +106,7 @@ def level(tests: int) -> float:
 
 
 def check_model(
-    job: Job, seed: int = 0, *, alpha: float = ALPHA, simulations: int | None = None, each: Each = map
+    job: Job, seed: int = 0, *, alpha: float = ALPHA, simulations: int | None = None, parallel_map: ParallelMap = map
 ) -> ModelCheck:
     """Check a model against the readings it was fitted to.
 
@@ -120,7 +120,7 @@ def check_model(
         See `level`.
     simulations : int
         Refitted data sets behind p; more where p is too close to `alpha` to tell.
-    each : function, optional
+    parallel_map : function, optional
         The built-in `map`, or one over processes.
     """
     kinds = catalogue(job.own_effects)
@@ -134,7 +134,7 @@ def check_model(
     first = rng.spawn(1)[0]
     block = fitted(job.experiments, effects, job.law, job.history, first, exponent=job.length_exponent)
     try:
-        gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, each=each)
+        gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, parallel_map=parallel_map)
     except InputError:
         return unchecked(reason="no further effect could show in these holds")
     p, surprises = gate.test.p, gate.test.surprises
@@ -149,13 +149,13 @@ def write_checks(
     directory: Path,
     seed: int,
     report: Report,
-    each: Each | None = None,
+    parallel_map: ParallelMap | None = None,
     simulations: int | None = None,
 ) -> None:
     """Check all fits of a command and put the result first in their ``summary.json``, as ``model_check``.
 
     The level is that which the command as a whole keeps. What was checked before an interruption is not checked again.
-    Processes share the work unless a map is given as `each`; `simulations` as for `check_model`.
+    Processes share the work unless a map is given as `parallel_map`; `simulations` as for `check_model`.
     """
     alpha = level(len(jobs))
     paths = {job.folder: directory / job.folder / "summary.json" for job in jobs}
@@ -163,9 +163,13 @@ def write_checks(
     todo = [job for job in jobs if "model_check" not in summaries[job.folder]]
     work = partial(check_model, seed=seed, alpha=alpha, simulations=simulations)
     own_effects = jobs[0].own_effects
-    with workers(prepare=partial(catalogue, own_effects)) if each is None else nullcontext(each) as each:
+    with (
+        workers(prepare=partial(catalogue, own_effects))
+        if parallel_map is None
+        else nullcontext(parallel_map) as parallel_map
+    ):
         # One fit shares its simulations among the cores, several are each done on one.
-        checks = [work(todo[0], each=each)] if len(todo) == 1 else each(work, todo)
+        checks = [work(todo[0], parallel_map=parallel_map)] if len(todo) == 1 else parallel_map(work, todo)
         for done, (job, check) in enumerate(zip(todo, checks, strict=True), 1):
             write_json(paths[job.folder], {"model_check": check.to_dict()} | summaries[job.folder])
             report("checks", done, len(todo))

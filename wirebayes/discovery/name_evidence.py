@@ -15,7 +15,7 @@ from wirebayes.discovery.screening import Candidate, log_bayes
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Array = NDArray[Any]
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
@@ -65,7 +65,7 @@ def weigh_names(
     candidates: Sequence[Candidate],
     scans: Sequence[Scan],
     further: Mapping[Candidate, float] = {},
-    each: Each = map,
+    parallel_map: ParallelMap = map,
     correction: Correction = lambda found: 0.0,
     most: int = 16,
     forms_a_name: int = 3,
@@ -81,7 +81,7 @@ def weigh_names(
         Of the readings, a block each.
     further : mapping of Candidate to float
         Log Bayes factors of the effects that were tried from larger amplitudes.
-    each : function, optional
+    parallel_map : function, optional
         The built-in `map`, or one over processes: refits are independent of each other.
     correction : function of Refit
         Added to the log Bayes factor of every refit (see `wirebayes.discovery.stepwise`).
@@ -105,7 +105,7 @@ def weigh_names(
             if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
                 _, guess, per_delta = log_bayes(Candidate(probe, name, place[1], True), scans)
                 tasks[place] = form.effect, float(per_delta[0]), float(guess[0])
-    done = each(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
+    done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
     found = dict(zip(tasks, done, strict=True))
     return _summed(forms, found, len(blocks), correction)
 

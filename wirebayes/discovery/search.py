@@ -27,7 +27,7 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Array = NDArray[Any]
 _VISIBLE = 0.05  # p of a residual pattern that is told of the remainder
@@ -79,7 +79,7 @@ def investigate(
     settings: Settings,
     seed: int = 0,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
-    each: Each = map,
+    parallel_map: ParallelMap = map,
 ) -> Findings:
     """Judge the experiments of one file together.
 
@@ -90,7 +90,7 @@ def investigate(
     seed : int
     report : function of (what, done, total)
         Told as the work goes on.
-    each : function, optional
+    parallel_map : function, optional
         The built-in `map`, or one over processes (`wirebayes.workers`); the findings are the same.
 
     Returns
@@ -102,8 +102,8 @@ def investigate(
     for e in experiments:
         groups.setdefault(e.material, []).append(e)
     laws = repeat(settings.law), repeat(settings.history)
-    start = list(each(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
-    gate = examine(start, settings.kinds, settings.simulations, rng, report=report, each=each)
+    start = list(parallel_map(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
+    gate = examine(start, settings.kinds, settings.simulations, rng, report=report, parallel_map=parallel_map)
     plain, trials, candidates, data, nulls = gate.blocks, gate.trials, gate.candidates, gate.data, gate.nulls
     test = gate.test
     where = [
@@ -115,10 +115,10 @@ def investigate(
     decision, explored = None, None
     if test.p <= ALPHA:
         report("naming", 0, 1)
-        found = weigh_names(plain, trials, candidates, data, gate.further, each)
-        explored = explore(plain, found, expansions, trials, data, settings, rng, each)
+        found = weigh_names(plain, trials, candidates, data, gate.further, parallel_map)
+        explored = explore(plain, found, expansions, trials, data, settings, rng, parallel_map)
         copies = power.copies(expansions, trials, ratios)
-        decision = decide(plain, explored, copies, settings, rng, each)
+        decision = decide(plain, explored, copies, settings, rng, parallel_map)
         report("naming", 1, 1)
     answers = [_answer(plain, decision, explored, i, where[i], rng) for i in range(len(plain))]
     final = [a.stages[-1] if a.stages else block for a, block in zip(answers, plain, strict=True)]
@@ -131,7 +131,7 @@ def investigate(
         common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, answer, alike)
         names = [a.name for a in answer.accepted]
         remains = answer.verdict in ("partial", "unknown")
-        checks = shrinking.shrinking(block, answer.stages, names, remains, rng, each)
+        checks = shrinking.shrinking(block, answer.stages, names, remains, rng, parallel_map)
         for e, check in zip(block.experiments, checks, strict=True):
             out[e.name] = common | {
                 "steps": check.steps,

@@ -13,7 +13,7 @@ from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 _NOTHING: dict[str, Any] = {"rmse_N": None, "elpd": None, "coverage_90": None}
 
@@ -40,7 +40,7 @@ def shrinking(
     names: Sequence[str],
     remains: bool,
     rng: np.random.Generator,
-    each: Each,
+    parallel_map: ParallelMap,
 ) -> list[Shrinking]:
     """Score the models of one block on the last third of the holds, and by leaving out one hold at a time.
 
@@ -56,7 +56,7 @@ def shrinking(
     remains : bool
         Whether the final model has a smooth discrepancy beside the effects.
     rng : numpy Generator
-    each : function
+    parallel_map : function
         The built-in `map`, or one over processes.
 
     Returns
@@ -83,14 +83,16 @@ def shrinking(
     for base in beside:
         first = [e.train(k) for e, k in zip(members, train, strict=True)]
         blocks = repeat(base)
-        added = list(each(with_discrepancy, blocks, [*members, *first], rng.spawn(2 * len(members))))
+        added = list(parallel_map(with_discrepancy, blocks, [*members, *first], rng.spawn(2 * len(members))))
         n = len(members)
         alone = [(e,) for e in members]
         laws = repeat(base.law), repeat(base.history)
-        whole += each(fitted, alone, added[:n], *laws, rng.spawn(n))
+        whole += parallel_map(fitted, alone, added[:n], *laws, rng.spawn(n))
         asked += zip(alone, [(k,) for k in train], added[n:], repeat(base), strict=False)
-    predicted: list[list[gap.HeldOut]] = list(each(gap.held_out, *zip(*asked, strict=True), rng.spawn(len(asked))))
-    left_out = list(each(gap.leave_one_hold_out, whole, rng.spawn(len(whole)))) if len(whole) > 1 else []
+    predicted: list[list[gap.HeldOut]] = list(
+        parallel_map(gap.held_out, *zip(*asked, strict=True), rng.spawn(len(asked)))
+    )
+    left_out = list(parallel_map(gap.leave_one_hold_out, whole, rng.spawn(len(whole)))) if len(whole) > 1 else []
     by_step, alone_ = predicted[: 1 + len(stages)], [part[0] for part in predicted[1 + len(stages) :]]
     n = len(members)
     flexible = alone_[:n]

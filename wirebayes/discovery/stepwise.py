@@ -35,7 +35,7 @@ from wirebayes.discovery.sharing import informed
 from wirebayes.discovery.smooth_credit import beside_smooth
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of, fitted
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Array = NDArray[Any]
 Key = frozenset[str]
@@ -136,7 +136,7 @@ def explore(
     scans: Sequence[Scan],
     settings: Settings,
     rng: np.random.Generator,
-    each: Each,
+    parallel_map: ParallelMap,
 ) -> Explored:
     """Fit the sets of effects that may hold a good share of the probability.
 
@@ -149,7 +149,7 @@ def explore(
         Of the plain blocks, as the global test has them.
     settings : Settings
     rng : numpy Generator
-    each : function
+    parallel_map : function
         The built-in `map`, or one over processes; the sets are the same.
     """
     units = _units(found)
@@ -172,7 +172,7 @@ def explore(
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]
         names = [frontier.parents[k][1] for k in wave]
-        fitted_sets = each(_fit, parents, names, repeat(settings), repeat(units), rng.spawn(len(wave)))
+        fitted_sets = parallel_map(_fit, parents, names, repeat(settings), repeat(units), rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
             known = frontier.known[key]
             beside = float(np.maximum(new.effects.remainder, 0.0).sum())

@@ -28,7 +28,7 @@ from wirebayes.discovery.settings import (
 from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet, Key
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Array = NDArray[Any]
 Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
@@ -77,7 +77,7 @@ def decide(
     copies: Mapping[str, int],
     settings: Settings,
     rng: np.random.Generator,
-    each: Each,
+    parallel_map: ParallelMap,
 ) -> Decision:
     """Weigh the sets, leave out those whose last effect does not predict, and test the best one once more."""
     sets, gains = list(explored.sets), dict[Key, Array]()
@@ -93,13 +93,13 @@ def decide(
             continue
         key = best.effects.key
         if key not in gains:
-            gains[key] = _gain(plain, best, explored, rng, each)
+            gains[key] = _gain(plain, best, explored, rng, parallel_map)
         if len(key) == 1 or gains[key].sum() > KEEP_ELPD:
             break
         sets = [s for s in sets if not key <= s.key]
-    retest = _retested(best, settings, rng, each)
+    retest = _retested(best, settings, rng, parallel_map)
     if _fails(retest):
-        passing = _complete(found, explored, best, settings, rng, each)
+        passing = _complete(found, explored, best, settings, rng, parallel_map)
         if passing is not None:
             dropped = {key for key, other in explored.fitted.items() if other is best or key in passing.failed}
             sets = [s for s in sets if s.key not in dropped]
@@ -116,7 +116,7 @@ def decide(
     path = [explored.fitted.get(frozenset(best.effects.names[: n + 1])) for n in range(len(best.effects.names))]
     for step in path:
         if step is not None and step.effects.key not in gains:
-            gains[step.effects.key] = _gain(plain, step, explored, rng, each)
+            gains[step.effects.key] = _gain(plain, step, explored, rng, parallel_map)
     own = {s.accepted[-1].name: gains[s.effects.key] for s in path if s is not None}
     return Decision(found, best, retest, own)
 
@@ -140,7 +140,7 @@ def _complete(
     best: FittedSet,
     settings: Settings,
     rng: np.random.Generator,
-    each: Each,
+    parallel_map: ParallelMap,
 ) -> _Passing | None:
     """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none."""
     weights = {s.key: float(w) for s, w in zip(found.sets, found.without + found.beside, strict=True)}
@@ -150,32 +150,34 @@ def _complete(
     for key in near[:MOST_RETESTS]:
         if explored.fitted[key] is best:
             continue
-        retest = _retested(explored.fitted[key], settings, rng, each)
+        retest = _retested(explored.fitted[key], settings, rng, parallel_map)
         if not _fails(retest):
             return _Passing(explored.fitted[key], retest, failed)
         failed.add(key)
     return None
 
 
-def _gain(plain: list[LaplaceFit], best: FittedSet, explored: Explored, rng: np.random.Generator, each: Each) -> Array:
+def _gain(
+    plain: list[LaplaceFit], best: FittedSet, explored: Explored, rng: np.random.Generator, parallel_map: ParallelMap
+) -> Array:
     """(b,) gain in leave-one-hold-out elpd that the last effect of a set brings in each block it acts on."""
     earlier = explored.fitted.get(frozenset(best.effects.names[:-1]))
     before = plain if earlier is None else earlier.blocks
     on = list(best.accepted[-1].blocks)
     fits = [version[b] for version in (best.blocks, before) for b in on]
-    elpd = [float(v.sum()) for v in each(gap.leave_one_hold_out, fits, rng.spawn(len(fits)))]
+    elpd = [float(v.sum()) for v in parallel_map(gap.leave_one_hold_out, fits, rng.spawn(len(fits)))]
     out = np.zeros(len(plain))
     out[on] = np.subtract(elpd[: len(on)], elpd[len(on) :])
     return out
 
 
-def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, each: Each) -> Retest:
+def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, parallel_map: ParallelMap) -> Retest:
     """The global test with the set inside, and where its residuals still depend on something."""
     trials, candidates, _ = best.scanned
     if not candidates:
         return Retest(None, [[] for _ in best.blocks])
     simulated = list(
-        each(simulated_with_patterns, best.blocks, repeat(trials), repeat(RETESTS), rng.spawn(len(best.blocks)))
+        parallel_map(simulated_with_patterns, best.blocks, repeat(trials), repeat(RETESTS), rng.spawn(len(best.blocks)))
     )
     nulls = [s.scan for s in simulated]
     data, where = [], []

@@ -39,7 +39,7 @@ class LaplaceFit:
     target : LogPosterior
     modes : Optimum
         Distinct modes, best first.
-    sober : (k, d) array
+    modes_with_expected_setting_error : (k, d) array
         Where the best fit calls setting error what is larger than half a step of the test, the best one with setting
         errors as they are expected: a large effect is easily taken in by a setting error without bounds. Else no row.
     exponent : float or scipy frozen distribution
@@ -52,7 +52,7 @@ class LaplaceFit:
     history: History
     target: LogPosterior
     modes: Optimum
-    sober: Array
+    modes_with_expected_setting_error: Array
     exponent: Any = 1.0
 
     @property
@@ -107,12 +107,19 @@ def fitted(
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
     return LaplaceFit(
-        tuple(experiments), tuple(effects), law, history, target, found, _sober(target, found, rng), exponent
+        tuple(experiments),
+        tuple(effects),
+        law,
+        history,
+        target,
+        found,
+        _with_expected_setting_error(target, found, rng),
+        exponent,
     )
 
 
-def _sober(target: LogPosterior, found: Optimum, rng: np.random.Generator) -> Array:
-    """(k, d) places of `LaplaceFit.sober`."""
+def _with_expected_setting_error(target: LogPosterior, found: Optimum, rng: np.random.Generator) -> Array:
+    """(k, d) places of `LaplaceFit.modes_with_expected_setting_error`."""
     problem, best = target.problem, target.coordinates.to_natural(found.z[:1])
     if all(
         problem.parameters(best, s)["setting_sd"][0] <= _ABSURD * _typical_step(s.protocol) for s in problem.samples
@@ -145,11 +152,11 @@ class Pinned:
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:
-        """(k, d) where the block's own best modes and its sober fit lie, shape constants at their prior medians."""
+        """(k, d) starts: the modes without the effect and the fit with expected setting errors, shapes at medians."""
         names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
         known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
         natural = self._plain.target.coordinates.to_natural(
-            np.concatenate([self._plain.modes.z[:best], self._plain.sober])
+            np.concatenate([self._plain.modes.z[:best], self._plain.modes_with_expected_setting_error])
         )
         theta = np.empty((len(natural), len(names)))
         for i, name in enumerate(names):

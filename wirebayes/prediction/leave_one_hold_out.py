@@ -83,7 +83,7 @@ def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
     return float(gained.sum()), standard_error(gained)
 
 
-def loho(
+def leave_each_hold_out(
     fitted: Fit,
     seed: int = 0,
     *,

@@ -8,7 +8,7 @@ import numpy as np
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
 from wirebayes.io.experiment import Experiment
-from wirebayes.workers import Each
+from wirebayes.workers import ParallelMap
 
 Row = dict[str, Any]
 
@@ -18,7 +18,7 @@ def rows(
     published: Mapping[str, Mapping[str, float]],
     training_holds: int,
     seed: int,
-    each: Each = map,
+    parallel_map: ParallelMap = map,
 ) -> list[Row]:
     """One row for each wire, variant and source of the parameters.
 
@@ -29,7 +29,7 @@ def rows(
     training_holds : int
         Both are adjusted to these first holds: all parameters, or the preload that the published ones lack.
     seed : int
-    each : function, optional
+    parallel_map : function, optional
         The built-in `map`, or one over processes.
 
     Returns
@@ -38,7 +38,7 @@ def rows(
         Parameters, and the rms of what each predicts on the training holds, on the rest and on all, in N.
     """
     wires = [(e, dict(published[e.name]), training_holds, seed) for e in experiments]
-    return [row for part in each(_wire, wires) for row in part]
+    return [row for part in parallel_map(_wire, wires) for row in part]
 
 
 def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:

@@ -104,8 +104,8 @@ def _tables_and_pictures(
     report: Callable[[str, float, float], None],
 ) -> None:
     table_4 = published["table_4"]
-    with workers(len(experiments)) as each:
-        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, each))
+    with workers(len(experiments)) as parallel_map:
+        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, parallel_map))
     report("tables and pictures", 1, 3)
     posterior: list[Row] = []
     creep: list[Row] = []

@@ -73,8 +73,8 @@ def run(
             one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
         return
     work = partial(one, directory=directory, seed=seed, policy=policy)
-    with workers(len(todo)) as each:
-        for done, _ in enumerate(each(work, todo), 1):
+    with workers(len(todo)) as parallel_map:
+        for done, _ in enumerate(parallel_map(work, todo), 1):
             report("fits", done, len(todo))
 
 

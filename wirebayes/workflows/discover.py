@@ -119,8 +119,8 @@ def discover(
         return Findings(place, own, computed=False)
     settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
     with without_script():
-        with workers(prepare=partial(catalogue, own)) as each:
-            found = investigate(experiments, settings, seed, progress or silent, each)
+        with workers(prepare=partial(catalogue, own)) as parallel_map:
+            found = investigate(experiments, settings, seed, progress or silent, parallel_map)
         jobs = jobs_of(found, elastic_law, history, own)
         run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
     write_findings(found, place.path, own)
