@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from wirebayes.discovery import verdict
-from wirebayes.discovery.model_space import EffectSet
+from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.settings import Settings
 from wirebayes.discovery.stepwise import Accepted, Explored
 from wirebayes.discovery.verdict import Retest, decide, verdict_of
 
 ONE = np.ones(1)
+UNLIKELIER = -log_prior(2, 20)  # nats by which a set of two has less prior weight than one of one, of twenty names
 NONE = np.full(1, -20.0)  # a remainder that the readings speak against
 
 
@@ -75,6 +76,30 @@ def test_a_set_that_leaves_something_over_gives_way_to_one_that_does_not(
     found = decided(monkeypatch, explored({"a": 20.0, "b": 20.0 - behind}), {}, {"a": 0.01, "b": p})
     assert names(found) == best
     assert verdict_of(found, 0)[0] == ("named" if best == "b" else "partial")
+
+
+@pytest.mark.parametrize(("gain", "best"), [(4.1, "bc"), (3.9, "a")])
+def test_a_set_that_takes_over_must_predict_too(monkeypatch: pytest.MonkeyPatch, gain: float, best: str) -> None:
+    found = decided(monkeypatch, explored({"a": 20.0, "bc": 19.0 + UNLIKELIER}), {"bc": gain}, {"a": 0.01, "bc": 0.5})
+    assert names(found) == best
+
+
+def test_the_set_that_passed_the_second_test_is_the_one_that_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even where another one, which was not tested, is more probable then."""
+    sets = explored({"a": 20.0, "b": 19.0, "c": 19.5})
+    del sets.fitted[frozenset("c")]  # known by a chain of refits alone
+    found = decided(monkeypatch, sets, {}, {"a": 0.01, "b": 0.4})
+    assert found.posterior.best.names == ("c",)
+    assert names(found) == "b" and found.retest is not None and found.retest.p == 0.4
+    assert list(found.gains) == ["b"]
+
+
+def test_a_set_known_by_refits_alone_keeps_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = explored({"a": 20.0, "b": 21.0})
+    del sets.fitted[frozenset("b")]
+    found = decided(monkeypatch, sets, {}, {})
+    assert names(found) == "a" and found.posterior.inclusion["b"][0] > 0.7
+    assert verdict_of(found, 0)[0] == "ambiguous"
 
 
 def test_a_remainder_alone_needs_no_test(monkeypatch: pytest.MonkeyPatch) -> None:

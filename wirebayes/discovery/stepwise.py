@@ -162,12 +162,15 @@ def explore(
         frontier.add(root, name, found, credit)
     done = frontier.fitted
     start = FittedSet(root, plain, (), found, ([], [], []))
-    while len(done) < MOST_LOOKS:
-        best = max((frontier.promise(key) for key in frontier.known), default=-np.inf)
-        open_ = [k for k in frontier.known if k not in done and frontier.promise(k) > best - REACH]
-        open_ = sorted(open_, key=lambda k: (-frontier.promise(k), sorted(k)))
+    while True:
+        promises = {key: frontier.promise(key) for key in frontier.known}
+        best = max(promises.values(), default=-np.inf)
+        open_ = [k for k, promise in promises.items() if k not in done and promise > best - REACH]
+        open_ = sorted(open_, key=lambda k: (-promises[k], sorted(k)))
         # as many at once whatever the number of cores, so that the sets are the same
-        wave = open_[: FIRST_LOOK if not done else 2][: MOST_LOOKS - len(done)]
+        wave = open_[: FIRST_LOOK if not done else 2][: max(MOST_LOOKS - len(done), 0)]
+        if not wave and open_ and promises[open_[0]] == best:
+            wave = open_[:1]  # the best set is always fitted
         if not wave:
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]

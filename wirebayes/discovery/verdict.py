@@ -1,6 +1,6 @@
 """From the probabilities of models to a verdict for each material, in the order that the thresholds demand."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from typing import Any, Literal
@@ -58,9 +58,9 @@ class Decision:
     ----------
     posterior : ModelPosterior
     best : FittedSet or None
-        The most probable set of effects, fitted; None where that is the plain model.
+        The most probable set of effects, fitted, or the one it gave way to; None where that is the plain model.
     retest : Retest or None
-        With the best set inside.
+        With the best set inside, or with the one that was, where a remainder alone came out more probable.
     gains : dict of name to (b,) array
         Gain of leaving out one hold at a time that each effect of the best set brought when it was added.
     """
@@ -82,27 +82,28 @@ def decide(
     """Weigh the sets, leave out those whose last effect does not predict, and test the best one once more."""
     sets, gains = list(explored.sets), dict[Key, Array]()
     count, blocks = len(settings.kinds), len(plain)
+
+    def predicts(candidate: FittedSet) -> bool:
+        """Whether the last effect of a set, if it is not the only one, predicts holds that are left out."""
+        key = candidate.effects.key
+        if key not in gains:
+            gains[key] = _gain(plain, candidate, explored, rng, parallel_map)
+        return len(key) == 1 or float(gains[key].sum()) > KEEP_ELPD
+
     while True:
         without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
         found = model_space.posterior(sets, without, beside, blocks)
-        if not found.best.names:
+        best = _best_fitted(found, explored)
+        if best is None:
             return Decision(found, None, None, {})
-        best = explored.fitted.get(found.best.key)
-        if best is None:  # known by a chain of refits alone
-            sets.remove(found.best)
-            continue
-        key = best.effects.key
-        if key not in gains:
-            gains[key] = _gain(plain, best, explored, rng, parallel_map)
-        if len(key) == 1 or gains[key].sum() > KEEP_ELPD:
+        if predicts(best):
             break
-        sets = [s for s in sets if not key <= s.key]
+        sets = [s for s in sets if not best.effects.key <= s.key]
     retest = _retested(best, settings, rng, parallel_map)
     if _fails(retest):
-        passing = _complete(found, explored, best, settings, rng, parallel_map)
+        passing = _complete(found, explored, best, predicts, settings, rng, parallel_map)
         if passing is not None:
-            dropped = {key for key, other in explored.fitted.items() if other is best or key in passing.failed}
-            sets = [s for s in sets if s.key not in dropped]
+            sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
             best, retest = passing.best, passing.retest
             without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
         else:
@@ -112,13 +113,20 @@ def decide(
         found = model_space.posterior(sets, without, beside, blocks)
         if not found.best.names:
             return Decision(found, None, retest, {})
-        best = explored.fitted.get(found.best.key, best)
     path = [explored.fitted.get(frozenset(best.effects.names[: n + 1])) for n in range(len(best.effects.names))]
-    for step in path:
-        if step is not None and step.effects.key not in gains:
-            gains[step.effects.key] = _gain(plain, step, explored, rng, parallel_map)
-    own = {s.accepted[-1].name: gains[s.effects.key] for s in path if s is not None}
-    return Decision(found, best, retest, own)
+    steps = [step for step in path if step is not None]
+    for step in steps:
+        predicts(step)
+    return Decision(found, best, retest, {s.accepted[-1].name: gains[s.effects.key] for s in steps})
+
+
+def _best_fitted(found: ModelPosterior, explored: Explored) -> FittedSet | None:
+    """The most probable set, if effects are in it; where a chain of refits is all that is known of it, the next one."""
+    if not found.best.names or found.best.key in explored.fitted:
+        return explored.fitted.get(found.best.key)
+    weights = zip(found.without + found.beside, (explored.fitted.get(s.key) for s in found.sets), strict=True)
+    known = [(weight, s) for weight, s in weights if s is not None]
+    return max(known, key=lambda item: item[0])[1] if known else None
 
 
 def _fails(retest: Retest) -> bool:
@@ -138,21 +146,27 @@ def _complete(
     found: ModelPosterior,
     explored: Explored,
     best: FittedSet,
+    predicts: Callable[[FittedSet], bool],
     settings: Settings,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> _Passing | None:
-    """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none."""
+    """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none.
+
+    It must predict as the best one had to; one that does not has failed without a test.
+    """
     weights = {s.key: float(w) for s, w in zip(found.sets, found.without + found.beside, strict=True)}
     least = weights[best.effects.key] * np.exp(-GIVE_WAY)
     near = [k for k, w in sorted(weights.items(), key=lambda item: -item[1]) if k in explored.fitted and w > least]
     failed: set[Key] = set()
     for key in near[:MOST_RETESTS]:
-        if explored.fitted[key] is best:
+        candidate = explored.fitted[key]
+        if candidate is best:
             continue
-        retest = _retested(explored.fitted[key], settings, rng, parallel_map)
-        if not _fails(retest):
-            return _Passing(explored.fitted[key], retest, failed)
+        if predicts(candidate):
+            retest = _retested(candidate, settings, rng, parallel_map)
+            if not _fails(retest):
+                return _Passing(candidate, retest, failed)
         failed.add(key)
     return None
 
