@@ -95,3 +95,13 @@ def _polished(value_and_slope, q):
 
 def _factorial(k):
     return float(np.prod(np.arange(1, k + 1, dtype=float)))
+
+
+def with_pulleys(robot, rng, share=0.02):
+    """The same robot with pulleys of about a share of its span at all exits but the first, their axes about upright."""
+    from wirebayes.robot.mechanics.description import Pulleys
+
+    axis = rng.normal(0.0, 0.3, (robot.legs, 3)) + [0.0, 0.0, 1.0]
+    radius = share * robot.span_m * rng.uniform(0.5, 1.5, robot.legs)
+    radius[0] = 0.0
+    return replace(robot, pulleys=Pulleys(radius, axis / np.linalg.norm(axis, axis=1, keepdims=True)))

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.robot import cases
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
@@ -51,8 +52,11 @@ def test_sensitivity_is_the_derivative_of_the_equilibrium():
         np.testing.assert_allclose(motion[:, :3, i], shift, atol=1e-5 * np.abs(motion[:, :3]).max())
 
 
-def test_exact_readings_bring_back_the_lengths():
+@pytest.mark.parametrize("rolling", [False, True])
+def test_exact_readings_bring_back_the_lengths(rolling):
     robot = schema.read("segesta-8")
+    if rolling:
+        robot = cases.with_pulleys(robot, np.random.default_rng(0))
     rng = np.random.default_rng(2)
     line = _line()
     session = replace(_session(robot, line, 5, rng), tension_sd_N=1e-4)

@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from tests.robot import cases
 from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
@@ -92,3 +93,12 @@ def test_a_line_that_cannot_carry_the_platform_has_no_spring_constant():
     robot = schema.read("hangprinter-4")
     with pytest.raises(InputError, match="cannot carry"):
         files.reprapfirmware(robot, _line("hooke", "strain_stiffening", {"strain_stiffening.c": -2000.0}))
+
+
+def test_firmware_says_that_it_leaves_out_pulleys():
+    line = _line("hooke", None, {})
+    robot = cases.with_pulleys(schema.read("hangprinter-4"), np.random.default_rng(0))
+    for text in (files.reprapfirmware(robot, line), files.klipper(robot, line)):
+        assert "Left out: the pulleys at the anchors (radii 0, " in text
+    assert "Left out" not in files.klipper(schema.read("hangprinter-4"), line)
+    assert "pulleys do not swivel" in files.mujoco(robot, line)

@@ -4,6 +4,7 @@ import pytest
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import schema
 
+OPTIONAL = {"k1_N", "B_mm", "length_mm", "wire", "pulley_radius_m", "swivel_axis"}
 GOOD = """version = 1
 name = "tripod"
 description = "three wires and a point"
@@ -80,6 +81,10 @@ def test_a_good_file_is_read(tmp_path):
         ('freedom = "position"', 'freedom = "all"', "freedom"),
         ('actuator = "linear"', 'actuator = "drum"', "leg[2].pulley_ratio"),
         ("[platform]\nmass_kg = 1.0", "platform = 3", "platform"),
+        ('wire = "steel"', "pulley_radius_m = 0.0", "leg[0].pulley_radius_m"),
+        ('wire = "steel"', "pulley_radius_m = 0.05", "leg[0].swivel_axis"),
+        ('wire = "steel"', "pulley_radius_m = 0.05\nswivel_axis = [0, 0, 0]", "leg[0].swivel_axis"),
+        ('wire = "steel"', "swivel_axis = [0, 0, 1]", "leg[0].swivel_axis"),
     ],
 )
 def test_every_mistake_names_file_and_key_in_one_line(tmp_path, old, new, key):
@@ -90,6 +95,14 @@ def test_every_mistake_names_file_and_key_in_one_line(tmp_path, old, new, key):
     assert "\n" not in said
     assert "robot.toml" in said
     assert f" {key}" in said
+
+
+def test_a_pulley_is_read_and_its_axis_has_unit_length(tmp_path):
+    assert _read(tmp_path, GOOD).pulleys is None
+    pulley = 'wire = "steel"\npulley_radius_m = 0.05\nswivel_axis = [0.0, 3.0, 4.0]'
+    robot = _read(tmp_path, GOOD.replace('wire = "steel"', pulley))
+    np.testing.assert_array_equal(robot.pulleys.radius_m, [0.05, 0.0, 0.0])
+    np.testing.assert_allclose(robot.pulleys.axis[0], [0.0, 0.6, 0.8])
 
 
 @pytest.mark.parametrize("text", ["version = ", GOOD.split("[[leg]]")[0], "\x00"])
@@ -122,4 +135,4 @@ def test_every_key_of_a_robots_file_is_documented():
     assert len(used) > 15
     for page in (root / "data" / "robots" / "README.md", root / "docs" / "robot.rst"):
         text = page.read_text()
-        assert [key for key in sorted(used | {"k1_N", "B_mm", "length_mm", "wire"}) if f"{key}" not in text] == []
+        assert [key for key in sorted(used | OPTIONAL) if f"{key}" not in text] == []

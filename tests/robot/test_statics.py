@@ -14,8 +14,12 @@ def _turned(R, d):
 @pytest.mark.parametrize("name", schema.shipped())
 @pytest.mark.parametrize("law", ["hooke", "modified"])
 def test_wrench_and_stiffness_are_derivatives_of_the_energy(name, law):
-    robot = schema.read(name)
-    rng = np.random.default_rng(5)
+    check_derivatives(schema.read(name), law)
+
+
+def check_derivatives(robot, law, seed=5):
+    """Against central differences; the seed keeps wires away from the edge of slackness, where the slope jumps."""
+    rng = np.random.default_rng(seed)
     c = cases.disturbed(robot, law, 6, rng)
     d, n = robot.degrees, len(c.position_m)
 

@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
 from wirebayes.report.pictures.robot_space import workspace_map
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.answer import Answer
 from wirebayes.robot.pose.request import PoseRequest
@@ -69,9 +70,9 @@ def scene(
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
     here = position_m + robot.platform_m @ rotation.T
     there = position_m + exaggeration * shift + robot.platform_m @ (rotation + exaggeration * turn).T
-    for a, p, q in zip(robot.exit_m, here, there, strict=True):
-        axes.plot(*np.stack([a, p], 1), color=QUIET, lw=1.0)
-        axes.plot(*np.stack([a, q], 1), color=HOLD, lw=0.7, ls=":")
+    for i, (a, p, q) in enumerate(zip(robot.exit_m, here, there, strict=True)):
+        axes.plot(*(a + traced(robot.pulleys, i, p - a)).T, color=QUIET, lw=1.0)
+        axes.plot(*(a + traced(robot.pulleys, i, q - a)).T, color=HOLD, lw=0.7, ls=":")
     for points, colour, name in ((here, CHAIN, "commanded"), (there, HOLD, "drifted")):
         for i, j in _edges(robot.platform_m):
             axes.plot(*points[[i, j]].T, color=colour, lw=1.6)

@@ -170,7 +170,14 @@ def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> st
     return (
         f"{mark} {robot.name}: line fitted at {line.length_mm:g} mm{tested}.\n"
         f"{mark} The firmware knows no creep; creep-table.csv says how much a line grows under load.\n"
-    ) + (f"{mark} {spring.remark}\n" if spring.remark else "")
+    ) + "".join(f"{mark} {remark}\n" for remark in (spring.remark, _pulleys_left_out(robot)) if remark)
+
+
+def _pulleys_left_out(robot: Robot) -> str:
+    if robot.pulleys is None:
+        return ""
+    radii = _joined(1e3 * robot.pulleys.radius_m, "g", ", ")
+    return f"Left out: the pulleys at the anchors (radii {radii} mm); the firmware takes an anchor for a point."
 
 
 def _joined(values: Floats, form: str, between: str = ":") -> str:

@@ -2,6 +2,10 @@
 
 A spatial tendon with stiffness k1/ℓ and a spring length from 0 to ℓ pulls as Hooke's law does and goes slack. Several
 lines of one wire, and wire beyond the exit point, make one tendon of k1 m²/ℓ that rests at (ℓ - offset)/m.
+
+A pulley is a cylinder on which the tendon wraps; the tendon starts a radius before the exit point, on the swivel axis,
+so that it meets the rim at a tangent. The cylinder has no groove, a free one would be pushed aside: it stands still and
+looks towards one pose. There lengths and forces are the robot's; beside it they differ by the square of the way.
 """
 
 from typing import Any
@@ -10,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.rotation import matrix, vector
 
 Floats = NDArray[np.float64]
+_STILL = "pulleys do not swivel: they look towards the home pose; lengths and forces are the robot's there"
 
 
 def mjcf(
@@ -22,6 +28,7 @@ def mjcf(
     damping_N_s_m: float = 1.0,
     timestep_s: float = 1e-3,
     remark: str = "",
+    towards_m: Floats | None = None,
 ) -> str:
     """MuJoCo model (MJCF) of a robot with given lengths.
 
@@ -35,6 +42,8 @@ def mjcf(
     timestep_s : float
     remark : str
         A comment at the head of the model.
+    towards_m : (w, 3) array, optional
+        Where the pulleys look; default: to the platform points at the home pose.
     """
     m, arm2 = robot.mass_kg, robot.size_m**2
     stiffness = k1_N * robot.lines**2 / zero_m
@@ -43,21 +52,52 @@ def mjcf(
         f'<joint type="slide" axis="{axis}" damping="{damping_N_s_m!r}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
     )
     ball = f'<joint type="ball" damping="{damping_N_s_m * arm2!r}"/>' if robot.degrees == 6 else ""
-    exits = "".join(f'<site name="exit{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_m))
+    if towards_m is None:
+        towards_m = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+    radius, axis = wheels(robot)
+    exits = "".join(f'<site name="exit{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_m - radius * axis))
+    pulleys = "".join(
+        _rim(int(i), robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i]) for i in np.flatnonzero(radius[:, 0])
+    )
+    rest = np.where(radius[:, 0] > 0, (zero_m - offset_m) / robot.lines + radius[:, 0], rest).clip(0.0)
     points = "".join(f'<site name="point{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.platform_m))
     tendons = "".join(
         f'<spatial stiffness="{float(k)!r}" springlength="0 {float(rest_m)!r}">'
-        f'<site site="exit{i}"/><site site="point{i}"/></spatial>'
+        f'<site site="exit{i}"/>{_wrapped(i) if radius[i, 0] else ""}<site site="point{i}"/></spatial>'
         for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
     )
-    comment = f"<!-- {remark} -->" if remark else ""
+    comment = "".join(f"<!-- {text} -->" for text in (remark, _STILL if pulleys else "") if text)
     inertia = _row(np.full(3, m * arm2))
     return (
         f'<mujoco model="{robot.name}">{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}<body>{slides}{ball}'
         f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
-        f"</body></worldbody><tendon>{tendons}</tendon></mujoco>\n"
+        f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
+
+
+def wheels(robot: Robot) -> tuple[Floats, Floats]:
+    """Radii ``(w, 1)``, zero without a pulley, and swivel axes ``(w, 3)``."""
+    if robot.pulleys is None:
+        return np.zeros((robot.legs, 1)), np.zeros((robot.legs, 3))
+    return robot.pulleys.radius_m[:, None], robot.pulleys.axis
+
+
+def _rim(i: int, exit_m: Floats, radius: float, axis: Floats, towards_m: Floats) -> str:
+    """A pulley: x of its frame away from the swivel axis, z along it; the tendon passes on the side that z shows."""
+    line = towards_m - exit_m
+    outward = line - (line @ axis) * axis
+    outward = outward / np.linalg.norm(outward)
+    frame = _row(np.concatenate([outward, np.cross(axis, outward)]))
+    return (
+        f'<body name="pulley{i}" pos="{_row(exit_m)}" xyaxes="{frame}">'
+        f'<geom name="rim{i}" type="cylinder" size="{radius!r} {0.2 * radius!r}" pos="{radius!r} 0 0" '
+        f'zaxis="0 1 0" contype="0" conaffinity="0"/><site name="side{i}" pos="{radius!r} 0 {2 * radius!r}"/></body>'
+    )
+
+
+def _wrapped(i: int) -> str:
+    return f'<geom geom="rim{i}" sidesite="side{i}"/>'
 
 
 def _row(values: Floats) -> str:
@@ -73,6 +113,7 @@ def settle(
     start_rotation: Floats,
     softest_N_m: float,
     max_steps: int = 400_000,
+    towards_m: Floats | None = None,
 ) -> tuple[Floats, Floats, bool]:
     """Let MuJoCo's damped platform come to rest.
 
@@ -83,6 +124,8 @@ def settle(
     start_m, start_rotation : (3,), (3, 3) arrays
     softest_N_m : float
         About the smallest stiffness on the way; it only sets the damping, hence the time to rest.
+    towards_m : (w, 3) array, optional
+        As in `mjcf`.
 
     Returns
     -------
@@ -92,13 +135,12 @@ def settle(
     """
     import mujoco
 
-    from wirebayes.robot.mechanics.rotation import vector
-
     stiffest = float((k1_N * robot.lines**2 / zero_m).sum()) * 4
     mass = robot.mass_kg
     damping = 2.0 * float(np.sqrt(softest_N_m * mass))
     step = 0.3 / float(np.sqrt(stiffest / mass))
-    model: Any = mujoco.MjModel.from_xml_string(mjcf(robot, k1_N, zero_m, offset_m, damping, step))
+    text = mjcf(robot, k1_N, zero_m, offset_m, damping, step, towards_m=towards_m)
+    model: Any = mujoco.MjModel.from_xml_string(text)
     data: Any = mujoco.MjData(model)
     data.qpos[:3] = start_m
     if robot.degrees == 6:

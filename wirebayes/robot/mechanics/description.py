@@ -38,6 +38,23 @@ class TensionRule:
 
 
 @dataclass(frozen=True)
+class Pulleys:
+    """Swivelling pulleys at the exit points.
+
+    Attributes
+    ----------
+    radius_m : (w,) array
+        From the pulley's axle to the middle of the wire; 0 where the wire leaves from a fixed point.
+    axis : (w, 3) array
+        Unit vectors of the swivel axes, in the direction in which the wire runs when it comes to the exit point. The
+        axis goes through the exit point and touches the rim there.
+    """
+
+    radius_m: Floats
+    axis: Floats
+
+
+@dataclass(frozen=True)
 class Robot:
     """A robot of ``w`` legs; all lengths in metres, masses in kilograms.
 
@@ -50,7 +67,8 @@ class Robot:
     centre_of_mass_m : (3,) array
         In the platform's frame, from the reference point.
     exit_m, platform_m : (w, 3) arrays
-        Exit points in the world, platform points in the platform's frame.
+        Exit points in the world, platform points in the platform's frame. Over a pulley the exit point is where the
+        wire meets the rim.
     lines : (w,) array
         Parallel parts of one wire between exit and platform point; all carry its tension.
     beyond_m : (w,) array
@@ -68,6 +86,8 @@ class Robot:
         The pose shown when none is asked for.
     lower_m, upper_m : (3,) arrays
         Box in which workspace figures are computed.
+    pulleys : Pulleys or None
+        None where all wires leave from fixed points.
 
     Examples
     --------
@@ -96,6 +116,7 @@ class Robot:
     home_rotation_rad: Floats
     lower_m: Floats
     upper_m: Floats
+    pulleys: Pulleys | None = None
 
     @property
     def legs(self) -> int:

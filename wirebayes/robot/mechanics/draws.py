@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.wire import laws
 from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
@@ -127,8 +128,8 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
 
 def nominal_length(robot: Robot) -> Floats:
     """Length of each leg's wire, (w,) m: all of a linear actuator's, a drum's at the home pose."""
-    points = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
-    free = robot.lines * np.linalg.norm(points - robot.exit_m, axis=1) + robot.beyond_m
+    shape = geometry(robot, robot.home_m[:, None], matrix(robot.home_rotation_rad)[..., None])
+    free = robot.lines * shape.distance_m[:, 0] + robot.beyond_m
     return np.where(robot.is_linear, robot.wire_m, free)
 
 

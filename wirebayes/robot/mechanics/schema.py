@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.robot.mechanics.description import GivenWire, Robot, TensionRule
+from wirebayes.robot.mechanics.description import GivenWire, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.tensions import CHOICES
 
+Floats = NDArray[np.float64]
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
 
 
@@ -91,11 +93,18 @@ class _Table:
             raise self.fail(key, f"found {_shown(value)}", f"a finite number{bound}")
         return float(value)
 
-    def triple(self, key: str, default: list[float] | None = None) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def triple(self, key: str, default: list[float] | None = None) -> Floats:
         value = self.take(key, "three numbers", default)
         if not isinstance(value, list) or len(value) != 3 or not all(_is_number(v) for v in value):
             raise self.fail(key, f"found {_shown(value)}", "a list of three finite numbers")
         return np.array(value, float)
+
+    def unit(self, key: str) -> Floats:
+        value = self.triple(key)
+        length = float(np.linalg.norm(value))
+        if not length > 0:
+            raise self.fail(key, f"found {value.tolist()}", "a direction, not all zero")
+        return value / length
 
     def text(self, key: str, default: str | None = None, among: tuple[str, ...] = ()) -> str:
         expected = "one of " + ", ".join(among) if among else "a text"
@@ -143,8 +152,12 @@ def _robot(t: _Table) -> Robot:
         name, description, source, "pose" if freedom == "pose" else "position", mass, centre,
         stack("exit"), stack("platform"), stack("lines"), stack("beyond"), tuple(leg["actuator"] for leg in legs),
         stack("ratio"), stack("wire_m"), tuple(leg["wire"] for leg in legs), given, tension,
-        position, turn, lower, upper,
+        position, turn, lower, upper, _pulleys(stack("pulley"), stack("axis")),
     )  # fmt: skip
+
+
+def _pulleys(radius_m: Floats, axis: Floats) -> Pulleys | None:
+    return Pulleys(radius_m, axis) if radius_m.any() else None
 
 
 def _given(t: _Table) -> dict[str, GivenWire]:
@@ -174,12 +187,17 @@ def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
             "wire": leg.text("wire", "default"),
             "ratio": 0.0,
             "wire_m": 0.0,
+            "pulley": 0.0,
+            "axis": np.array([0.0, 0.0, 1.0]),
         }
         if row["lines"] != int(row["lines"]):
             raise leg.fail("lines", f"found {row['lines']:g}", "a whole number")
         if actuator == "linear":
             row["ratio"] = leg.number("pulley_ratio", above=0)
             row["wire_m"] = leg.number("wire_length_m", above=0)
+        if "pulley_radius_m" in leg.content:
+            row["pulley"] = leg.number("pulley_radius_m", above=0)
+            row["axis"] = leg.unit("swivel_axis")
         if row["wire"] != "default" and row["wire"] not in given:
             raise leg.fail("wire", f"found {row['wire']!r}", "the name of a table under [wires], or no key")
         leg.finish()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.pulleys import WireRun, run
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 
 Floats = NDArray[np.float64]
@@ -22,16 +23,30 @@ class Geometry:
     Attributes
     ----------
     distance_m : (w, n)
-        From exit point to platform point.
+        Along one line from exit point to platform point, with the arc on a pulley.
     direction : (3, w, n)
-        Unit vectors from the exit point to the platform point (a wire pulls the platform the other way).
+        Unit vectors along the wire to the platform point (a wire pulls the platform the other way).
     arm_m : (3, w, n)
         From the reference point to the platform points, in the world's axes.
+    over : WireRun or None
+        How the wires run over pulleys, where there are any.
     """
 
     distance_m: Floats
     direction: Floats
     arm_m: Floats
+    over: WireRun | None = None
+
+    @property
+    def straight_m(self) -> Floats:
+        """(w, n) Straight part of a line, which swings with its platform point."""
+        return self.distance_m if self.over is None else self.over.straight_m
+
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """(n,) False where a platform point lies inside a pulley."""
+        none = np.ones(self.distance_m.shape[-1], bool)
+        return none if self.over is None else np.asarray(self.over.clear.all(0))
 
 
 def turned(points_m: Floats, rotation: Floats) -> Floats:
@@ -41,18 +56,25 @@ def turned(points_m: Floats, rotation: Floats) -> Floats:
 
 
 def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
-    """Distances, directions and lever arms at poses ``(3, n)``, ``(3, 3, n)``."""
+    """Distances, directions and lever arms, over pulleys where there are any, at poses ``(3, n)``, ``(3, 3, n)``."""
     arm = turned(robot.platform_m, rotation)
     line = position_m[:, None] + arm - robot.exit_m.T[:, :, None]
+    if robot.pulleys is not None:
+        over = run(robot.pulleys, line)
+        return Geometry(over.length_m, over.direction, arm, over)
     distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
     return Geometry(distance, line / distance, arm)
 
 
 def jacobian(robot: Robot, shape: Geometry) -> Floats:
     """Change of the distances with a small motion, ``(6 or 3, w, n)``: rows ``u`` and ``r × u``."""
+    return _with_moments(robot, shape.direction, shape.arm_m)
+
+
+def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
+    """Vectors ``(3, w, n)`` at platform points with their moments about the reference point, as far as they count."""
     if robot.degrees == 3:
-        return shape.direction
-    u, r = shape.direction, shape.arm_m
+        return u
     moment = [r[1] * u[2] - r[2] * u[1], r[2] * u[0] - r[0] * u[2], r[0] * u[1] - r[1] * u[0]]
     return np.concatenate([u, np.stack(moment)])
 
@@ -103,7 +125,7 @@ def unbalance_and_stiffness(
     J = jacobian(robot, shape)
     m = robot.lines[:, None]
     pull = tension_N * m
-    beta = pull / shape.distance_m
+    beta = pull / shape.straight_m
     alpha = slope_N_m * (m * m) - beta
     degrees = robot.degrees
     gradient = (J * pull).sum(1) - weight(robot, rotation)
@@ -112,6 +134,12 @@ def unbalance_and_stiffness(
     for i in range(degrees):
         for j in range(i, degrees):
             H[i][j] = (scaled[i] * J[j]).sum(0)
+    if shape.over is not None:
+        side = _with_moments(robot, shape.over.across, shape.arm_m)
+        swivel = side * (pull * shape.over.swing_1_m)
+        for i in range(degrees):
+            for j in range(i, degrees):
+                H[i][j] = H[i][j] + (swivel[i] * side[j]).sum(0)
     total = beta.sum(0)
     for i in range(3):
         H[i][i] = H[i][i] + total

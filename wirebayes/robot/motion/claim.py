@@ -119,7 +119,10 @@ def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
     lengths = ("exit_m", "platform_m", "centre_of_mass_m", "beyond_m", "wire_m", "home_m", "lower_m", "upper_m")
     rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
                    highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip
-    return replace(robot, mass_kg=mass_kg, rule=rule, **{name: getattr(robot, name) * factor for name in lengths})
+    pulleys = robot.pulleys and replace(robot.pulleys, radius_m=factor * robot.pulleys.radius_m)
+    return replace(
+        robot, mass_kg=mass_kg, rule=rule, pulleys=pulleys, **{name: getattr(robot, name) * factor for name in lengths}
+    )
 
 
 def summary(out: WorkspaceDrift) -> dict[str, float]:

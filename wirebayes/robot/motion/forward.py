@@ -110,6 +110,8 @@ def solve(
         rest = _in_chunks(robot, *part, max_iterations - quick)
         at[:, slow], turn[..., slow], tau[:, slow], status[slow], left[slow] = *rest[:4], rest[5]
         count[slow] += rest[4]
+    if robot.pulleys is not None:  # inside a pulley there is no wire, and no equilibrium to be found
+        status[(status == FOUND) & ~statics.geometry(robot, at, turn).clear] = NOT_CONVERGED
     return Equilibria(at.T + middle, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
 
 

@@ -40,7 +40,8 @@ class Commands:
 def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice | None = None) -> Floats:
     """Tensions that hold the platform at poses, ``(p, w)`` N; NaN where none within the bounds do.
 
-    They depend on geometry and mass alone, not on the wires: one set serves all draws.
+    They depend on geometry and mass alone, not on the wires: one set serves all draws. None hold a pose with a platform
+    point inside a pulley.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice 
     structure[3:] /= robot.size_m
     load[3:] /= robot.size_m
     out = np.full((len(position_m), robot.legs), np.nan)
-    for p in range(len(position_m)):
+    for p in np.flatnonzero(shape.clear):
         tau = chosen(structure[:, :, p], load[:, p], rule.lowest_N, rule.highest_N)
         if tau is not None:
             out[p] = tau

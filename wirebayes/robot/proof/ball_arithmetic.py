@@ -16,6 +16,14 @@ Floats = NDArray[np.float64]
 Bounds = tuple[Floats, Floats]  # lower and upper, (w,) each
 
 
+class Span(NamedTuple):
+    """One line of a wire over a box: length, its gradient and its second derivative by the platform point."""
+
+    length: Any
+    direction: list[Any]
+    curvature: list[list[Any]]
+
+
 class Strand(NamedTuple):
     """A wire over a box of poses: stretched length, its slope by the pose, and the wrench of 1 N of tension."""
 
@@ -69,16 +77,14 @@ class Balance:
             slope += _block(arb_mat(3, 3), None, _skew(weight, arb) * _skew(c, arb) * by_turn, self.size)
         for i in range(robot.legs):
             r, line = self._line(i, y, turn)
-            length = _square(line).sqrt()
+            span = self._span(i, line)
             m = arb(float(robot.lines[i]))
-            S = m * length + self.offset[i]
+            S = m * span.length + self.offset[i]
             tau, stiff = pulls[i] if pulls else self.pull(i, self.strain(i, S), S)
-            u = [a / length for a in line]
+            u = span.direction
             pull = [-m * tau * a for a in u]
-            swing = tau / length
-            along = stiff * m - swing
-            rows = [[-m * (along * a * b + (swing if a is b else 0)) for b in u] for a in u]
-            A = arb_mat(rows)
+            bends = span.curvature
+            A = arb_mat([[-m * (stiff * m * u[j] * u[k] + tau * bends[j][k]) for k in range(3)] for j in range(3)])
             force = [p + q for p, q in zip(force, pull, strict=True)]
             if d == 3:
                 slope += A
@@ -110,19 +116,51 @@ class Balance:
         robot, m = self.robot, self.arb(float(self.robot.lines[i]))
         turn, by_turn = self._turn(y[3:]) if robot.degrees == 6 else (self.R, None)
         r, line = self._line(i, y, turn)
-        length = _square(line).sqrt()
-        u = [m * a / length for a in line]
+        span = self._span(i, line)
+        u = [m * a for a in span.direction]
         if by_turn is None:
-            return Strand(m * length + self.offset[i], u, [-a for a in u])
+            return Strand(m * span.length + self.offset[i], u, [-a for a in u])
         # u . (s x r) = s . (r x u): the stretch by a turn is the moment
         moment = _cross(r, u)
         slope = [sum((moment[k] * by_turn[k, j] for k in range(3)), self.arb(0)) for j in range(3)]
-        return Strand(m * length + self.offset[i], [*u, *slope], [-a for a in u] + [-v / self.size for v in moment])
+        return Strand(
+            m * span.length + self.offset[i], [*u, *slope], [-a for a in u] + [-v / self.size for v in moment]
+        )
 
     def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
         """Platform point from the reference point, and from the exit point."""
         r = _times(turn, self.robot.platform_m[i], self.arb)
         return r, [self.x[k] + y[k] + r[k] - self.arb(float(self.robot.exit_m[i, k])) for k in range(3)]
+
+    def _span(self, i: int, line: list[Any]) -> Span:
+        """A line from an exit point, over its pulley if it has one (`mechanics.pulleys` has the equations)."""
+        pulleys = self.robot.pulleys
+        if pulleys is None or not pulleys.radius_m[i]:
+            length = _square(line).sqrt()
+            u = [a / length for a in line]
+            return Span(
+                length, u, [[((1 if j == k else 0) - u[j] * u[k]) / length for k in range(3)] for j in range(3)]
+            )
+        arb, rho = self.arb, self.arb(float(pulleys.radius_m[i]))
+        s = [arb(float(a)) for a in pulleys.axis[i]]
+        s = [a / _square(s).sqrt() for a in s]
+        z = _dot(line, s)
+        beside = [a - z * b for a, b in zip(line, s, strict=True)]
+        away = _square(beside).sqrt()
+        e = [a / away for a in beside]
+        h = away - rho
+        straight = (h * h + z * z - rho * rho).sqrt()
+        size = h * h + z * z
+        cosine, sine = (z * straight - h * rho) / size, (z * rho + h * straight) / size
+        wrap = arb.pi() / 2 - arb.atan2(cosine, sine)  # cut where no pulley in use is wrapped that far
+        u = [sine * a + cosine * b for a, b in zip(e, s, strict=True)]
+        normal = [cosine * a - sine * b for a, b in zip(e, s, strict=True)]
+        across = _cross(s, e)
+        swivel = sine / away
+        bends = [
+            [normal[j] * normal[k] / straight + across[j] * across[k] * swivel for k in range(3)] for j in range(3)
+        ]
+        return Span(rho * wrap + straight, u, bends)
 
     def strain(self, i: int, S: Any) -> Any:
         """Strain at a stretched length, eq (1) or (3)."""
@@ -171,6 +209,10 @@ def _times(matrix: Any, vector: Floats, arb: Any) -> list[Any]:
 def _square(v: list[Any]) -> Any:
     # not v**2: the power of a ball that holds zero is taken by logarithms and lost
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+
+
+def _dot(a: list[Any], b: list[Any]) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _cross(a: list[Any], b: list[Any]) -> list[Any]:

@@ -1,0 +1,104 @@
+"""Wires over swivelling pulleys: tangent point, length with the wrapped arc, direction, and curvature of the length.
+
+The wire comes along the swivel axis, meets the rim at the exit point, lies on the rim for an arc and leaves along a
+tangent. The pulley turns about the axis towards the platform point, so that all of this happens in one plane (A. Pott,
+*Influence of pulley kinematics on cable-driven parallel robots*, Advances in Robot Kinematics 2012).
+
+In that plane, with the pulley's centre as origin, the platform point is ``(h, z)``: away from the axis and along it.
+Its straight part is ``L = sqrt(h^2 + z^2 - rho^2)`` and its arc follows from ``z + i h = (L - i rho) exp(i wrap)``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import Pulleys
+
+Floats = NDArray[np.float64]
+_LEAST = 1e-3  # of the radius: a point nearer to the rim has no tangent worth the name, and counts as inside
+
+
+@dataclass(frozen=True)
+class WireRun:
+    """How wires run from exit points over their pulleys.
+
+    Attributes
+    ----------
+    length_m : (w, n) array
+        From exit point to platform point: arc and straight part.
+    straight_m : (w, n) array
+        From tangent point to platform point.
+    direction : (3, w, n) array
+        Unit vectors from the tangent point to the platform point: the gradient of the length.
+    across : (3, w, n) array
+        Unit vectors across the pulley's plane.
+    swing_1_m : (w, n) array
+        Curvature of the length across the plane beyond that of the straight part: the pulley swivels, its centre moves.
+    wrap_rad : (w, n) array
+        Arc on the rim.
+    clear : (w, n) bool array
+        False where the platform point lies inside the pulley: there the other values mean nothing.
+    """
+
+    length_m: Floats
+    straight_m: Floats
+    direction: Floats
+    across: Floats
+    swing_1_m: Floats
+    wrap_rad: Floats
+    clear: NDArray[np.bool_]
+
+
+def run(pulleys: Pulleys, line_m: Floats) -> WireRun:
+    """The way of wires to platform points that lie at ``(3, w, n)`` from their exit points."""
+    rho, s = pulleys.radius_m[:, None], pulleys.axis.T[:, :, None]
+    along = line_m[0] * s[0] + line_m[1] * s[1] + line_m[2] * s[2]
+    beside = line_m - along * s
+    tiny = 1e-12 * (rho + 1e-300)
+    away = np.maximum(np.sqrt(beside[0] ** 2 + beside[1] ** 2 + beside[2] ** 2), tiny)
+    outward = beside / away
+    h = away - rho
+    square = h * h + along * along - rho * rho
+    clear = (square > (_LEAST * rho) ** 2) | (rho == 0)
+    straight = np.sqrt(np.maximum(square, (_LEAST * rho) ** 2 + tiny * tiny))
+    size = np.maximum(np.sqrt(h * h + along * along), tiny) * np.sqrt(straight * straight + rho * rho)
+    cosine, sine = (along * straight - h * rho) / size, (along * rho + h * straight) / size
+    wrap = np.arctan2(sine, cosine)
+    wrap = np.where(wrap < -1e-9, wrap + 2 * np.pi, wrap)
+    direction = sine * outward + cosine * s
+    across = np.stack([s[1] * outward[2] - s[2] * outward[1], s[2] * outward[0] - s[0] * outward[2],
+                       s[0] * outward[1] - s[1] * outward[0]])  # fmt: skip
+    # A leg without a pulley is a straight line, whatever its axis.
+    point = rho == 0
+    distance = np.sqrt(line_m[0] ** 2 + line_m[1] ** 2 + line_m[2] ** 2)
+    return WireRun(
+        np.where(point, distance, rho * wrap + straight),
+        np.where(point, distance, straight),
+        np.where(point, line_m / np.maximum(distance, 1e-300), direction),
+        across,
+        np.where(point, 0.0, sine / away - 1.0 / straight),
+        np.where(point, 0.0, wrap),
+        clear,
+    )
+
+
+def traced(pulleys: Pulleys | None, leg: int, line_m: Floats, points: int = 12) -> Floats:
+    """One wire from its exit point on, as a line for pictures: ``(p, 3)`` m from the exit point.
+
+    Parameters
+    ----------
+    pulleys : Pulleys or None
+    leg : int
+    line_m : (3,) array
+        From exit point to platform point.
+    points : int
+        On the arc.
+    """
+    if pulleys is None or not pulleys.radius_m[leg]:
+        return np.stack([np.zeros(3), line_m])
+    own = Pulleys(pulleys.radius_m[leg : leg + 1], pulleys.axis[leg : leg + 1])
+    way, rho, s = run(own, line_m[:, None, None]), own.radius_m[0], own.axis[0]
+    outward = np.cross(way.across[:, 0, 0], s)
+    turn = np.linspace(0.0, way.wrap_rad[0, 0], points)[:, None]
+    return np.vstack([rho * ((1 - np.cos(turn)) * outward + np.sin(turn) * s), line_m])
