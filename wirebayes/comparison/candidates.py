@@ -110,7 +110,22 @@ def candidates(
 def effects_of(
     candidate: Candidate, training: Experiment, known: Mapping[str, type[Effect]], seed: int
 ) -> list[Effect]:
-    """The candidate's effects; an event is put at the training hold where it has the most evidence (Laplace)."""
+    """The candidate's effects; an event is put at the training hold where it has the most evidence (Laplace).
+
+    Parameters
+    ----------
+    candidate : Candidate
+    training : Experiment
+        The training holds only, so that an event is never placed by readings that are predicted later.
+    known : mapping of name to effect class
+        The catalogue, a user's own effects included.
+    seed : int
+        Of the fits that place an event.
+
+    Returns
+    -------
+    list of Effect
+    """
     out: list[Effect] = []
     for key in candidate.effects:
         name = key.split("@")[0]
@@ -133,7 +148,20 @@ def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence
 
 
 def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Effect]) -> Problem:
-    """The candidate's posterior of an experiment."""
+    """The candidate's posterior of an experiment.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Parameters that it fixes leave the posterior.
+    training : Experiment
+    effects : sequence of Effect
+        What `effects_of` returned.
+
+    Returns
+    -------
+    Problem
+    """
     problem = build([training], effects, law=candidate.law, history=candidate.history, likelihood=candidate.likelihood)
     prior = problem.prior
     here = {name: value for name, value in candidate.fixed.items() if name in prior.names}

@@ -54,6 +54,13 @@ class Task:
 def judge(task: Task, seed: int, policy: Policy = POLICY) -> dict[str, Any]:
     """Fit one model and score it; a failure is a result too.
 
+    Parameters
+    ----------
+    task : Task
+    seed : int
+    policy : Policy
+        When a fit counts as converged; lower than that of `fit`, as a comparison samples dozens of posteriors.
+
     Returns
     -------
     dict
@@ -140,7 +147,18 @@ def run(
     policy: Policy = POLICY,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
 ) -> None:
-    """Judge all models whose file is not there yet, on all cores; the results do not depend on how many there are."""
+    """Judge all models whose file is not there yet, on all cores; the results do not depend on how many there are.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    directory : Path
+        Of the run; each task names its file within it.
+    seed : int
+    policy : Policy
+    report : callable
+        Called with a name, the number of models judged and the number of all that were missing.
+    """
     todo = [task for task in tasks if not (directory / task.file).exists()]
     for task in todo:
         (directory / task.file).parent.mkdir(parents=True, exist_ok=True)

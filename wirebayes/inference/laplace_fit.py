@@ -98,10 +98,26 @@ def fitted(
     near: Array | None = None,
     exponent: Any = 1.0,
 ) -> LaplaceFit:
-    """Fit a block from many starts, and from the parameters `near` ``(d,)``, known to be good, where given.
+    """Find the modes of the posterior of some experiments with some effects, from many starts.
 
-    What the readings depend on linearly is integrated out (`wirebayes.model.linear_amplitudes`). The `exponent` is that
-    of the creep amount's growth with length, or its prior (see `wirebayes.model.problem.build`).
+    What the readings depend on linearly is integrated out (`wirebayes.model.linear_amplitudes`).
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Samples of one material, fitted jointly.
+    effects : sequence of Effect
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+    rng : numpy.random.Generator
+    near : (d,) array, optional
+        Natural parameters known to be good: one more start.
+    exponent : float or prior
+        That of the creep amount's growth with the sample's length (see `wirebayes.model.problem.build`).
+
+    Returns
+    -------
+    LaplaceFit
     """
     target = LogPosterior(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
     extra = None if near is None else target.coordinates.to_sampled(near[None])

@@ -173,7 +173,20 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
 
 
 def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
-    """The distinct modes of a posterior, best first (see `search`)."""
+    """The distinct modes of a posterior, best first (see `search`).
+
+    Parameters
+    ----------
+    target : LogPosterior
+    rng : numpy.random.Generator
+        Draws the starts.
+    extra : (m, d) array, optional
+        Further starts, in the coordinates that are sampled.
+
+    Returns
+    -------
+    Optimum
+    """
     return search(target, rng, extra=extra).modes
 
 

@@ -18,7 +18,22 @@ _SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, b
 
 
 def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:
-    """(n, d) natural parameters from the posterior whose modes are `found`."""
+    """Posterior draws by a short run of the sampler from known modes.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    found : Optimum
+        The modes of `target`; no search is made.
+    rng : numpy.random.Generator
+    n : int
+        Number of draws, picked from the run without replacement.
+
+    Returns
+    -------
+    (n, d) array
+        Natural parameters.
+    """
     chains = sample(target, int(rng.integers(2**63)), _SHORT, found=found)
     z = chains.z.reshape(-1, chains.z.shape[-1])
     return target.coordinates.to_natural(z[rng.choice(len(z), n, replace=False)])

@@ -116,6 +116,22 @@ def threshold(n: int, quantities: int, joint: float = 0.99, *, replicates: int =
     """The value of `extremeness` that all of some quantities exceed with probability `joint`.
 
     Quantities are taken as independent, which makes the band wider than needed where they go together.
+
+    Parameters
+    ----------
+    n : int
+        Number of simulated tests, each with one rank a quantity.
+    quantities : int
+        How many the band shall hold at once.
+    joint : float
+        Probability that it holds them all if everything is calibrated.
+    replicates : int
+        Simulated sets of `n` uniform ranks that the quantile is taken from.
+    seed : int
+
+    Returns
+    -------
+    float
     """
     rng = np.random.default_rng(seed)
     tails, points = _tails(n), np.arange(len(_GRID))

@@ -49,7 +49,17 @@ class _Ridge:
     log_length: float
 
     def log_creep(self, U: Array, k2: Array, N: Array) -> Array:
-        """log G: root mean square of the elongation gained in a hold, for B = 1."""
+        """log G: root mean square of the elongation gained in a hold, for B = 1.
+
+        Parameters
+        ----------
+        U, k2, N : (n,) arrays
+            Natural parameters.
+
+        Returns
+        -------
+        (n,) array
+        """
         U = np.minimum(U, self.steepest)
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
         mean = float(self.log_tension.mean())

@@ -137,7 +137,21 @@ class Table:
         return f"line {row + 2}, column {self.header.index(column) + 1} ({column})"
 
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
-        """The error of a cell."""
+        """The error for one cell.
+
+        Parameters
+        ----------
+        row : int
+            Position among the rows of readings, from 0.
+        column : str
+        found, expected : str
+            As the message shows them: what stands there, and what should.
+
+        Returns
+        -------
+        InputError
+            With the file, the line and the column; the caller raises it.
+        """
         return InputError(f"{self.path}, {self.place(row, column)}: found {found}, expected {expected}")
 
     def cell(self, row: int, column: str) -> str:

@@ -49,7 +49,16 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a CSV with line feeds; floats in their shortest exact form, NaN as an empty cell."""
+    """Write a CSV with line feeds; floats in their shortest exact form, NaN as an empty cell.
+
+    Parameters
+    ----------
+    path : Path
+        Written whole or not at all.
+    header : sequence of str
+    rows : iterable of sequences
+        As long as the header. None is an empty cell too.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
@@ -59,7 +68,15 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
 
 
 def write_parquet(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    """Write the same table as `write_csv` as Parquet, where pyarrow is installed; otherwise nothing."""
+    """Write the same table as `write_csv` as Parquet, where pyarrow is installed; otherwise nothing.
+
+    Parameters
+    ----------
+    path : Path
+    header : sequence of str
+    rows : sequence of sequences
+        As long as the header; a column holds values of one type, or None.
+    """
     try:
         from pyarrow import BufferOutputStream, array, table
         from pyarrow.parquet import write_table
@@ -244,7 +261,20 @@ def check_run(directory: Path, configuration: Mapping[str, Any]) -> Literal["new
 
 
 def differences(found: Any, wanted: Any, key: str = "") -> list[str]:
-    """What differs between two configurations, one short phrase for each key."""
+    """What differs between two configurations, one short phrase for each key.
+
+    Parameters
+    ----------
+    found, wanted : JSON values
+        The configuration that a folder has, and the one that was requested.
+    key : str
+        Where they stand; empty for whole configurations.
+
+    Returns
+    -------
+    list of str
+        Empty where they agree.
+    """
     if isinstance(found, dict) and isinstance(wanted, dict):
         keys = [*wanted, *(name for name in found if name not in wanted)]
         parts = [

@@ -42,6 +42,19 @@ class Keys:
     kind: str = "experiment"
 
     def complain(self, key: str, found: str, expected: str) -> InputError:
+        """The error for one key of the table.
+
+        Parameters
+        ----------
+        key : str
+        found, expected : str
+            As the message shows them: what stands there, and what should.
+
+        Returns
+        -------
+        InputError
+            With the file, the line, the table and the key; the caller raises it.
+        """
         place = f"{self.source}, line {self.line(key)}"
         if self.index is not None:
             place += f", {self.kind} {_printable(self.name) or self.index + 1}"
@@ -71,6 +84,23 @@ class Keys:
     def number(
         self, key: str, expected: str, above: float = -np.inf, least: float = -np.inf, most: float = np.inf
     ) -> float:
+        """A finite number within limits.
+
+        Parameters
+        ----------
+        key : str
+        expected : str
+            What the message says is expected.
+        above : float
+            The number must be greater.
+        least, most : float
+            The number must not be less, nor more.
+
+        Raises
+        ------
+        InputError
+            If the key is missing, no number or beyond the limits.
+        """
         value = self.value(key, expected)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.complain(key, shown(value), expected)

@@ -166,9 +166,27 @@ def jacobian(line: Linearised) -> Array:
 
 
 def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> Array:
-    """(H, n) log p(readings of one hold | the readings of all others), from the inverse of V by blocks.
+    """Probability of each hold's readings given those of all other holds, from the inverse of V by blocks.
 
     The hold's displacement and duration stay: only its readings are left out.
+
+    Parameters
+    ----------
+    line : Linearised
+        The staircase, all holds included, with its derivatives.
+    readings : (H, R, n) or (H, R, 1) array
+        Tensions, N; what `mask` leaves out is ignored.
+    mask : (H, R) bool array
+        True where a reading was taken.
+    variance : (n,) array
+        Of one reading, rounding included, N² (`reading_variance`).
+    setting_sd : (n,) array
+        Standard deviation of a hold's position, mm.
+
+    Returns
+    -------
+    (H, n) array
+        Log densities; zero for an unrecorded hold, -inf where the model cannot be computed.
     """
     holds, width, n = line.tension.shape
     jac = np.moveaxis(jacobian(line), -1, 0) * mask[None, :, :, None]
@@ -195,11 +213,27 @@ def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance:
 
 
 def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array) -> Array:
-    """(H, n) log p(later readings | first reading) of every hold, each an experiment of its own (parameters as above).
+    """Probability of each hold's later readings given its first, every hold an experiment of its own.
 
     The stretched length is where the first reading puts it, found by Newton steps; the first reading carries the
     sensor's error too, so the later ones have covariance ``variance (I + a aᵀ)``, a the ratio of slopes. A hold whose
     first reading is not above zero says nothing of its length and contributes nothing.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    theta : mapping of name to (n,) array
+        ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part.
+    model : Model
+    readings : (H, R, n) or (H, R, 1) array
+        Tensions, N; what the protocol's mask leaves out is ignored.
+    variance : (n,) array
+        Of one reading, rounding included, N².
+
+    Returns
+    -------
+    (H, n) array
+        Log densities; zero for a hold with fewer than two readings.
     """
     holds, _, n = np.broadcast_shapes(readings.shape, (1, 1, len(variance)))
     out = np.zeros((holds, n))
@@ -223,9 +257,22 @@ def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array
 def hold_courses(
     protocol: Protocol, theta: Theta, model: Model, first: Array
 ) -> list[tuple[Array, Array, Array] | None]:
-    """Each hold's course from its first reading alone: tension (R, n), slope by stretched length, validity (n,).
+    """Each hold's course when its first reading alone says how far the wire is stretched.
 
-    `first` is (H, n) or (H, 1); None stands for a hold that has no reading.
+    Parameters
+    ----------
+    protocol : Protocol
+    theta : mapping of name to (n,) array
+        ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part.
+    model : Model
+    first : (H, n) or (H, 1) array
+        First reading of each hold, N.
+
+    Returns
+    -------
+    list of (tension, slope, valid) or None
+        For each hold the tensions (R, n) in N, their derivatives by the stretched length (R, n) in N/mm, and whether
+        the first reading determines a length (n,); None for a hold without readings.
     """
     n = np.shape(theta["k1"])[0]
     walk = Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)

@@ -234,9 +234,24 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
 
 
 def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:
-    """Parameters of a sample `ratio` times as long as the reference: whatever is an elongation of the wire has grown.
+    """Parameters of a sample of another length than the reference: whatever is an elongation of the wire has grown.
 
-    The creep amount grows as the ratio to the power `exponent`, an effect's elongation as the ratio itself.
+    The creep amount `B` grows as the ratio to the power `exponent`, an effect's elongation as the ratio itself.
+
+    Parameters
+    ----------
+    own : mapping of name to (n,) array
+        Parameters at the reference length.
+    effects : sequence of Effect
+        Those of the model; they say which of their amplitudes are elongations.
+    ratio : float
+        Length of the sample over the reference length.
+    exponent : float or (n,) array
+        1 where creep is a strain of the whole wire, 0 where it does not depend on the length.
+
+    Returns
+    -------
+    dict of name to array
     """
     grown = [c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_elongation]
     return {**own, "B": own["B"] * ratio**exponent, **{name: own[name] * ratio for name in grown}}
@@ -250,7 +265,20 @@ def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:
 
 
 def with_protocols(problem: Problem, protocols: Sequence[Protocol], readings: Sequence[Array]) -> Problem:
-    """The same parameters on other holds, per sample."""
+    """The same parameters on other holds, per sample.
+
+    Parameters
+    ----------
+    problem : Problem
+    protocols : sequence of Protocol
+        One a sample, in the problem's order.
+    readings : sequence of (H, R, 1) arrays
+        One a sample, padded as its protocol is, N.
+
+    Returns
+    -------
+    Problem
+    """
     return replace(
         problem,
         samples=tuple(

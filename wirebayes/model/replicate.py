@@ -16,6 +16,21 @@ def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Gene
     """(H, R, n) simulated readings of one sample, one replicate a row of `theta` (n, d).
 
     Hold by hold, each replicate starts from the measured first reading, which stays as it is.
+
+    Parameters
+    ----------
+    problem : Problem
+        Says which likelihood holds and which column is which parameter.
+    theta : (n, d) array
+        Parameters, for instance draws of a posterior.
+    sample : Sample
+        The test that is repeated: its protocol, its model and its resolution.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (H, R, n) array
+        Tensions, N, rounded to the sample's resolution; entries outside the protocol's mask mean nothing.
     """
     own = problem.parameters(theta, sample)
     protocol, n = sample.protocol, len(theta)

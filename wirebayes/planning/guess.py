@@ -51,6 +51,24 @@ def from_tables(
     ------
     InputError
         A table is no distribution.
+
+    Parameters
+    ----------
+    tables : mapping of parameter to value
+        A number fixes a parameter; a table names its distribution (see `wirebayes.model.prior.from_table`).
+    lines : mapping of parameter to int
+        Where each stands in the file, for messages.
+    source : Path
+        The plan file, for messages.
+    length_mm : float
+        Length of the sample that the guess speaks of: priors of `B` depend on it.
+    n : int
+        Number of draws.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    GuessedWire
     """
     defaults = wire_defaults(length_mm)
     out = {}
@@ -67,7 +85,23 @@ def from_tables(
 
 
 def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n: int) -> GuessedWire:
-    """Some of a posterior's draws, evenly spaced."""
+    """Some of a posterior's draws, evenly spaced.
+
+    Parameters
+    ----------
+    draws : mapping of name to (m,) array
+        Of all parameters of the wire and the bench.
+    length_mm : float
+        Length of the sample that was fitted.
+    source : str
+        What the guess rests on, for people.
+    n : int
+        How many draws; all of them where there are fewer.
+
+    Returns
+    -------
+    GuessedWire
+    """
     count = len(draws["k1"])
     pick = np.linspace(0, count - 1, min(n, count)).round().astype(int)
     return GuessedWire({name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}, length_mm, source)
@@ -76,7 +110,21 @@ def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n:
 def from_readings(
     experiment: Experiment, n: int, rng: np.random.Generator, law: ElasticLaw, history: History
 ) -> GuessedWire:
-    """A short run of the sampler on what was measured."""
+    """The posterior of what was measured, by a short run of the sampler.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    n : int
+        Number of draws.
+    rng : numpy.random.Generator
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+
+    Returns
+    -------
+    GuessedWire
+    """
     block = fitted([experiment], (), law, history, rng)
     theta = rough_draws(block.target, block.modes, rng, n)
     own = block.target.problem.parameters(theta, block.target.problem.samples[0])

@@ -42,7 +42,21 @@ class Judged:
 
 
 def ranked(tests: Sequence[Judged], aim: Sequence[str], budget_min: float | None) -> list[Judged]:
-    """The tests within the budget, best first, then the others, best first."""
+    """The tests within the budget, best first, then the others, best first.
+
+    Parameters
+    ----------
+    tests : sequence of Judged
+    aim : sequence of str
+        ``("parameters",)``, ``("creep",)``, or the names of two effects to be distinguished; it decides the score.
+    budget_min : float or None
+        Longest test that is possible, minutes; None sets no limit.
+
+    Returns
+    -------
+    list of Judged
+        Among equal scores the shorter test comes first.
+    """
 
     def order(judged: Judged) -> tuple[bool, float, float]:
         return too_long(judged, budget_min), -judged.score(aim), judged.duration_min

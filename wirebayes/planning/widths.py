@@ -98,7 +98,20 @@ def central(guess: Guess) -> dict[str, float]:
 
 
 def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History) -> Experiment:
-    """The test with the readings that the guess's centre gives without errors."""
+    """The test with the readings that the guess's centre gives without errors.
+
+    Parameters
+    ----------
+    test : Experiment
+        The planned test; the readings that it holds are replaced.
+    guess : Guess
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+
+    Returns
+    -------
+    Experiment
+    """
     problem = build([test], law=law, history=history)
     (sample,) = problem.samples
     tension = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]

@@ -160,7 +160,21 @@ def log_mean(log_p: Array, log_p_weighted: Array) -> float:
 
 
 def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
-    """The problem that does not see the readings of one hold (a row of a sample's protocol)."""
+    """The problem that does not see the readings of one hold.
+
+    Parameters
+    ----------
+    problem : Problem
+    sample : int
+        Position among the problem's samples.
+    hold : int
+        Row of the sample's protocol; unrecorded holds count.
+
+    Returns
+    -------
+    Problem
+        Displacement and duration of the hold stay, so the wire creeps there all the same.
+    """
     here = problem.samples[sample]
     mask = here.protocol.mask.copy()
     mask[hold] = False

@@ -87,9 +87,27 @@ def _readings(
 
 
 def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: np.random.Generator) -> Array:
-    """(H, R, n) readings without sensor error, of trained holds as replicates.
+    """Readings without sensor error along the chain of holds; trained holds appear as replicates.
 
-    An unknown discrepancy is an effect among the others here: its draws were made given the training readings.
+    A replicate has a setting error of its own, while the creep carried on from a trained hold is the one that its
+    readings imply. An unknown discrepancy is an effect among the others here: its draws were made given the training
+    readings.
+
+    Parameters
+    ----------
+    own : mapping of name to (n,) array
+        Posterior draws of the sample's parameters.
+    sample : Sample
+        What was trained on.
+    question : PredictionRequest
+        The protocol, trained holds first, and which of its holds are to be predicted.
+    rng : numpy.random.Generator
+        Draws the setting errors.
+
+    Returns
+    -------
+    (H, R, n) array
+        Tensions of all holds of the protocol, N.
     """
     protocol, trained = question.protocol, question.trained
     n = len(own["k1"])
@@ -114,7 +132,20 @@ def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: n
 
 
 def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator) -> Array:
-    """(H, n) a draw of the setting errors of a sample's holds, unrecorded ones included, given all its readings."""
+    """A draw of the setting errors of a sample's holds, unrecorded ones included, given all its readings.
+
+    Parameters
+    ----------
+    own : mapping of name to (n,) array
+        Posterior draws of the sample's parameters.
+    sample : Sample
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (H, n) array
+        mm; one draw of all holds for each draw of the parameters.
+    """
     line = linearise(sample.protocol, own, sample.model)
     variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
     holds, _, n = line.tension.shape

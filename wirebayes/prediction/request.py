@@ -66,7 +66,26 @@ def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Protoco
 
 
 def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
-    """Check the table of a protocol against what was trained on, as `read_question` does."""
+    """Check the table of a protocol against what was trained on.
+
+    Parameters
+    ----------
+    table : Table
+        Rows of the protocol file, or of arrays given in its place.
+    stored : Stored
+        The posterior.
+    fresh : bool
+        The table is the whole history of another sample (see `read_question`).
+
+    Returns
+    -------
+    ProtocolRequest
+
+    Raises
+    ------
+    InputError
+        With the line, column, what was found and what was expected.
+    """
     trained = stored.sample.protocol
     file = _File(table, protocol_holds(table, trained.length_mm))
     file.check_temperature(trained.reference_C is not None)
@@ -134,6 +153,16 @@ class _File:
     holds: tuple[Hold, ...]
 
     def complain(self, hold: int, reading: int, column: str, found: str, expected: str) -> InputError:
+        """The error for one cell of the file.
+
+        Parameters
+        ----------
+        hold, reading : int
+            Positions of the hold in the file and of the reading in its hold.
+        column : str
+        found, expected : str
+            As the message shows them.
+        """
         row = sum(len(h.time_s) for h in self.holds[:hold]) + reading
         return self.table.complain(row, column, found, expected)
 

@@ -57,6 +57,18 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
 
     As a chain the training readings fix the creep carried in, the displacements say the rest; hold by hold each hold
     is given its own first reading, which is then not predicted.
+
+    Parameters
+    ----------
+    stored : Stored
+        Posterior of the first holds.
+    experiment : Experiment
+        All holds.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    HeldOut
     """
     protocol, measured = experiment.protocol(), experiment.tension()
     trained = len(stored.sample.protocol.displacement_mm)
@@ -72,7 +84,22 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
 
 
 def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator) -> Array:
-    """(len(time_s), n) predicted readings of the last hold given its first reading, hold by hold."""
+    """Predicted readings of the last hold given its first reading, hold by hold.
+
+    Parameters
+    ----------
+    stored : Stored
+        Posterior that has not seen the hold.
+    experiment : Experiment
+    time_s : (t,) array
+        Times since the hold began; they need not be those of the readings.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (t, n) array
+        N.
+    """
     protocol, first = _last_alone(experiment, time_s)
     question = PredictionRequest(protocol, 0, np.array([True]), first)
     drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, question, rng)[0]
@@ -80,7 +107,21 @@ def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng:
 
 
 def published_course(published: dict[str, float], experiment: Experiment, time_s: Array) -> Array:
-    """(len(time_s),) the paper's curve of the last hold."""
+    """The paper's curve of the last hold.
+
+    Parameters
+    ----------
+    published : dict of name to float
+        A row of the paper's Table 4: ``k1 B U k2 N``.
+    experiment : Experiment
+        Its first reading of that hold fixes the stretched length.
+    time_s : (t,) array
+
+    Returns
+    -------
+    (t,) array
+        N.
+    """
     protocol, first = _last_alone(experiment, time_s)
     theta = {name: np.array([value]) for name, value in published.items()}
     course = hold_courses(protocol, theta, Model(), first[:, None])[0]

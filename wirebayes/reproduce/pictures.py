@@ -33,7 +33,19 @@ class Gallery:
         self.index: list[dict[str, str]] = []
 
     def add(self, section: str, name: str, figure: Figure, alt: str, caption: str = "") -> None:
-        """Write one picture and what it says."""
+        """Write one picture and its entry in the index.
+
+        Parameters
+        ----------
+        section : str
+            Part of the page that shows it; the file's name begins with it.
+        name : str
+            Unique within the section.
+        figure : matplotlib.figure.Figure
+        alt : str
+            What the picture shows, for those who cannot see it.
+        caption : str
+        """
         file = f"{section}-{name}.svg"
         write_bytes(self.folder / file, svg(figure))
         self.index.append({"section": section, "file": file, "alt": alt, "caption": caption})
@@ -55,7 +67,17 @@ class Gallery:
         self.add("known", e.name, paper_figures.intervals(rows, e.name), alt)
 
     def last_hold(self, e: Experiment, published: dict[str, float], first: Stored, rng: np.random.Generator) -> None:
-        """One of the paper's figures."""
+        """The paper's figures 1 to 4: the last hold of a wire, with the paper's curve and the predicted band.
+
+        Parameters
+        ----------
+        e : Experiment
+        published : dict of name to float
+            The wire's row of Table 4.
+        first : Stored
+            Posterior of the first holds, hold by hold.
+        rng : numpy.random.Generator
+        """
         hold = e.recorded_holds[-1]
         times = np.linspace(0.0, hold.duration_s, 49)
         drawn, curve = last_hold_course(first, e, times, rng), published_course(published, e, times)
@@ -67,7 +89,15 @@ class Gallery:
         self.add("figures-1-to-4", e.name, figure, alt, caption)
 
     def unused_holds(self, e: Experiment, published: dict[str, float], seen: Mapping[str, HeldOut]) -> None:
-        """All unused holds, hold by hold and as one chain."""
+        """All unused holds, hold by hold and as one chain.
+
+        Parameters
+        ----------
+        e : Experiment
+        published : dict of name to float
+            The wire's row of Table 4; its curve is drawn hold by hold.
+        seen : mapping of likelihood to HeldOut
+        """
         for likelihood, out in seen.items():
             spoken = figures.WORDS[likelihood]
             curve = _published_at(e, published, out) if likelihood == "hold" else None
@@ -78,7 +108,16 @@ class Gallery:
             self.add(f"unused-{likelihood}", e.name, figure, alt, caption)
 
     def ridges(self, e: Experiment, published: Mapping[str, float], full: Mapping[str, Stored]) -> None:
-        """What hold by hold cannot tell apart: stiffness and amount, amount and rate."""
+        """What hold by hold cannot tell apart: stiffness and amount, amount and rate.
+
+        Parameters
+        ----------
+        e : Experiment
+        published : mapping of name to float
+            The wire's row of Table 4, marked in the pictures.
+        full : mapping of likelihood to Stored
+            Posteriors of all holds, ``hold`` and ``chain``.
+        """
         draws = {kind: {k: some(v) for k, v in full[kind].draws.items()} for kind in ("hold", "chain")}
         mark = (published["k1"], published["B"])
         k1, B, k2 = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B", "k2"))

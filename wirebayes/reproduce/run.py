@@ -72,7 +72,20 @@ def reproduce(
 
 
 def configuration(experiments: Sequence[Experiment], seed: int, policy: Policy) -> dict[str, Any]:
-    """Everything that decides the results."""
+    """Everything that decides the results.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        The paper's; their content counts, as a hash.
+    seed : int
+    policy : Policy
+
+    Returns
+    -------
+    dict
+        What ``configuration.json`` holds: another one is refused in the same folder.
+    """
     return {
         "command": "reproduce",
         "version": __version__,
@@ -221,7 +234,16 @@ def _sampling_row(directory: Path, name: str, likelihood: str, suffix: str) -> R
 
 
 def write_table(directory: Path, name: str, rows: Sequence[Row]) -> None:
-    """The same rows as CSV and JSON."""
+    """The same rows as CSV and JSON.
+
+    Parameters
+    ----------
+    directory : Path
+    name : str
+        Of both files, without its ending.
+    rows : sequence of dict
+        All with the keys of the first, which make the header; at least one.
+    """
     header = list(rows[0])
     write_csv(directory / f"{name}.csv", header, ([row[key] for key in header] for row in rows))
     write_json(directory / f"{name}.json", list(rows))

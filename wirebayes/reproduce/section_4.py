@@ -88,7 +88,16 @@ def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
 
 
 def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) -> None:
-    """The robot with its drift, the drift of every wire against time, and whose uncertainty makes it uncertain."""
+    """The robot with its drift, the drift of every wire against time, and whose uncertainty makes it uncertain.
+
+    Parameters
+    ----------
+    gallery : Gallery
+    chains : mapping of wire to Stored
+        Posteriors of all holds.
+    limit_mm : float
+        The paper's claim, drawn as a line.
+    """
     robot = schema.read(MAPPED)
     x, R = robot.home_m, matrix(robot.home_rotation_rad)
     moved: dict[str, NDArray[np.float64]] = {}
@@ -112,7 +121,16 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
 
 
 def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
-    """One picture a robot."""
+    """One picture a robot.
+
+    Parameters
+    ----------
+    gallery : Gallery
+    told : sequence of rows
+        Those of ``robot_claim.csv``.
+    limit_mm : float
+        The paper's claim, drawn as a line.
+    """
     for name in ROBOTS:
         mine = [row for row in told if row["robot"] == name]
         best = max(row["probability"] for row in mine if not row["loaded_before_s"])

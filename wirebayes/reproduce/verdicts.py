@@ -22,7 +22,20 @@ PRODUCT = "k1*B"  # the only combination that one hold alone determines
 
 
 def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict:
-    """The word for a published value."""
+    """The word for a published value.
+
+    Parameters
+    ----------
+    published : float
+    low, high : float
+        Ends of the posterior's 90 % interval.
+    shrunk : float
+        The contraction: share by which the prior's interval shrank.
+
+    Returns
+    -------
+    {"inside", "outside", "not determined"}
+    """
     if shrunk < LEAST_CONTRACTION:
         return "not determined"
     return "inside" if low <= published <= high else "outside"
@@ -77,7 +90,26 @@ def creep_rows(
     tension_N: float,
     length_mm: float,
 ) -> list[dict[str, Any]]:
-    """Creep elongation at a tension after 2 min, 1 h and 1 day: published parameters beside the posterior."""
+    """Creep elongation at a tension after 2 min, 1 h and 1 day: published parameters beside the posterior.
+
+    Parameters
+    ----------
+    experiment, likelihood : str
+        Written into every row.
+    draws : mapping of name to (n,) array
+        Of the posterior.
+    published : mapping of name to float
+        The wire's row of Table 4.
+    tension_N : float
+        The constant tension of a fresh sample.
+    length_mm : float
+        Its length.
+
+    Returns
+    -------
+    list of dict
+        One a time, with the median and the ends of the 90 % interval.
+    """
     times = np.array(list(CREEP_TIMES_S.values()))
     table = {name: np.array([value]) for name, value in published.items()}
     ours, theirs = (FreshSample(theta, Model(), length_mm).creep_mm(tension_N, times) for theta in (draws, table))

@@ -63,9 +63,22 @@ def run(
     policy: Policy = DEFAULT,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
 ) -> None:
-    """Do all fits of which a folder has no ``summary.json`` yet; the results do not depend on how many cores there are.
+    """Do all fits that are not in the directory yet, on all cores.
 
-    A fit cut off leaves a checkpoint in its folder, from which the next call goes on to the same bytes.
+    A fit is done when each of its folders has a ``summary.json``. One that was cut off leaves a checkpoint in its
+    folder, from which the next call goes on to the same bytes. The results do not depend on how many cores there are.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    directory : Path
+        Of the run; jobs name their folders within it.
+    seed : int
+        Of the run; each fit derives its own from it and the name of its folder.
+    policy : Policy
+        When a fit counts as converged and when it gives up.
+    report : callable
+        Called with a name, what is done, and the total: the share of one fit that runs alone, or the number of fits.
     """
     todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
     if len(todo) == 1 or cores() == 1:
@@ -81,7 +94,19 @@ def run(
 def one(
     job: Job, directory: Path, seed: int, policy: Policy, progress: Callable[[float], None] = lambda share: None
 ) -> None:
-    """Do one fit and store it."""
+    """Do one fit and store it.
+
+    Parameters
+    ----------
+    job : Job
+    directory : Path
+        Of the run; the job's folders are made in it.
+    seed : int
+        Of the run; the fit's own follows from it and the name of the job's folder.
+    policy : Policy
+    progress : callable
+        Called with the share of the work that is done, from 0 to 1.
+    """
     from wirebayes.results.store import save  # xarray takes a second to load; not every user of jobs stores
 
     folder = directory / job.folder

@@ -127,6 +127,14 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     ------
     InputError
         If a parameter is unknown or impossible.
+
+    Parameters
+    ----------
+    benches : sequence of Bench
+        What was done to each sample. Samples of one material share their wire.
+    truth : Truth
+        The wire. Parameters that it leaves open are drawn from the prior.
+    seed : int or numpy.random.SeedSequence
     """
     rng = np.random.default_rng(seed)
     problem = build([bench.experiment() for bench in benches], truth.effects, law=truth.law, history=truth.history)

@@ -12,7 +12,21 @@ _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 
 
 def bent(effects: Placed, strain: Array, hold: HoldContext) -> tuple[Array, Array]:
-    """Effective strain, and its slope by the strain (a complex step)."""
+    """Effective strain, and its slope by the strain (a complex step).
+
+    Parameters
+    ----------
+    effects : Placed
+        Those at ``strain`` take part.
+    strain : array
+        Geometric strain, as `laws.strain` gives it.
+    hold : HoldContext
+
+    Returns
+    -------
+    effective, slope : arrays of the shape of `strain`
+        k1 times the effective strain is the tension.
+    """
     if "strain" not in effects.at:
         return strain, np.ones_like(strain)
     value = effects.change("strain", strain + 1j * _STEP, hold)
@@ -20,7 +34,19 @@ def bent(effects: Placed, strain: Array, hold: HoldContext) -> tuple[Array, Arra
 
 
 def strain_of(effects: Placed, effective: Array, hold: HoldContext) -> Array:
-    """Strain that has an effective strain, by Newton's steps; NaN where none has."""
+    """Strain that has an effective strain, by Newton's steps; NaN where none has.
+
+    Parameters
+    ----------
+    effects : Placed
+    effective : array
+        Tension over k1.
+    hold : HoldContext
+
+    Returns
+    -------
+    array of the shape of `effective`
+    """
     strain = effective
     if "strain" in effects.at:
         for _ in range(50):

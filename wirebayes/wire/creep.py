@@ -60,7 +60,20 @@ class Creep:
         }
 
     def elongation(self, creep_mm: Array, beside: Mapping[str, Array], hold: HoldContext) -> Array:
-        """Growth of the zero-tension length over the length before the test, mm."""
+        """Growth of the zero-tension length over the length before the test, mm.
+
+        Parameters
+        ----------
+        creep_mm : (R, n) array
+            What `creep` returned.
+        beside : mapping of effect key to (R, n) array
+            What `beside` returned.
+        hold : HoldContext
+
+        Returns
+        -------
+        (R, n) array
+        """
         total = sum(beside.values(), creep_mm)
         if "zero_length" in self.effects.at:  # a difference of lengths would cost the others some digits
             total = self.effects.change("zero_length", hold.length_mm + total, hold) - hold.length_mm

@@ -125,7 +125,27 @@ class Effect:
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
-        """The changed value; `own` holds this effect's amplitudes by their short names, each ``(n,)``."""
+        """The quantity at the effect's place, changed by the effect.
+
+        Parameters
+        ----------
+        value : array
+            The quantity before this effect, in the unit of its `Place`. Its last axis is the batch ``n`` (or one, where
+            all draws share the value); the axis before it, where there is one, runs over the times of the hold. It may
+            be complex, because derivatives are taken by a complex step: compare ``value.real`` and let the imaginary
+            part through. At ``sample`` it is the dictionary of all parameters.
+        own : dict of name to (n,) array
+            The effect's amplitudes by their short names (``own["p"]``, not ``own["my_effect.p"]``).
+        hold : HoldContext
+            The hold that is being computed and what came before it; not to be changed.
+
+        Returns
+        -------
+        array
+            A new one, of a shape that broadcasts with `value`. Where the amplitudes are neutral it equals `value` to
+            the last bit. At ``elongation`` the value is what was carried into the hold, and what is returned is the
+            course over its times.
+        """
         raise NotImplementedError
 
     @property
@@ -170,7 +190,20 @@ class Placed:
         self.own = {e.key: {a.name: theta[c] for a, c in zip(e.amplitudes, e.columns(), strict=True)} for e in effects}
 
     def change(self, place: Place, value: Any, hold: HoldContext) -> Any:
-        """A quantity after all effects at its place."""
+        """A quantity after all effects at its place.
+
+        Parameters
+        ----------
+        place : Place
+        value : array, or dict at ``sample``
+            The quantity as the plain model has it.
+        hold : HoldContext
+
+        Returns
+        -------
+        array, or dict at ``sample``
+            `value` itself where no effect is at the place.
+        """
         for effect in self.at.get(place, ()):
             value = effect.apply(value, self.own[effect.key], hold)
         return value

@@ -17,6 +17,20 @@ def strain(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke
     """Strain whose product with k1 is the tension: eq (1) ``L/L0 - 1``, eq (3) ``1 - L0/L``.
 
     Negative when slack; the caller clips the tension, so that the slope stays available.
+
+    Parameters
+    ----------
+    stretched_mm : array
+        Distance between the wire's ends, L.
+    zero_tension_mm : array
+        Length under no tension, L0, creep included.
+    law : {"hooke", "modified"}
+        Eq (1) or eq (3).
+
+    Returns
+    -------
+    array
+        The broadcast of both; real or complex.
     """
     if law == "hooke":
         return stretched_mm / zero_tension_mm - 1.0
@@ -24,7 +38,17 @@ def strain(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke
 
 
 def strain_slopes(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> tuple[Array, Array]:
-    """Derivatives of `strain` by stretched and by zero-tension length, 1/mm."""
+    """Derivatives of `strain` by stretched and by zero-tension length, 1/mm.
+
+    Parameters
+    ----------
+    stretched_mm, zero_tension_mm : array
+    law : {"hooke", "modified"}
+
+    Returns
+    -------
+    by_stretched, by_zero_tension : array
+    """
     if law == "hooke":
         by_stretched = 1.0 / zero_tension_mm
         return by_stretched, -stretched_mm * by_stretched * by_stretched
@@ -33,11 +57,40 @@ def strain_slopes(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw =
 
 
 def creep_target(tension_N: Array, B: Array, U: Array) -> Array:
-    """Final creep elongation at a tension, eqs (2) and (4), mm; zero when slack."""
+    """Final creep elongation at a tension, eqs (2) and (4), mm; zero when slack.
+
+    Parameters
+    ----------
+    tension_N : array
+    B : array
+        Final creep elongation at 1 N, mm N^-U.
+    U : array
+        Exponent of the tension.
+
+    Returns
+    -------
+    array
+        The broadcast of all three.
+    """
     taut = tension_N > 0
     return np.where(taut, B * np.power(np.where(taut, tension_N, 1.0), U), 0.0)
 
 
 def creep_fraction(time_s: Array, k2: Array, N: Array) -> Array:
-    """Share of the creep reached after a time, eq (5): ``1 - exp(-k2 t^N)``."""
+    """Share of the creep reached after a time, eq (5): ``1 - exp(-k2 t^N)``.
+
+    Parameters
+    ----------
+    time_s : array
+        Since the hold began.
+    k2 : array
+        Rate, s^-N.
+    N : array
+        Exponent of time: 1 is an exponential, less a stretched one.
+
+    Returns
+    -------
+    array
+        From 0 to 1, the broadcast of all three.
+    """
     return -np.expm1(-k2 * np.power(time_s, N))

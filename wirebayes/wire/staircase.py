@@ -103,10 +103,21 @@ def simulate(
 
 
 def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linearised:
-    """Readings with their derivatives by setting error and carried creep (parameters as in `simulate`).
+    """Readings with their derivatives by setting error and carried creep.
 
     Without effects the derivatives are in closed form; with effects they come from a complex step through the same
     code that computes the readings. What effects carry beside the creep is held at its nominal value in them.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    theta : mapping of name to (n,) array
+        ``k1 B U k2 N preload`` and ``effect_name.parameter`` of every effect of the model.
+    model : Model
+
+    Returns
+    -------
+    Linearised
     """
     n = np.shape(theta["k1"])[0]
     holds, width = protocol.time_s.shape
@@ -168,7 +179,27 @@ class Walk:
     def hold(
         self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
     ) -> tuple[NDArray[Any], NDArray[Any], dict[str, NDArray[Any]]]:
-        """Readings (R, n), creep carried out (n,), other elongations carried out; real or complex."""
+        """One hold, effects included; real or complex.
+
+        Parameters
+        ----------
+        j : int
+            Its position among all holds. Holds are walked in order: effects may look at earlier ones.
+        stretched : (n,) array
+            Stretched length, setting error included, mm.
+        creep : (n,) array
+            Creep elongation carried in, mm.
+        beside : dict of effect key to (1, n) array
+            Elongations beside the creep carried in, mm; empty at the start.
+
+        Returns
+        -------
+        readings : (R, n) array
+            N.
+        creep : (n,) array
+        beside : dict of effect key to (1, n) array
+            Both carried out.
+        """
         hold, law = self._context(j), self.creep
         position = self.change("position", stretched[None], hold)
         hold.carried = creep[None]
@@ -190,7 +221,22 @@ class Walk:
         return readings, grown[last], {key: course[last][None] for key, course in courses.items()}
 
     def fresh(self, j: int, stretched: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Some readings (r, n) of a hold without a past, and their derivatives by the stretched length."""
+        """Some readings of a hold without a past, and their derivatives by the stretched length.
+
+        Parameters
+        ----------
+        j : int
+            Position of the hold.
+        stretched : (n,) array
+            Stretched length, mm.
+        rows : slice
+            Which of its readings; all when left out.
+
+        Returns
+        -------
+        tension, slope : (r, n) arrays
+            N and N/mm.
+        """
         self.past = []
         uncrept = np.zeros(len(stretched))
         if not self.model.effects:
@@ -204,8 +250,23 @@ class Walk:
     ) -> tuple[NDArray[Any], ...]:
         """A hold without effects, eqs (4)-(6) differentiated by hand.
 
-        Some of the readings (r, n) with their derivatives by setting error and carried creep, and the creep carried out
-        (n,) with the same two.
+        Parameters
+        ----------
+        j : int
+            Position of the hold.
+        stretched : (n,) array
+            Stretched length, mm.
+        creep : (n,) array
+            Creep elongation carried in, mm.
+        rows : slice
+            Which of its readings; all when left out.
+
+        Returns
+        -------
+        tension, by_setting, by_creep : (r, n) arrays
+            Readings, N, and their derivatives by the setting error and by the carried creep, N/mm.
+        carried, carry_by_setting, carry_by_creep : (n,) arrays
+            Creep carried out, mm, and its derivatives by the same two.
         """
         law, length, k1 = self.model.law, self.protocol.length_mm, self.k1
         zero = length + creep

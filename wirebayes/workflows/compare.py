@@ -136,7 +136,24 @@ def plan(
     seed: int,
     policy: Policy | None = None,
 ) -> Plan:
-    """Check what `compare` is given."""
+    """Check what `compare` is given.
+
+    Parameters
+    ----------
+    source, experiment, train_holds, elastic_law, history, likelihood, only, own_effects, seed
+        As for `wirebayes.compare`.
+    policy : Policy, optional
+        Another one than that of every comparison, for tests and studies.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        If an option, an experiment, its priors or the name of a model is not usable.
+    """
     for option, value, choices in (
         ("elastic_law", elastic_law, get_args(ElasticLaw)),
         ("history", history, get_args(History)),
@@ -174,7 +191,20 @@ def plan(
 
 
 def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) -> Comparison:
-    """Fit and judge all models of a plan."""
+    """Fit and judge all models of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+    output : path, optional
+        Folder of the results; a temporary one when left out. Models judged there already are not judged again.
+    progress : callable or None
+        Called with a name, what is done and the total.
+
+    Returns
+    -------
+    Comparison
+    """
     place = Place.at(output)
     opened = open_run(place.path, plan.configuration)
     if opened.state == "done":

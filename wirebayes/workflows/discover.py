@@ -129,7 +129,17 @@ def discover(
 
 
 def write_findings(found: search.Findings, output: Path, own_effects: Path | None) -> None:
-    """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes."""
+    """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes.
+
+    Parameters
+    ----------
+    found : Findings
+        Of the search; its report gains the amplitudes.
+    output : Path
+        Folder of the results, which holds the fits already.
+    own_effects : Path or None
+        File of a user's own effects.
+    """
     _mixtures(found, output)
     _pictures(found, output, own_effects)
     _posterior_amplitudes(found, output)
@@ -137,7 +147,22 @@ def write_findings(found: search.Findings, output: Path, own_effects: Path | Non
 
 
 def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
-    """Plain fit of every experiment, and the final ones."""
+    """Plain fit of every experiment, and the final ones.
+
+    Parameters
+    ----------
+    found : Findings
+        Of the search.
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+    own_effects : Path or None
+        File of a user's own effects, which the workers load again.
+
+    Returns
+    -------
+    list of Job
+        Where the findings are ambiguous, one for each effect that could be the missing one.
+    """
     models = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
     models += [("final", model) for model in final_models(found)]
     models += [(f"final/{_OTHERS}/{k}", m) for k, m in _others(found)]

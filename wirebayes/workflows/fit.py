@@ -153,7 +153,24 @@ def fit(
 def fits_in(
     place: Place, folders: Sequence[str], own_effects: Path | None = None, *, computed: bool = False
 ) -> Posterior | Posteriors:
-    """What `fit` returns of a folder that holds these fits."""
+    """What `fit` returns of a folder that holds these fits.
+
+    Parameters
+    ----------
+    place : Place
+        The folder.
+    folders : sequence of str
+        Names of the fits within it.
+    own_effects : Path, optional
+        File of a user's own effects.
+    computed : bool
+        True where they were computed now, not found done.
+
+    Returns
+    -------
+    Posterior or Posteriors
+        The first where there is one fit.
+    """
     alone = len(folders) == 1
     members = {name: Posterior(place, own_effects, computed, name, name, alone) for name in folders}
     return next(iter(members.values())) if alone else Posteriors(place, own_effects, computed, members)

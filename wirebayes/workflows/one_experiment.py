@@ -75,7 +75,20 @@ class Done:
 
 
 def packed(experiment: Experiment, file: str, task: Task) -> bytes:
-    """A piece of work for `do`."""
+    """A piece of work for `do`.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    file : str
+        Where it was read, for the table.
+    task : Task
+        What to do with it.
+
+    Returns
+    -------
+    bytes
+    """
     return pickle.dumps((experiment, file, task))
 
 

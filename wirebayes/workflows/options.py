@@ -18,7 +18,14 @@ Numbers = str | Sequence[float]  # text is what the command line was given: it s
 
 
 def silent(name: str, done: float, total: float) -> None:
-    """Nobody watches the progress."""
+    """Nobody watches the progress.
+
+    Parameters
+    ----------
+    name : str
+    done, total : float
+        What a progress function is called with.
+    """
 
 
 def path_of(value: PathLike | None) -> Path | None:
@@ -66,7 +73,21 @@ def check_train_holds(holds: int | None) -> int | None:
 
 
 def check_choice(option: str, value: str, known: Sequence[str]) -> None:
-    """Refuse a value that an option does not have."""
+    """Refuse a value that an option does not have.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    value : str
+    known : sequence of str
+        The values that it may have.
+
+    Raises
+    ------
+    InputError
+        With the nearest known value as a hint.
+    """
     if value not in known:
         hint = nearest(value, known) if isinstance(value, str) else ""
         raise InputError(f"{option}: found {value!r}{hint}, expected {' or '.join(known)}")
@@ -80,7 +101,23 @@ def text_of(values: Numbers) -> str:
 
 
 def numbers(option: str, values: Numbers, count: int | None = None) -> Any:
-    """Finite numbers, `count` of them where it is given; text has commas between them."""
+    """Finite numbers, `count` of them where it is given; text has commas between them.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    values : str, number or sequence of numbers
+    count : int, optional
+
+    Returns
+    -------
+    (count,) array
+
+    Raises
+    ------
+    InputError
+    """
     text = text_of(values)
     try:
         found = np.array([float(word) for word in text.split(",")])

@@ -107,6 +107,26 @@ def stored_posteriors(
     """Draws and models of one experiment with their probabilities, from what `predict` is given.
 
     More than one where `discover` left undecided which effects are missing.
+
+    Parameters
+    ----------
+    posterior : path, Posterior, Posteriors or Findings
+        A folder that `fit` or `discover` wrote, or what they returned.
+    experiment : str, optional
+        May be left out where there is one.
+    model : {"plain", "final"}, optional
+        Of what `discover` found; final when left out.
+    own_effects : Path, optional
+        File of a user's own effects, for a folder.
+
+    Returns
+    -------
+    list of (probability, Stored)
+
+    Raises
+    ------
+    InputError
+        If there is no such posterior, or several to choose from.
     """
     if isinstance(posterior, str | os.PathLike):
         name, folder = find_posterior(Path(posterior), experiment, model)
@@ -134,12 +154,28 @@ def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Poste
 
 
 def find_posterior(folder: Path, experiment: str | None = None, model: str | None = None) -> tuple[str, Path]:
-    """An experiment's name and the folder of its posterior, in one of fit or discover or in that folder itself.
+    """Find the posterior of one experiment in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        What `fit` or `discover` wrote, or the folder of one posterior itself.
+    experiment : str, optional
+        May be left out where there is one.
+    model : {"plain", "final"}, optional
+        Of what `discover` found; final when left out.
+
+    Returns
+    -------
+    name : str
+        Of the experiment.
+    folder : Path
+        The one that holds ``posterior.nc``.
 
     Raises
     ------
     InputError
-        When there is none, several to choose from, or not the one asked for.
+        If there is none, several to choose from, or not the one requested.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")

@@ -764,7 +764,21 @@ def cautions(summary: dict[str, Any]) -> list[str]:
 
 
 def html_table(title: str, header: list[str], rows: list[list[str]], notes: tuple[str, ...] = ()) -> str:
-    """A small table for notebooks."""
+    """A small table for notebooks.
+
+    Parameters
+    ----------
+    title : str
+    header : list of str
+    rows : list of list of str
+        As long as the header. All text is escaped.
+    notes : tuple of str
+        Paragraphs below the table.
+
+    Returns
+    -------
+    str
+    """
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     below = "".join(f"<p>{escape(note)}</p>" for note in notes)

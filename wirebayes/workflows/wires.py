@@ -72,7 +72,28 @@ def folder_of(wires: Wires, experiment: str | None = None) -> Path:
 
 
 def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
-    """Draws of a fitted line as the robot takes them, from what a robot's function is given."""
+    """Draws of a fitted line in the form that the robot takes.
+
+    Parameters
+    ----------
+    wires : path, Posterior, Posteriors or Findings
+        A folder with a ``posterior.nc``, or what `fit` or `discover` returned.
+    count : int
+        Largest number of draws.
+    experiment : str, optional
+        May be left out where there is one.
+    own_effects : Path, optional
+        File of a user's own effects, for a folder.
+
+    Returns
+    -------
+    WireDraws
+
+    Raises
+    ------
+    InputError
+        If there is no posterior, or its model cannot be used on a robot.
+    """
     if isinstance(wires, Posteriors | Findings):
         wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)
     if isinstance(wires, Posterior):
@@ -81,7 +102,28 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
 
 
 def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
-    """Draws of a fitted line as the robot takes them, evenly thinned; an `InputError` names what is wrong."""
+    """Draws of a fitted line, read from a folder and evenly thinned.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds a ``posterior.nc``.
+    count : int
+        Largest number of draws.
+    experiment : str, optional
+        May be left out where the posterior has one.
+    own_effects : Path, optional
+        File of a user's own effects.
+
+    Returns
+    -------
+    WireDraws
+
+    Raises
+    ------
+    InputError
+        If there is no posterior, or its model cannot be used on a robot.
+    """
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / POSTERIOR).is_file():
         raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
@@ -123,7 +165,24 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
 def configuration(
     command: str, robot: RobotLike, posterior: Path, draws: int, seed: int, own_effects: Path | None, *rest: Any
 ) -> dict[str, Any]:
-    """Everything that decides the results; files by their content, not by where they lie."""
+    """Everything that decides the results; files by their content, not by where they lie.
+
+    Parameters
+    ----------
+    command : str
+    robot : Robot or path
+    posterior : Path
+        The file of the wires' draws.
+    draws, seed : int
+    own_effects : Path or None
+    *rest
+        The command's own options, in a fixed order.
+
+    Returns
+    -------
+    dict
+        What ``configuration.json`` holds: another one is refused in the same folder.
+    """
     return {
         "command": command,
         "version": __version__,

@@ -29,7 +29,27 @@ Array = NDArray[Any]
 def begin(
     target: LogPosterior, seed: int, policy: Policy, found: Optimum | None, near: Array | None, rough: Array | None
 ) -> State:
-    """Search where nothing is known, and learn a first proposal from rough draws (policy: `ensemble`)."""
+    """Search where nothing is known, and learn a first proposal from rough draws.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    seed : int
+        Of everything that is random in this run.
+    policy : Policy
+        See `wirebayes.inference.sampler.ensemble.sample`.
+    found : Optimum or None
+        Modes that are known already; None searches for them.
+    near : (m, d) array or None
+        Further starts of the search, in the coordinates that are sampled.
+    rough : (m, d) array or None
+        Points that roughly follow the posterior, in the same coordinates; the first proposal is fitted to them.
+
+    Returns
+    -------
+    State
+        Walkers drawn from the modes' normal approximations, widened; nothing is kept yet.
+    """
     spawned = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
@@ -49,7 +69,16 @@ def begin(
 
 
 def one_round(target: LogPosterior, state: State, policy: Policy) -> None:
-    """Learn from a walk, as long as the proposal is not to be trusted, then from weighted draws of the proposal."""
+    """Learn from a walk, as long as the proposal is not to be trusted, then from weighted draws of the proposal.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    state : State
+        Changed in place: proposal, acceptance and round; after the last round it is frozen and its walkers are placed.
+    policy : Policy
+        How many rounds, how many draws in each, and what acceptance is enough.
+    """
     state.round += 1
     if state.acceptance < _USEFUL:
         _fit(target, state, policy, *_resampled_twice(*_walked(target, state, policy), state.generator))
@@ -75,7 +104,15 @@ def one_round(target: LogPosterior, state: State, policy: Policy) -> None:
 
 
 def learn_again(target: LogPosterior, state: State, policy: Policy) -> None:
-    """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before."""
+    """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    state : State
+        Changed in place: unfrozen, without kept draws.
+    policy : Policy
+    """
     z = np.concatenate(state.kept_z).reshape(-1, state.positions.shape[1])
     value = np.concatenate(state.kept_log_density).ravel()
     state.frozen, state.again, state.round = False, state.again + 1, policy.rounds - 1
@@ -91,8 +128,21 @@ def overlooked(state: State, z: Array, value: Array) -> float:
     """How far places that matter lie above what the frozen proposal makes of them, in nats.
 
     The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
-    draws (n, d) with log densities (n,), and at its 99 % quantile over the rough draws that the search left; the larger
-    counts. A neck into which few walkers found, and stayed, shows in the first, a mode that they lost in the second.
+    draws, and at its 99 % quantile over the rough draws that the search left; the larger counts. A neck into which few
+    walkers found their way, and stayed, shows in the first, a mode that they lost in the second.
+
+    Parameters
+    ----------
+    state : State
+        Holds the proposal and, in `witness`, what the search left.
+    z : (n, d) array
+        Kept draws, in the coordinates that are sampled.
+    value : (n,) array
+        Their log posterior densities.
+
+    Returns
+    -------
+    float
     """
     over = value - state.proposal.log_density(z)
     middle, high = np.quantile(over, [0.5, 0.999])

@@ -66,7 +66,19 @@ class Mixture:
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:
-    """One component a mode, weighted by its evidence but none below a twentieth."""
+    """One component a mode, weighted by its evidence but none below a twentieth.
+
+    Parameters
+    ----------
+    centres : (k, d) array
+    covariances : (k, d, d) array
+    log_weights : (k,) array
+        Log evidence of each mode.
+
+    Returns
+    -------
+    Mixture
+    """
     weights = np.maximum(np.exp(log_weights - log_weights.max()), 0.05)
     return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
 
@@ -74,9 +86,29 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
 def fit(
     x: Array, rng: np.random.Generator, *, most: int = 8, degrees: float = DEGREES, before: Mixture | None = None
 ) -> Mixture:
-    """The mixture of as many components, up to `most`, as points (n, d) can hold apart.
+    """The mixture of as many components as points can hold apart.
 
-    It is sought from the one `before`, of nearly these points, if that has so many.
+    Parameters
+    ----------
+    x : (n, d) array
+        Points of equal weight.
+    rng : numpy.random.Generator
+        Draws the starts.
+    most : int
+        Largest number of components; fewer are tried where a fit fails.
+    degrees : float
+        Degrees of freedom of every component.
+    before : Mixture, optional
+        A mixture of nearly these points, used as the start if it has `most` components.
+
+    Returns
+    -------
+    Mixture
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the points do not span their space.
     """
     d = x.shape[1]
     middle = x.mean(axis=0)
@@ -129,7 +161,20 @@ def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
 
 
 def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
-    """Rows far from one another, for a start (k-means++); fewer than `k` where there are not so many different ones."""
+    """Rows far from one another, for a start (k-means++).
+
+    Parameters
+    ----------
+    x : (n, d) array
+    k : int
+        How many rows.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of int
+        Fewer than `k` where there are not so many different points.
+    """
     chosen = [int(rng.integers(len(x)))]
     nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)
     while len(chosen) < k and nearest.any():
@@ -139,7 +184,20 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
 
 
 def rows_by_weight(weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """(n,) rows drawn in proportion to (m,) weights, systematically, in their order."""
+    """Rows drawn in proportion to their weights, systematically, in their order.
+
+    Parameters
+    ----------
+    weight : (m,) array
+        Not negative; need not sum to one.
+    n : int
+        Number of draws.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (n,) int array
+    """
     shares = np.cumsum(weight)
     return np.minimum(np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n), len(weight) - 1)
 

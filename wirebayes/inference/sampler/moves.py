@@ -104,7 +104,22 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         super().__init__(randomize_split=False)  # neighbours fall into different halves: half of every ensemble each
 
     def get_proposal(self, x: Array, others: Sequence[Array], random: Any) -> tuple[Array, Array]:
-        """Places (n, d) proposed for walkers at (n, d), from differences of the other half, and log factors (n,)."""
+        """Places proposed for half of the walkers, from differences of the other half; called by emcee.
+
+        Parameters
+        ----------
+        x : (n, d) array
+            Walkers to move, of all ensembles one after the other.
+        others : sequence of one (m, d) array
+            The other half of the walkers. Each ensemble uses its own part.
+        random : numpy.random.RandomState
+
+        Returns
+        -------
+        y : (n, d) array
+        log_factor : (n,) array
+            Added to the log acceptance ratio; not zero where the map that straightens the coordinates changes volume.
+        """
         (n, d), each = x.shape, len(others[0]) // self.ensembles
         (u, slope), (pool, _) = self._forward(x), self._forward(others[0])
         one = random.randint(each, size=n)

@@ -131,13 +131,25 @@ def _numbered(arrays: tuple[Array, ...] | None) -> dict[str, Array] | None:
 
 
 def advance(target: LogPosterior, state: State, steps: int, ensembles: int = 1, power: float = 1.0) -> tuple[Any, int]:
-    """Run the walkers on, on the density to a power; their places and random state are left in `state`.
+    """Run the walkers on.
 
     All ensembles walk side by side: a batch costs little more than one of its parts.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    state : State
+        Its walkers, their log densities, random state and count of evaluations are changed in place.
+    steps : int
+    ensembles : int
+        Number of independent ensembles among the walkers.
+    power : float
+        The density is taken to this power; below one, walls between modes are lower.
 
     Returns
     -------
     sampler : emcee.EnsembleSampler
+        Holds the chain.
     evaluations : int
     """
 

@@ -34,7 +34,20 @@ class RawTable:
         return f"line {line}, column {self.sheet.column_name(column)} ({self.header[column]})"
 
     def complain(self, line: int, column: int, found: str, expected: str) -> InputError:
-        """The error of a cell."""
+        """The error for one cell.
+
+        Parameters
+        ----------
+        line, column : int
+            Of the sheet, from 0, rows above the readings included.
+        found, expected : str
+            As the message shows them.
+
+        Returns
+        -------
+        InputError
+            With the file and the cell, as the sheet counts; the caller raises it.
+        """
         return InputError(f"{self.sheet.path}, {self.place(line, column)}: found {found}, expected {expected}")
 
     def column(self, column: int) -> list[str]:

@@ -22,6 +22,19 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
     ------
     InputError
         It is no workbook, there is no such sheet, or no readings; `Undecided` where several sheets hold some.
+
+    Parameters
+    ----------
+    path : Path
+        Named in messages.
+    raw : bytes
+        Content of the file.
+    chosen : str, optional
+        Name of a sheet; left out, the only one with readings is taken.
+
+    Returns
+    -------
+    Sheet
     """
     import openpyxl
 
