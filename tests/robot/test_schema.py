@@ -4,7 +4,10 @@ import pytest
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import schema
 
-OPTIONAL = {"k1_N", "B_mm", "length_mm", "wire", "pulley_radius_m", "swivel_axis"}
+OPTIONAL = {"k1_N", "B_mm", "length_mm", "wire", "pulley_radius_m", "swivel_axis"} | {
+    "drum_radius_m", "drum_pitch_m", "drum_layer_turns", "drum_layer_height_m", "gear_ratio",
+}  # fmt: skip
+LAYERS = "drum_radius_m = 0.05\ndrum_layer_turns = 9\ndrum_layer_height_m = 5e-4"
 GOOD = """version = 1
 name = "tripod"
 description = "three wires and a point"
@@ -81,6 +84,13 @@ def test_a_good_file_is_read(tmp_path):
         ('freedom = "position"', 'freedom = "all"', "freedom"),
         ('actuator = "linear"', 'actuator = "drum"', "leg[2].pulley_ratio"),
         ("[platform]\nmass_kg = 1.0", "platform = 3", "platform"),
+        ('wire = "steel"', "drum_radius_m = -1", "leg[0].drum_radius_m"),
+        ('wire = "steel"', "gear_ratio = 2.0", "leg[0].gear_ratio"),
+        ('wire = "steel"', "drum_radius_m = 0.05\ndrum_layer_turns = 0.5", "leg[0].drum_layer_turns"),
+        ('wire = "steel"', "drum_radius_m = 0.05\ndrum_layer_turns = 9", "leg[0].drum_layer_height_m"),
+        ('wire = "steel"', f"{LAYERS}", "leg[0].wire_length_m"),
+        ('wire = "steel"', f"{LAYERS}\nwire_length_m = 1e9", "leg[0].wire_length_m"),
+        ("pulley_ratio = 4.0", "pulley_ratio = 4.0\ndrum_radius_m = 0.05", "leg[2].drum_radius_m"),
         ('wire = "steel"', "pulley_radius_m = 0.0", "leg[0].pulley_radius_m"),
         ('wire = "steel"', "pulley_radius_m = 0.05", "leg[0].swivel_axis"),
         ('wire = "steel"', "pulley_radius_m = 0.05\nswivel_axis = [0, 0, 0]", "leg[0].swivel_axis"),
@@ -103,6 +113,14 @@ def test_a_pulley_is_read_and_its_axis_has_unit_length(tmp_path):
     robot = _read(tmp_path, GOOD.replace('wire = "steel"', pulley))
     np.testing.assert_array_equal(robot.pulleys.radius_m, [0.05, 0.0, 0.0])
     np.testing.assert_allclose(robot.pulleys.axis[0], [0.0, 0.6, 0.8])
+
+
+def test_a_drum_is_read(tmp_path):
+    assert _read(tmp_path, GOOD).drums is None
+    drums = _read(tmp_path, GOOD.replace('wire = "steel"', LAYERS + "\nwire_length_m = 8\ngear_ratio = 3")).drums
+    assert (drums.radius_m[0], drums.layer_turns[0], drums.layer_m[0], drums.wire_m[0]) == (0.05, 9.0, 5e-4, 8.0)
+    np.testing.assert_array_equal(drums.radius_m[1:], 0.0)
+    np.testing.assert_array_equal(drums.gear, [3.0, 1.0, 1.0])
 
 
 @pytest.mark.parametrize("text", ["version = ", GOOD.split("[[leg]]")[0], "\x00"])

@@ -41,7 +41,7 @@ def calibrate(
     ----------
     robot : Robot, name of a shipped robot, or path
     readings : path of a CSV, DataFrame, or mapping of name to (r,) array
-        A row a hold, in order: pose asked for, duration, joint values, and tensions at its end or NaN.
+        A row a hold, in order: pose asked for, duration, joint values or motor angles, and tensions at its end or NaN.
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
     tension_sd : float
         Standard error of a tension, N.
@@ -110,7 +110,7 @@ def _as_csv(columns: Any, robot: Robot) -> str:
     if not is_table(columns):
         raise InputError(f"readings: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
     names = list(columns.columns) if hasattr(columns, "columns") else list(columns)
-    wanted = session_file.columns(robot, tilted=session_file.NORMAL[0] in names)
+    wanted = session_file.columns(robot, session_file.NORMAL[0] in names, session_file.has_motors(names))
     names = wanted if sorted(map(str, names)) == sorted(wanted) else names
     values = [plain(list(columns[name])) for name in names]
     rows = sorted({len(column) for column in values})

@@ -68,6 +68,9 @@ def _asked(pose: dict[str, Any]) -> Points:
             low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
             rule = pose["tension_distribution"]["choice"].replace("_", " ")
             points.append(f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N.")
+        if angles := pose.get("inverse", {}).get("motor_angle_rad"):
+            turned = ", ".join("no drum" if a is None else f"{a:.5g}" for a in angles["mean"])
+            points.append(f"Motor angles, rad, counted from nothing paid out: {turned}.")
     return Points("What was computed", points)
 
 

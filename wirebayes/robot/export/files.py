@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.robot.export.mujoco_model import mjcf
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.drums import motor_angle, paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.robot.motion import inverse
@@ -43,7 +45,14 @@ def reprapfirmware(robot: Robot, line: WireDraws) -> str:
         (f"M666 I{_joined(np.full(robot.legs, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
         (f"M666 X{_joined(np.full(robot.legs, robot.rule.highest_N), 'g')}", "largest planned force, N"),
     ]
-    return _head(robot, line, spring, ";") + "".join(f"{code} ; {comment}\n" for code, comment in rows)
+    if robot.drums is not None and robot.drums.radius_m.all():
+        radius, growth = _spools(robot, robot.drums)
+        rows += [
+            (f"M666 R{_joined(1e3 * radius, '.3f')}", "spool radii at the origin, mm"),
+            (f"M666 Q{1e3 * growth.mean():.5f}", f"buildup, mm: {_joined(1e3 * growth, '.5f', ', ')}"),
+            ("", f"M666 L and H, teeth of motor and spool: their ratio is {_joined(robot.drums.gear, 'g', ', ')}"),
+        ]
+    return _head(robot, line, spring, ";") + "".join(f"{code} ; {comment}\n".lstrip() for code, comment in rows)
 
 
 def klipper(robot: Robot, line: WireDraws) -> str:
@@ -62,7 +71,24 @@ def klipper(robot: Robot, line: WireDraws) -> str:
     for letter, anchor in zip(LETTERS.lower(), 1e3 * robot.exit_m, strict=False):
         x, y, z = anchor
         text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
+        if robot.drums is not None and robot.drums.radius_m.all():
+            leg = LETTERS.lower().index(letter)
+            turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][leg]
+            text += f"rotation_distance: {turn:.4f}  # mm of wire a turn, at the origin; a buildup is left out\n"
+            text += f"gear_ratio: {robot.drums.gear[leg]:g}:1\n"
     return text
+
+
+def _spools(robot: Robot, drums: Drums) -> tuple[Floats, Floats]:
+    """Wire per radian of each drum with the platform at the origin, and growth of the radius squared by the wire, m.
+
+    A layer of ``n`` turns raises the radius by its height ``t`` once for about ``2 pi r n`` of wire, so that the radius
+    squared grows by ``t / (pi n)`` per length: the firmware's buildup factor.
+    """
+    shape = statics.geometry(robot, np.zeros((3, 1)), np.eye(3)[..., None])
+    joint = statics.stretched(robot, shape, robot.beyond_m[:, None])[:, 0]
+    slope = paid_out(drums, motor_angle(drums, joint))[1] * drums.gear
+    return slope, drums.layer_m / (np.pi * drums.layer_turns)
 
 
 def creep_table(

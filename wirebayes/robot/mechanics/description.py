@@ -55,6 +55,32 @@ class Pulleys:
 
 
 @dataclass(frozen=True)
+class Drums:
+    """Drums of known size, which turn a motor's angle into wire.
+
+    Attributes
+    ----------
+    radius_m : (w,) array
+        From the drum's axle to the middle of the wire on the first layer; 0 where no drum is known.
+    pitch_m : (w,) array
+        Traverse of the wire in a turn.
+    layer_turns, layer_m : (w,) arrays
+        Turns in a layer, infinite where the wire lies in one layer; growth of the radius from layer to layer.
+    wire_m : (w,) array
+        Whole zero-tension length from its end on a layered drum to the platform; 0 where the wire lies in one layer.
+    gear : (w,) array
+        Turns of the motor for one of the drum.
+    """
+
+    radius_m: Floats
+    pitch_m: Floats
+    layer_turns: Floats
+    layer_m: Floats
+    wire_m: Floats
+    gear: Floats
+
+
+@dataclass(frozen=True)
 class Robot:
     """A robot of ``w`` legs; all lengths in metres, masses in kilograms.
 
@@ -88,6 +114,8 @@ class Robot:
         Box in which workspace figures are computed.
     pulleys : Pulleys or None
         None where all wires leave from fixed points.
+    drums : Drums or None
+        None where the joint values are lengths and no motor angles are known.
 
     Examples
     --------
@@ -117,6 +145,7 @@ class Robot:
     lower_m: Floats
     upper_m: Floats
     pulleys: Pulleys | None = None
+    drums: Drums | None = None
 
     @property
     def legs(self) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.robot.mechanics.description import GivenWire, Pulleys, Robot, TensionRule
+from wirebayes.robot.mechanics.description import Drums, GivenWire, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.tensions import CHOICES
 
 Floats = NDArray[np.float64]
@@ -153,11 +153,16 @@ def _robot(t: _Table) -> Robot:
         stack("exit"), stack("platform"), stack("lines"), stack("beyond"), tuple(leg["actuator"] for leg in legs),
         stack("ratio"), stack("wire_m"), tuple(leg["wire"] for leg in legs), given, tension,
         position, turn, lower, upper, _pulleys(stack("pulley"), stack("axis")),
+        _drums(*(stack(key) for key in _DRUM)),
     )  # fmt: skip
 
 
 def _pulleys(radius_m: Floats, axis: Floats) -> Pulleys | None:
     return Pulleys(radius_m, axis) if radius_m.any() else None
+
+
+def _drums(radius_m: Floats, *rest: Floats) -> Drums | None:
+    return Drums(radius_m, *rest) if radius_m.any() else None
 
 
 def _given(t: _Table) -> dict[str, GivenWire]:
@@ -198,11 +203,34 @@ def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
         if "pulley_radius_m" in leg.content:
             row["pulley"] = leg.number("pulley_radius_m", above=0)
             row["axis"] = leg.unit("swivel_axis")
+        row |= _drum(leg) if actuator == "drum" else _drum(None)
         if row["wire"] != "default" and row["wire"] not in given:
             raise leg.fail("wire", f"found {row['wire']!r}", "the name of a table under [wires], or no key")
         leg.finish()
         out.append(row)
     return out
+
+
+_DRUM = ("drum_radius", "drum_pitch", "drum_turns", "drum_layer", "drum_wire", "gear")
+_MOST_LAYERS = 10_000  # more wire than any drum holds: a slip of the unit
+
+
+def _drum(leg: _Table | None) -> dict[str, float]:
+    """What is known of a leg's drum."""
+    row = dict(zip(_DRUM, (0.0, 0.0, math.inf, 0.0, 0.0, 1.0), strict=True))
+    if leg is None or "drum_radius_m" not in leg.content:
+        return row
+    row["drum_radius"] = leg.number("drum_radius_m", above=0)
+    row["drum_pitch"] = leg.number("drum_pitch_m", 0.0, least=0)
+    row["gear"] = leg.number("gear_ratio", 1.0, above=0)
+    if "drum_layer_turns" in leg.content:
+        row["drum_turns"] = leg.number("drum_layer_turns", least=1)
+        row["drum_layer"] = leg.number("drum_layer_height_m", above=0)
+        row["drum_wire"] = leg.number("wire_length_m", above=0)
+        layers = row["drum_wire"] / (2 * math.pi * row["drum_radius"] * row["drum_turns"])
+        if layers > _MOST_LAYERS:
+            raise leg.fail("wire_length_m", f"{layers:.3g} layers on the drum", f"no more than {_MOST_LAYERS}")
+    return row
 
 
 def _is_number(value: Any) -> bool:

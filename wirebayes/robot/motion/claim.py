@@ -120,9 +120,10 @@ def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
     rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
                    highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip
     pulleys = robot.pulleys and replace(robot.pulleys, radius_m=factor * robot.pulleys.radius_m)
-    return replace(
-        robot, mass_kg=mass_kg, rule=rule, pulleys=pulleys, **{name: getattr(robot, name) * factor for name in lengths}
-    )
+    sizes = ("radius_m", "pitch_m", "layer_m", "wire_m")
+    drums = robot.drums and replace(robot.drums, **{name: getattr(robot.drums, name) * factor for name in sizes})
+    grown = {name: getattr(robot, name) * factor for name in lengths}
+    return replace(robot, mass_kg=mass_kg, rule=rule, pulleys=pulleys, drums=drums, **grown)
 
 
 def summary(out: WorkspaceDrift) -> dict[str, float]:

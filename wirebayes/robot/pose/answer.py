@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import draws
+from wirebayes.robot.mechanics import draws, drums
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, control, drift, forward, inverse, path
@@ -91,6 +91,8 @@ def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws |
         "zero_tension_length_m": band(told.zero_m),
         "joint_value_m": band(told.joint_m),
     }
+    if robot.drums is not None:
+        content["inverse"] |= _motors(robot.drums, told.joint_m)
     content["forward"] = _round_trip(robot, shared, told, x, R)
     content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
     stable = content["equilibria"]["commanded_stable"]
@@ -112,9 +114,26 @@ def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws |
         weak = 100 * (1 - content["feasible_draws"])
         losses.insert(0, f"{weak:.2g} % of the draws cannot pull as hard as the pose asks, however far stretched")
     content["warnings"] = losses + draws.warnings(line, tau, float(asked.times_s[-1]), told.zero_m)
+    if robot.drums is not None:
+        content["warnings"] += [
+            f"wire {i + 1} is longer here than its drum's wire_length_m, {robot.drums.wire_m[i]:g} m"
+            for i in drums.emptied(robot.drums, told.joint_m[told.feasible])
+        ]
     space = _workspace(robot, line)
     content["workspace"] = claim.summary(space) if space else None
     return Answer(content, courses, space)
+
+
+def _motors(known: Drums, joint_m: Floats) -> dict[str, Any]:
+    """Motor angles and the wire that a radian pays out there; null for legs without a drum of known radius."""
+    angle = drums.motor_angle(known, joint_m)
+    return {"motor_angle_rad": _by_leg(angle), "wire_per_motor_angle_m_rad": _by_leg(drums.paid_out(known, angle)[1])}
+
+
+def _by_leg(values: Floats) -> dict[str, Any]:
+    """Bands of legs one by one: what one leg does not have is no gap in the others."""
+    bands = [band(values[:, [i]]) for i in range(values.shape[1])]
+    return {key: [None if b[key] is None else b[key][0] for b in bands] for key in bands[0]}
 
 
 def _workspace(robot: Robot, line: WireDraws) -> claim.WorkspaceDrift | None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from wirebayes.robot.mechanics import rotation
+from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.self_calibration import observability
@@ -51,7 +51,10 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
         turn = rotation.vector(known.rotation)[0]
         content["pose_now"] = {"position_m": known.position_m[0], "rotation_vector_rad": turn}
         home = rotation.matrix(robot.home_rotation_rad)
-        content["joint_values_for_home_m"] = corrected(robot, prior, known, robot.home_m, home)[0]
+        joint = corrected(robot, prior, known, robot.home_m, home)[0]
+        content["joint_values_for_home_m"] = joint
+        if robot.drums is not None:
+            content["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
     return content | _observed(robot, prior, session, np.random.default_rng(seed))
 
 

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration.session import Session
 
@@ -18,11 +19,25 @@ POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
 
 
-def columns(robot: Robot, tilted: bool) -> list[str]:
-    """The file's header: pose asked for, duration, joint values, tensions at the end, and the normal's components."""
+def columns(robot: Robot, tilted: bool, motors: bool = False) -> list[str]:
+    """The file's header: pose asked for, duration, joint values, tensions at the end, and the normal's components.
+
+    With `motors` the legs with a drum of known radius have their motor's angle in place of the joint value.
+    """
     legs = range(1, robot.legs + 1)
-    joints, tensions = [f"joint_{i}_m" for i in legs], [f"tension_{i}_N" for i in legs]
+    turned = _motors(robot) if motors else np.zeros(robot.legs, bool)
+    joints = [f"motor_{i}_rad" if turned[i - 1] else f"joint_{i}_m" for i in legs]
+    tensions = [f"tension_{i}_N" for i in legs]
     return ["hold", *POSE, "duration_s", *joints, *tensions, *(NORMAL if tilted else ())]
+
+
+def has_motors(names: Sequence[str]) -> bool:
+    """Whether a header has motor angles among its columns."""
+    return any(str(name).startswith("motor_") for name in names)
+
+
+def _motors(robot: Robot) -> NDArray[np.bool_]:
+    return np.zeros(robot.legs, bool) if robot.drums is None else robot.drums.radius_m > 0
 
 
 def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> tuple[Session, Floats]:
@@ -61,7 +76,8 @@ def parse(
         raise InputError(f"{source}: {place(lines.line_num)}: not CSV ({error}); expected cells with commas") from None
     rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
-    wanted = columns(robot, tilted)
+    motors = bool(rows) and has_motors(rows[0])
+    wanted = columns(robot, tilted, motors)
     if not rows or rows[0] != wanted:
         found = ",".join(rows[0])[:200] if rows else "nothing"
         raise InputError(f"{source}: {place(1)}: found {found}; expected the header {','.join(wanted)}")
@@ -71,6 +87,8 @@ def parse(
         raise InputError(f"{source}: no holds; expected at least one row")
     w = robot.legs
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
+    if motors and robot.drums is not None:
+        joint = np.where(_motors(robot), paid_out(robot.drums, joint)[0], joint)
     measured = table[:, 8 + w :]
     read_here = np.isfinite(measured).all(1)
     half = ~read_here & np.isfinite(measured).any(1)

@@ -1,0 +1,127 @@
+"""Drums: motor angle to length against wire laid down turn by turn, and everywhere that motor angles come in."""
+
+import csv
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.robot.test_calibration import _line
+from wirebayes.errors import InputError
+from wirebayes.robot.export import files
+from wirebayes.robot.mechanics import draws, drums, schema
+from wirebayes.robot.mechanics.description import Drums
+from wirebayes.robot.motion import claim, forward, inverse
+from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.robot.self_calibration import session_file
+
+# one layer; five turns a layer; a spiral of one turn a layer; no drum known
+DRUMS = Drums(
+    np.array([0.04, 0.03, 0.02, 0.0]), np.array([2e-3, 1e-3, 0.0, 0.0]), np.array([np.inf, 5.0, 1.0, np.inf]),
+    np.array([0.0, 8e-4, 5e-4, 0.0]), np.array([0.0, 6.0, 6.0, 0.0]), np.array([1.0, 12.75, 0.5, 1.0]),
+)  # fmt: skip
+
+
+def _laid_down(leg, drum_rad):
+    """Wire on a drum that turned so far from empty: the helix's length, summed in small steps."""
+    steps = 200_000
+    angle = (np.arange(steps) + 0.5) * drum_rad / steps
+    layer = np.floor(angle / (2 * np.pi * DRUMS.layer_turns[leg]))
+    radius = DRUMS.radius_m[leg] + layer * DRUMS.layer_m[leg]
+    return np.hypot(radius, DRUMS.pitch_m[leg] / (2 * np.pi)).sum() * drum_rad / steps
+
+
+def test_the_wire_on_the_drum_is_that_laid_down_turn_by_turn():
+    full = drums.motor_angle(DRUMS, DRUMS.wire_m)  # everything paid out: the empty drum
+    for leg in (1, 2):
+        for turns in (0.3, 4.0, 12.5, 20.0):
+            motor = np.zeros(4)
+            motor[leg] = full[leg] - DRUMS.gear[leg] * 2 * np.pi * turns
+            paid, _ = drums.paid_out(DRUMS, motor)
+            assert DRUMS.wire_m[leg] - paid[leg] == pytest.approx(_laid_down(leg, 2 * np.pi * turns), rel=1e-5)
+    turn = drums.paid_out(DRUMS, np.full(4, 2 * np.pi))[0]
+    assert turn[0] == pytest.approx(np.hypot(2 * np.pi * 0.04, 2e-3), rel=1e-14)
+    assert np.isnan(turn[3])
+
+
+def test_angle_and_length_are_inverse_and_the_slope_is_the_derivative():
+    length = np.linspace(0.1, 5.9, 400)[:, None] * np.ones(4)
+    angle = drums.motor_angle(DRUMS, length)
+    back, slope = drums.paid_out(DRUMS, angle)
+    np.testing.assert_allclose(back[:, :3], length[:, :3], atol=1e-13)
+    assert (np.diff(angle[:, :3], axis=0) > 0).all()
+    h = 1e-3
+    difference = (drums.paid_out(DRUMS, angle + h)[0] - drums.paid_out(DRUMS, angle - h)[0]) / (2 * h)
+    away = np.abs(difference / slope - 1)[:, :3] < 1e-9
+    assert away.mean() > 0.97  # but for the two angles where a layer ends
+    assert np.ptp(slope[:, 1]) > 1e-6  # layers differ
+    assert drums.emptied(DRUMS, np.array([9.0, 6.1, 5.0, 9.0])) == [1]
+
+
+def _with_drums(name):
+    robot = schema.read(name)
+    w = robot.legs
+    zeros = np.zeros(w)
+    return replace(
+        robot, drums=Drums(np.linspace(0.02, 0.05, w), zeros + 1e-3, zeros + 7.0, zeros + 6e-4, zeros + 12.0, zeros + 3)
+    )
+
+
+def test_motor_angles_lead_to_the_pose_and_back():
+    robot, line = _with_drums("hangprinter-4"), _line(20)
+    wires = draws.for_robot(robot, line)
+    x, R = robot.home_m[None] + 0.03, np.eye(3)[None]
+    told = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
+    angle = drums.motor_angle(robot.drums, told.joint_m)
+    zero, offset = inverse.lengths(robot, drums.paid_out(robot.drums, angle)[0])
+    found = forward.solve(robot, wires, zero, offset, x[0] + 0.01, R[0])
+    assert found.found.all()
+    assert np.abs(found.position_m - x).max() < 1e-9
+    paid = drums.paid_out(robot.drums, angle)[1]
+    assert (np.abs(3 * paid - robot.drums.radius_m) < 4e-3).all()
+    short = replace(robot, drums=replace(robot.drums, wire_m=np.array([1.0, 12.0, 12.0, 12.0])))
+    content = answer(short, line, PoseRequest(x[0], R[0], np.array([0.0, 60.0]))).content
+    np.testing.assert_allclose(content["inverse"]["motor_angle_rad"]["mean"][1:], angle.mean(0)[1:])
+    np.testing.assert_allclose(content["inverse"]["wire_per_motor_angle_m_rad"]["mean"][1:], paid.mean(0)[1:])
+    said = [warning for warning in content["warnings"] if "wire_length_m" in warning]
+    assert said == ["wire 1 is longer here than its drum's wire_length_m, 1 m"]
+    big = claim.scaled(robot, 2.0, robot.mass_kg)
+    np.testing.assert_allclose(drums.motor_angle(big.drums, 2 * told.joint_m), angle)
+
+
+def test_a_session_may_give_motor_angles(tmp_path):
+    robot = _with_drums("cogiro-desk")
+    robot = replace(robot, drums=replace(robot.drums, radius_m=np.where(np.arange(8) == 2, 0.0, robot.drums.radius_m)))
+    joint = np.linspace(1.4, 1.6, 8)
+    angle = np.where(np.arange(8) == 2, joint, drums.motor_angle(robot.drums, joint))
+    sessions = []
+    for name, motors, values in (("a", False, joint), ("b", True, angle)):
+        with (tmp_path / name).open("w", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(session_file.columns(robot, False, motors))
+            rows.writerow([1, *robot.home_m, 0, 0, 0, 60, *map(float, values), *[2.0] * 8])
+        sessions.append(session_file.read(tmp_path / name, robot, 0.02, 1e-3)[0])
+    assert "joint_3_m" in session_file.columns(robot, False, True)
+    assert "motor_4_rad" in session_file.columns(robot, False, True)
+    np.testing.assert_allclose(sessions[1].joint_m, sessions[0].joint_m, atol=1e-13)
+    with pytest.raises(InputError, match="expected the header hold,.*joint_1_m"):
+        session_file.read(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
+
+
+def test_the_firmware_is_told_of_the_drums():
+    robot, line = _with_drums("hangprinter-4"), _line(20)
+    text = files.reprapfirmware(robot, line)
+    shown = next(row for row in text.splitlines() if row.startswith("M666 R"))
+    radius = np.array([float(v) for v in shown.split(" ;")[0][6:].split(":")])
+    # the firmware's rule: the square of the radius falls by the buildup factor for every length paid out
+    growth = 6e-4 / (np.pi * 7.0)
+    assert f"M666 Q{1e3 * growth:.5f}" in text
+    out = robot.lines * np.linalg.norm(robot.exit_m, axis=1) + robot.beyond_m
+    smooth = np.sqrt(robot.drums.radius_m**2 + growth * (robot.drums.wire_m - out))
+    assert np.abs(1e-3 * radius - smooth).max() < 6e-4  # steps of one layer against a smooth growth
+    assert "; M666 L and H, teeth of motor and spool: their ratio is 3, 3, 3, 3" in text
+    turn = re.search(r"rotation_distance: (\S+)", files.klipper(robot, line))[1]
+    assert float(turn) == pytest.approx(2 * np.pi * radius[0], rel=1e-4)
+    assert "M666 R" not in files.reprapfirmware(schema.read("hangprinter-4"), line)
