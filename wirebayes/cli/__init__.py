@@ -195,7 +195,7 @@ def _one_line(text: str) -> str:
     return line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE // 2]} … {line[-_LONGEST_LINE // 2 :]}"
 
 
-_LONGEST_LINE = 2000
+_LONGEST_LINE = 2000  # characters, some 25 lines of a terminal: a longer message hides what it says
 
 
 def _unloaded() -> None:

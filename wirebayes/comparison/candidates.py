@@ -21,7 +21,7 @@ LAW, HISTORY, LIKELIHOOD = "Which elastic law?", "Which history?", "One history,
 SETTING, ABSENT = "Do setting errors matter?", "Was the wire held where readings are missing?"
 EFFECT = "Which effect helps?"
 BASE = "plain"
-_NO_CREEP = {"B": 0.0, "U": 1.0, "k2": 1.0, "N": 1.0}
+_NO_CREEP = {"B": 0.0, "U": 1.0, "k2": 1.0, "N": 1.0}  # an amount of zero; what the others are does not matter then
 
 
 @dataclass(frozen=True)

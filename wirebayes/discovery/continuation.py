@@ -42,9 +42,10 @@ _FIRST, _LAST = 1.5, 24.0  # δ of the rungs
 _RAW = 10.0  # δ of the first one before the parameters take their part, if that is less
 _APART, _MOST = 2.0, 8  # largest ratio of neighbours, unless they would be more than that many
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
+# of a Gauss-Newton step, tried in one batch: whole, and shorter where the tangent does not reach so far
 _LENGTHS = np.array([1.0, 0.4, 0.1])
 _SETTLED, _HOPELESS = 0.05, -15.0  # nats: a gain too small to go on for, a rung from which none leads up again
-_NEVER = -1e300
+_NEVER = -1e300  # log Bayes factor of what cannot be computed: finite, so that sums of it stay numbers
 _MIDDLE = 6.0  # δ for which a one-sided form is tried
 _LONGEST = 3.0  # of a step, in any sampled coordinate
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
@@ -86,9 +87,24 @@ class AmplitudePath:
 def ladders(
     blocks: Sequence[LaplaceFit], trials: Sequence[Probe], candidates: Sequence[Candidate], data: Sequence[Scan]
 ) -> list[AmplitudePath]:
-    """One ladder for each form that lasts, a start for each trial of its shape constants and each sign.
+    """Ladders of amplitudes for each form that lasts: a start for each trial of its shape constants and each sign.
 
-    None for events: they move the level of their hold, which the linear scan sees.
+    There are none for events: they move the level of their hold, which the linear scan sees.
+
+    Parameters
+    ----------
+    blocks : sequence of LaplaceFit
+        The plain fits, one a material.
+    trials : sequence of Probe
+        Every form at the amplitudes of the linear scan.
+    candidates : sequence of Candidate
+        Which probe may act on which blocks.
+    data : sequence of Scan
+        The linear scan of each block's readings; it gives the size that one unit of amplitude has in them.
+
+    Returns
+    -------
+    list of AmplitudePath
     """
     alike: dict[str, dict[tuple[float, ...], list[int]]] = {}
     for k, probe in enumerate(trials):

@@ -134,13 +134,36 @@ def examine(
 
 
 def is_close(p: float, alpha: float, simulations: int) -> bool:
-    """Whether a p-value from so many simulations is too close to a level to say on which side it is."""
+    """Whether a p-value from so many simulations is too close to a level to say on which side it is.
+
+    Parameters
+    ----------
+    p : float
+        As the test reported it: one more than the simulations at least as surprising, over one more than all.
+    alpha : float
+        The level.
+    simulations : int
+    """
     larger = round(p * (1 + simulations)) - 1
     return bool(min(binom.cdf(larger, simulations, alpha), binom.sf(larger - 1, simulations, alpha)) > CLOSE)
 
 
 def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, rng: np.random.Generator) -> Replicates:
-    """Data sets simulated at a block's fit and refitted, scanned for probes and for residual patterns."""
+    """Data sets simulated at a block's fit and refitted, scanned for probes and for residual patterns.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+    trials : sequence of Probe
+    n : int
+        Number of data sets.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Replicates
+        Its scan has the probes first and the residual patterns behind them.
+    """
     return screening.replicated(block, trials, n, rng, residual_patterns.patterns(block.target.problem)[1])
 
 

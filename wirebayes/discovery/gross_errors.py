@@ -41,7 +41,20 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
 
 
 def without(experiment: Experiment, hold: int, reading: int) -> Experiment:
-    """The experiment with one reading struck out; the hold keeps its duration."""
+    """The experiment with one reading struck out; the hold keeps its duration.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    hold : int
+        Its number in the readings' file.
+    reading : int
+        Position in the hold, from 0.
+
+    Returns
+    -------
+    Experiment
+    """
     holds = []
     for h in experiment.holds:
         if h.number == hold:

@@ -22,7 +22,11 @@ from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import linearise, simulate
 
 Array = NDArray[Any]
+# of setting to sensor error, squared: from one that does not matter to one beside which the sensor's does not; steps of
+# half a decade, as the evidence is smooth in log ρ
 RATIOS = np.logspace(-2.0, 6.0, 13)
+# δ of the smooth remainder, doubling from about the least that the global test detects; a choice that hardly matters,
+# because neighbouring sizes explain nearly the same
 SIZES = np.array([4.0, 8.0, 16.0, 32.0])
 _NOISE = ("sensor_sd", "setting_sd")
 
@@ -221,7 +225,21 @@ def joined(scans: Sequence[Scan]) -> Scan:
 
 
 def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array]:
-    """Per sample the (H, R, m) signatures of the probes per unit amplitude, N, at the parameters ``z`` (1, d)."""
+    """Signatures of the probes: what each adds to the readings, per unit amplitude.
+
+    Parameters
+    ----------
+    target : LogPosterior
+        Of a block.
+    z : (1, d) array
+        Where it is evaluated, in the coordinates that are sampled.
+    trials : sequence of Probe
+
+    Returns
+    -------
+    list of (H, R, m) arrays
+        One a sample, N; zero where the effect cannot be computed or belongs to another sample.
+    """
     problem, theta = target.problem, target.coordinates.to_natural(z)
     alike: dict[str, list[int]] = {}
     for k, probe in enumerate(trials):
@@ -254,11 +272,26 @@ def expand(
     columns: Callable[[Problem, int, Array, Array], Array] | None = None,
     shapes: Sequence[Array] | None = None,
 ) -> Expansion:
-    """Linearise a block at the rows of `z` (n, d), for its readings or for replicates (H, R, n) row by row.
+    """Linearise a block at some parameters, with the signatures of the probes.
 
-    An effect's form hardly differs between refits: `shapes`, from `forms`, serve all rows. `columns` adds further
-    signatures behind the probes': given the problem, the sample's number, the tension
-    (H, R, n) and its derivatives (H, R, n, p), it returns (H, R, n, more), N.
+    Parameters
+    ----------
+    target : LogPosterior
+        Of the block.
+    z : (n, d) array
+        Parameters, in the coordinates that are sampled.
+    trials : sequence of Probe
+    readings : sequence of (H, R, n) arrays, optional
+        Replicates that stand in for the measured readings, one array a sample, row by row of `z`.
+    columns : callable, optional
+        Adds further signatures behind the probes': given the problem, the sample's number, the tension (H, R, n) and
+        its derivatives (H, R, n, p), it returns (H, R, n, more), N.
+    shapes : sequence of (H, R, m) arrays, optional
+        Signatures from `forms`, used for all rows: an effect's form hardly differs between refits.
+
+    Returns
+    -------
+    Expansion
     """
     problem = target.problem
     points = list(_points(target, z, readings, moving_columns(problem)))
@@ -286,7 +319,22 @@ def moving_columns(problem: Problem) -> list[int]:
 
 
 def tangent(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
-    """Linearise a block by some of its columns, at the rows of `z` (n, d); readings as in `expand`."""
+    """Linearise a block by some of its columns, without signatures.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    z : (n, d) array
+        Parameters, in the coordinates that are sampled.
+    readings : sequence of (H, R, n) arrays or None
+        As in `expand`.
+    moving : list of int
+        Columns of `z` by which the tensions are differentiated.
+
+    Returns
+    -------
+    Tangent
+    """
     return _tangent(target, z, list(_points(target, z, readings, moving)), moving)
 
 
@@ -484,7 +532,21 @@ def damp(singular: Array, ratio: Array | float) -> Array:
 
 
 def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None = None) -> Array:
-    """(n, N) readings less tensions at the rows of `z`, in units of the reading error."""
+    """Readings less tensions, in units of the reading error.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    z : (n, d) array
+        Parameters, in the coordinates that are sampled.
+    readings : sequence of (H, R, n) arrays, optional
+        Replicates that stand in for the measured readings.
+
+    Returns
+    -------
+    (n, N) array
+        All samples' readings one after the other.
+    """
     theta = target.coordinates.to_natural(z)
     parts = []
     for at, sample in enumerate(target.problem.samples):
@@ -535,7 +597,7 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
     return out
 
 
-_STEP = 1e-5
+_STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and rounding both stay below 1e-5 of a slope
 _LARGEST = 1e100  # of any derivative: the square of a larger one overflows
 _PIECE = 8  # parameter sets scanned at once: what stays in the cache
 _LEAST_SQUARE = 1e-14  # share of the largest squared singular value: less is rounding

@@ -154,8 +154,23 @@ def write_checks(
 ) -> None:
     """Check all fits of a command and put the result first in their ``summary.json``, as ``model_check``.
 
-    The level is that which the command as a whole keeps. What was checked before an interruption is not checked again.
-    Processes share the work unless a map is given as `parallel_map`; `simulations` as for `check_model`.
+    The level is the one that the command as a whole keeps. What was checked before an interruption is not checked
+    again.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        All with the same file of own effects.
+    directory : Path
+        Of the run; jobs name their folders within it.
+    seed : int
+        Of the run.
+    report : callable
+        Called with a name, the number of fits checked and the number to check.
+    parallel_map : callable, optional
+        Takes the place of processes that share the work.
+    simulations : int, optional
+        As for `check_model`.
     """
     alpha = level(len(jobs))
     paths = {job.folder: directory / job.folder / "summary.json" for job in jobs}

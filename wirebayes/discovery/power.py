@@ -19,14 +19,30 @@ from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
 Array = NDArray[Any]
-ALIKE = 0.95
+ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
 _POWER_ROWS = 300  # simulations behind an 80 % amplitude
 _WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
 _TRIED = "unloading, longer holds, finer steps, another length"
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
-    """Amplitude of a probe that passes the global test in 80 % of simulations; None beyond δ of `LARGEST`."""
+    """Amplitude of a probe that passes the global test in 80 % of simulations.
+
+    Parameters
+    ----------
+    null : Scan
+        Of data sets simulated without any effect.
+    probe : Probe
+    i : int
+        The probe's number in the scan.
+    threshold : float
+        Log Bayes factor, prior included, that the test needs.
+
+    Returns
+    -------
+    float or None
+        Distance from neutral; None where even δ of `LARGEST` would not pass, or the probe does not show at all.
+    """
     norm = float(np.median(null.norm[:, i]))
     if norm <= 0:
         return None
@@ -74,6 +90,19 @@ def similarity(
     """Largest |cos| between the projected signatures of any two effects, over their forms, at a noise ratio a block.
 
     An effect with one amplitude a block may put any size on each, so it is as alike as the best sizes make it.
+
+    Parameters
+    ----------
+    expansions : sequence of Expansion
+        One a block.
+    trials : sequence of Probe
+    ratios : sequence of float
+        Size of the setting errors against the sensor's, ρ, of each block.
+
+    Returns
+    -------
+    dict of (name, name) to float
+        From 0 (orthogonal) to 1 (one signature).
     """
     cosines = _cosines(expansions, trials, ratios)
     names = [t.effect.name for t in trials]
@@ -88,6 +117,19 @@ def copies(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Seq
     """How many names are one and the same in these tests, itself included, by name.
 
     Two names are where each form of either has a form of the other with the same signature.
+
+    Parameters
+    ----------
+    expansions : sequence of Expansion
+        One a block.
+    trials : sequence of Probe
+    ratios : sequence of float
+        As in `similarity`.
+
+    Returns
+    -------
+    dict of name to int
+        Only names that show at all.
     """
     same = _cosines(expansions, trials, ratios) > NEARLY_ONE
     forms: dict[str, list[int]] = {}
@@ -161,7 +203,20 @@ _ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _Displacemen
 
 
 def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
-    """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show."""
+    """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+    kinds : sequence of effect class
+        The catalogue.
+    possible : sequence of str
+        Names of effects that this protocol can show.
+
+    Returns
+    -------
+    list of str
+    """
     absorbable = [kind for kind in _ABSORBABLE if not (kind is _Compliance and "fixture_compliance" in possible)]
     trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in absorbable]
     x = expand(block.target, block.modes.z[:1], trials)
@@ -244,7 +299,22 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
 
 
 def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
-    """The plan that tells two candidates apart best, or shows one effect best, by projected signatures."""
+    """The plan that best distinguishes two candidates, or best shows one effect, by projected signatures.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+        The fit whose test would be followed by another.
+    pair : (Probe, Probe) or None
+        Candidates to distinguish.
+    weakest : Probe or None
+        Without a pair: the effect to reveal.
+
+    Returns
+    -------
+    str
+        A sentence, also where no plan helps.
+    """
     trials = list(pair) if pair else [weakest] if weakest else []
     if not trials:
         return "No candidate remains; repeating the same holds would narrow the parameters."

@@ -15,8 +15,10 @@ from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
+# δ; end of the amplitudes' uniform prior. Hardly matters: twice as much takes ln 2 from every name alike
 LARGEST = 40.0
-_OUTWARD = 6
+_OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all
+# δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice
 _DELTAS = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
 
 

@@ -101,9 +101,22 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
 
 
 def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
-    """Log likelihood ratio (...) of one amplitude for several blocks (b, ...), and that amplitude.
+    """One amplitude for several blocks: its log likelihood ratio, and the amplitude itself.
 
-    Each block's is a parabola through zero amplitude and through its own best.
+    Each block's log likelihood ratio is a parabola through zero amplitude and through its own best.
+
+    Parameters
+    ----------
+    lr : (b, ...) array
+        Log likelihood ratio of each block at its own best amplitude.
+    a : (b, ...) array
+        That amplitude.
+    norm : (b, ...) array
+        δ per amplitude, the curvature where the best amplitude is too small to say.
+
+    Returns
+    -------
+    value, amplitude : (...) arrays
     """
     with np.errstate(all="ignore"):
         weight = np.where(np.abs(a) * norm > 0.5, 2.0 * lr / a**2, norm**2)
@@ -131,7 +144,21 @@ class Replicates:
 def replicated(
     block: LaplaceFit, trials: Sequence[Probe], n: int, rng: np.random.Generator, columns: Any = None
 ) -> Replicates:
-    """Scan `n` data sets simulated at the block's fit, each refitted first."""
+    """Scan `n` data sets simulated at the block's fit, each refitted first.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+    trials : sequence of Probe
+    n : int
+    rng : numpy.random.Generator
+    columns : callable, optional
+        Further signatures (see `linear_scan.expand`).
+
+    Returns
+    -------
+    Replicates
+    """
     z = np.repeat(block.modes.z[:1], n, axis=0)
     theta = block.target.coordinates.to_natural(z)
     problem = block.target.problem
@@ -216,7 +243,20 @@ def chance_level(candidates: Sequence[Candidate], null: Sequence[Scan]) -> Globa
 
 
 def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Sequence[Scan]) -> GlobalTest:
-    """Compare the data's most surprising name with the simulations'."""
+    """Compare the data's most surprising name with the simulations'.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    data : sequence of Scan
+        Of the measured readings, one a block.
+    null : sequence of Scan
+        Of data sets simulated at the fits, one a block.
+
+    Returns
+    -------
+    GlobalTest
+    """
     level = chance_level(candidates, null)
     found = {name: surprise(float(v[0]), level.chance[name]) for name, v in by_name(candidates, data).items()}
     return replace(level, surprises=found)

@@ -69,7 +69,22 @@ def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = 
 def discover(
     experiments: Sequence[Experiment], *, without: Sequence[str] = (), seed: int = 0, **settings: Any
 ) -> dict[str, Any]:
-    """The content of ``discovery.json`` for the experiments of one file (see `investigate`)."""
+    """The content of ``discovery.json`` for the experiments of one file (see `investigate`).
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Those of one material are judged jointly.
+    without : sequence of str
+        Effects taken out of the catalogue.
+    seed : int
+    **settings
+        Fields of `Settings`.
+
+    Returns
+    -------
+    dict
+    """
     kinds = catalogue_without(without, settings.pop("kinds", CATALOGUE))
     return investigate(experiments, Settings(kinds=kinds, **settings), seed).report
 

@@ -127,7 +127,19 @@ def shrinking(
 
 
 def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.Generator) -> tuple[Effect, ...]:
-    """A block's effects that one of its experiments can show alone, and a discrepancy as large as what they leave."""
+    """A block's effects that one of its experiments can show alone, and a discrepancy as large as what they leave.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+    experiment : Experiment
+        One of the block's.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    tuple of Effect
+    """
     own = alone(block.effects, experiment)
     fit = fitted([experiment], own, block.law, block.history, rng)
     return (*own, discrepancy(experiment, left_over(fit, experiment.name)))

@@ -112,7 +112,19 @@ class _Frontier:
     credit: dict[Key, float] = field(default_factory=dict)
 
     def add(self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf) -> None:
-        """A set that a refit found, unless another order of the same names found a better one."""
+        """A set that a refit found, unless another order of the same names found a better one.
+
+        Parameters
+        ----------
+        parent : EffectSet
+            The set that was refitted with one more effect.
+        name : str
+            Of that effect.
+        found : NameEvidence
+            What the refit says of it beside the parent.
+        credit : float
+            Log Bayes factor that the set may come to with a remainder beside it, as far as is known.
+        """
         names = (*parent.names, name)
         key = frozenset(names)
         value = parent.log_bayes + found.log_bayes[name]

@@ -79,7 +79,25 @@ def decide(
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> Decision:
-    """Weigh the sets, leave out those whose last effect does not predict, and test the best one once more."""
+    """Weigh the sets, leave out those whose last effect does not predict, and test the best one once more.
+
+    Parameters
+    ----------
+    plain : list of LaplaceFit
+        One a material.
+    explored : Explored
+        Sets of effects that the search visited, with their evidence and fits.
+    copies : mapping of name to int
+        How many names share one signature in these tests (`power.copies`); they share its prior.
+    settings : Settings
+    rng : numpy.random.Generator
+    parallel_map : function
+        The built-in `map`, or one over processes.
+
+    Returns
+    -------
+    Decision
+    """
     sets, gains = list(explored.sets), dict[Key, Array]()
     count, blocks = len(settings.kinds), len(plain)
 
@@ -263,7 +281,24 @@ class Alternative:
 def alternatives(
     decision: Decision, explored: Explored, i: int, final: LaplaceFit, verdict: Verdict
 ) -> list[Alternative]:
-    """The final model of block `i` and the others that share the probability with it, at most `MOST_ALTERNATIVES`."""
+    """The final model of block `i` and the others that share the probability with it, at most `MOST_ALTERNATIVES`.
+
+    Parameters
+    ----------
+    decision : Decision
+    explored : Explored
+    i : int
+        Number of the block among the materials.
+    final : LaplaceFit
+        The block's final model.
+    verdict : str
+        Of the block; a partial one has the discrepancy beside its effects.
+
+    Returns
+    -------
+    list of Alternative
+        The final model first, probabilities summing to one; empty where it stands alone.
+    """
     found = decision.posterior
     blocks: dict[tuple[str, bool], LaplaceFit] = {}
     weights: dict[tuple[str, bool], float] = {}

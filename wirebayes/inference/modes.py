@@ -16,8 +16,9 @@ from wirebayes.inference.transform import LogPosterior
 
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
-_LEAST_CURVATURE = 0.3
+_LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
 _LOOKED = 400  # places that are asked whether a mode explains them
+# where on the line to a mode the density is evaluated: a valley between two hills seldom avoids all three
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
 _WARM_STEPS = 4  # the last ones of the cooling
@@ -25,6 +26,7 @@ _LEAST_SAG = 1.0  # nats
 _LOOKS = 12  # at most, for modes that explain places left over
 _MANY = 2  # new modes in one look: there may be more
 _ONE_MODE = 4.0  # squared standard deviations
+# of a Newton step, tried in one batch: whole, down to a thousandth where the curvature misleads
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 

@@ -21,8 +21,9 @@ from wirebayes.model.replicate import readings
 
 Array = NDArray[Any]
 JOINT = "log_likelihood"
+# every percentile: the ranks of some hundred data sets say no more between them
 _GRID = np.linspace(0.0, 1.0, 101)[1:-1]
-_CHUNK = 10_000
+_CHUNK = 10_000  # replicates at a time: bounds the memory
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,6 @@ def _covariance(x: Array) -> Array:
     return np.asarray(np.cov(x.T).reshape(x.shape[1], x.shape[1]))
 
 
-_DRAWS = 4000
+_DRAWS = 4000  # a variance is then known to 2 %, and `_SAYS_SOMETHING` is 20 %
 _SAYS_SOMETHING = 0.2  # of the prior's precision: less may be chance of the draws
 _SPREADS, _LINES = (1e-8, 1e8), (1e-100, 1e100)  # beyond, there are no digits left; priors are far inside

@@ -302,4 +302,4 @@ def hold_courses(
     return out
 
 
-_NEWTON_STEPS = 30
+_NEWTON_STEPS = 30  # a limit for absurd parameters: others reach the tolerance after a few

@@ -16,6 +16,7 @@ from wirebayes.wire.staircase import simulate
 
 Array = NDArray[Any]
 _ROWS = 2048  # draws completed at once
+# relative; far more than rounding errors of parameters that fit, far less than a log-likelihood has to resolve
 _ROUNDING = 1e-6
 
 

@@ -163,6 +163,7 @@ def _wire_defaults(length_mm: float) -> dict[str, Any]:
     }
 
 
+# for each form its keys in a TOML table, and how scipy makes it of them
 _FORMS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "normal": (("mean", "sd"), lambda mean, sd: stats.norm(mean, sd)),
     "half-normal": (("sd",), lambda sd: stats.halfnorm(0.0, sd)),

@@ -19,8 +19,8 @@ from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.wire.staircase import linearise
 
 Array = NDArray[Any]
-LEVELS = (0.5, 0.9, 0.99)
-QUANTILES = (0.005, 0.05, 0.25, 0.5, 0.75, 0.95, 0.995)
+LEVELS = (0.5, 0.9, 0.99)  # half, the usual nine in ten, and nearly all: intervals whose coverage is counted
+QUANTILES = (0.005, 0.05, 0.25, 0.5, 0.75, 0.95, 0.995)  # the ends of those intervals, and the median
 
 
 @dataclass(frozen=True)
@@ -252,4 +252,4 @@ def two_thirds(recorded: int) -> int:
     return int(round(2.0 * recorded / 3.0))
 
 
-_CHUNK = 1000
+_CHUNK = 1000  # draws at a time: bounds the memory of the staircases

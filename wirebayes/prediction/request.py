@@ -211,7 +211,7 @@ class _File:
                     raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
 
 
-_SAME_K = 1e-6
+_SAME_K = 1e-6  # kelvin: readings are stored as differences from the first, so only rounding is forgiven
 
 
 def _joined(before: Protocol, after: Protocol) -> Protocol:

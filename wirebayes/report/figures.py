@@ -16,7 +16,7 @@ Array = NDArray[Any]
 CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
 COLOURS = {"chain": CHAIN, "hold": HOLD}
 WORDS = {"chain": "holds as one chain", "hold": "hold by hold"}
-_SIZE = (4.7, 3.4)
+_SIZE = (4.7, 3.4)  # inches: two panels stand side by side on a page
 
 
 def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] = _SIZE) -> tuple[Figure, Any]:

@@ -14,7 +14,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, drift
 
 STEPS = ("table_4_elongation", "table_4_strain", "chain_strain", "chain_workspace")
-_GRID = (3, 3, 2)
+_GRID = (3, 3, 2)  # poses along each axis, as in `section_4`, so that the figures compare
 
 
 def rows(

@@ -27,7 +27,7 @@ Array = NDArray[Any]
 Row = dict[str, Any]
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
 POLICY = Policy()
-_PRIOR_DRAWS = 20_000
+_PRIOR_DRAWS = 20_000  # cheap, so many: a 5 % quantile is then one between 4.7 % and 5.3 %
 
 
 def reproduce(

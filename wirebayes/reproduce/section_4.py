@@ -29,6 +29,7 @@ ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as 
 CASES = ((0.0, 0.0), (0.05, 0.0), (0.05, 3600.0))
 _DRAWS, _GRID = 100, (3, 3, 2)
 MAPPED = "linear-7"
+# evenly spread on a logarithmic axis: the minute that the paper speaks of, and on to an hour
 _TIMES_S = np.array([1.0, 3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0])
 _MAP, _SIZES, _FEW = (7, 7, 3), (0.5, 1.0, 2.0), 40
 

@@ -19,10 +19,10 @@ from wirebayes.model.prior import fast_logpdf
 from wirebayes.wire.fresh import FreshSample
 
 Array = NDArray[Any]
-SENSITIVE = 0.05
+SENSITIVE = 0.05  # the threshold that the authors of the method propose
 RIDGE = 0.9  # correlation above which two parameters are known in combination only
-_POWERS = (1.0 / 1.1, 1.1)
-_DRAWS = 4000
+_POWERS = (1.0 / 1.1, 1.1)  # so small that weights stay even, so large that the change exceeds the chance of 4000 draws
+_DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 _statistics: Any = array_stats
 
 
@@ -212,6 +212,7 @@ class Extrapolation:
                 "pareto_k": self.pareto_k, "sentence": sentence, "warning": self.warning}  # fmt: skip
 
 
+# from within a hold to the day that robots ask for; evenly spread on a logarithmic axis
 TIMES_S = np.array([10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0, 7200.0, 14400.0, 28800.0, 86400.0])
 TRUSTED_K = 0.7  # of importance weights (Vehtari et al., Pareto smoothed importance sampling)
 

@@ -34,10 +34,11 @@ from wirebayes.wire.staircase import Model
 Array = NDArray[Any]
 UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", "sensor_sd": "N",
          "setting_sd": "mm", LENGTH_EXPONENT: "1"}  # fmt: skip
+# a hold of the paper, and what a robot on the wire works through
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
 _PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
-_CHUNK = 2000
+_CHUNK = 2000  # draws at a time: bounds the memory
 
 
 def save(

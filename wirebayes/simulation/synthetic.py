@@ -27,7 +27,7 @@ from wirebayes.wire.staircase import simulate, tension_reference
 
 Array = NDArray[Any]
 FILE, TRUTH = "experiments.toml", "truth.json"
-PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)
+PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)  # when the paper read its holds
 
 
 @dataclass(frozen=True)

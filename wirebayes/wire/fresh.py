@@ -24,7 +24,7 @@ from wirebayes.wire.staircase import Model, Theta
 
 Array = NDArray[Any]
 _LOG_TIMES = -50.0, 700.0  # logarithms of the times between which the median creep time is looked for
-_HALVINGS = 60
+_HALVINGS = 60  # 750 over two to the 60th is less than rounding
 
 
 @dataclass(frozen=True)

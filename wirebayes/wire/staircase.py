@@ -17,7 +17,7 @@ from wirebayes.wire.effect import Effect, HoldContext, Placed
 from wirebayes.wire.protocol import Protocol
 
 Theta = Mapping[str, NDArray[Any]]
-_NONE: NDArray[Any] = np.zeros((1, 1))
+_NONE: NDArray[Any] = np.zeros((1, 1))  # stands in for what the hold has not computed yet
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 
 

@@ -7,7 +7,8 @@ from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, 
 from wirebayes.workflows.results import POSTERIOR, Export, Place
 from wirebayes.workflows.wires import RobotLike, Wires, configuration, draws_of, folder_of, robot_of
 
-TENSIONS_N = (1.0, 2.0, 4.0, 8.0)
+TENSIONS_N = (1.0, 2.0, 4.0, 8.0)  # an option; doubling, because creep goes as a power of the tension
+# an option; a minute to a day, because creep goes as a power of the time at first
 TIMES_S = (60.0, 600.0, 3600.0, 86400.0)
 
 

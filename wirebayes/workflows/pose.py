@@ -19,6 +19,7 @@ from wirebayes.workflows.options import (
 from wirebayes.workflows.results import POSTERIOR, Place, Pose
 from wirebayes.workflows.wires import RobotLike, Wires, configuration, content, draws_of, folder_of, robot_of
 
+# an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
 
 

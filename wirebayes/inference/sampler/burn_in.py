@@ -238,13 +238,15 @@ def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> 
     return drawn[:n], values[:n]
 
 
+# of the covariance at a mode: too narrow a start misses what is bent, too wide a one costs some draws
 _OVERDISPERSED = 1.7
 _WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the longer the more often it has to
 _HOT = 0.4  # power of the density that the wide part of the proposal is fitted to
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
-_GOOD_ACCEPTANCE = 0.25
+_GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, independent draws are some 7 steps apart
 _PASSING = 5000  # points for a proposal that only the next round draws from
 _IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are as many draws as asked for; the fewest before
 _TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where the last proposal overlooked places
+# steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
 _LONGEST_SETTLING = 8
 _MOST_COMPONENTS = 24  # however many modes there are

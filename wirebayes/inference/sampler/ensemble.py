@@ -206,7 +206,7 @@ def _promises_more(state: State, policy: Policy) -> bool:
     return bool(poor or going_on > policy.ess / _USUAL + policy.round_draws)
 
 
-_LEAST_BLOCK = 8
+_LEAST_BLOCK = 8  # steps between two looks at the stop rule, which is not to be evaluated after every one
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
 _WEIGHED = 16384  # kept draws whose weights are looked at
 _MOST_AGAIN = 5  # times that the proposal may be learned once more for what it overlooks

@@ -15,6 +15,7 @@ COMMON: dict[Role, tuple[str, ...]] = {
     "displacement": ("mm", "cm", "m", "in"), "time": ("s", "min", "h", "ms"), "tension": ("N", "kN", "kgf", "lbf"),
     "temperature": ("°C", "°F", "K"),
 }  # fmt: skip
+# seconds that the first number of a two-part clock counts; three parts leave no doubt
 CLOCKS = {"mm:ss": 60.0, "m:ss": 60.0, "min:s": 60.0, "hh:mm": 3600.0, "h:mm": 3600.0, "hh:mm:ss": 1.0, "h:mm:ss": 1.0}
 
 # Spellings that pint does not know, or knows as something else.

@@ -29,7 +29,7 @@ from wirebayes.results.contraction import LEAST_CONTRACTION, contraction
 from wirebayes.results.store import Stored, experiments_in, load, prior_draws, unit_of
 
 Array = NDArray[Any]
-_DRAWS = 1000
+_DRAWS = 1000  # for bands in pictures: a 5 % quantile is then one between 3.6 % and 6.4 %
 _SPOKEN = {"creep_2min_mm": "2 min", "creep_1h_mm": "1 h", "creep_1day_mm": "1 day"}
 
 

@@ -8,7 +8,7 @@ Rows = list[dict[str, Any]]
 VERDICTS = {"inside": "good", "outside": "bad", "not determined": "open", "yes": "good", "no": "bad"}
 LIKELIHOOD = {"chain": "chain", "hold": "hold by hold"}
 LEAST_COVERAGE = 0.75  # of readings in a band that promises 0.9
-_TIMES = {120.0: "2 min", 3600.0: "1 h", 86400.0: "1 day"}
+_TIMES = {120.0: "2 min", 3600.0: "1 h", 86400.0: "1 day"}  # as people say them
 
 
 def measured(rows: Rows) -> Table:

@@ -161,7 +161,7 @@ def _residuals(axis: Axes, stored: store.Stored, held: list[int]) -> None:
 
 
 _SHOWN = 0.05  # p of a pattern that is worth a picture
-_GROUPS = 12
+_GROUPS = 12  # points of the line of means: each is the mean of some five readings of a test like the paper's
 _LABELS = {
     "hold": "hold number",
     "displacement": "displacement (mm)",

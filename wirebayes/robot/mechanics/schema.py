@@ -239,7 +239,7 @@ def _is_number(value: Any) -> bool:
     return -_LARGEST < value < _LARGEST  # an integer may be too large for any float
 
 
-_LARGEST = 1e12
+_LARGEST = 1e12  # no length, mass or stiffness comes near, and its square does not overflow
 
 
 def _kind(value: Any) -> str:

@@ -17,6 +17,7 @@ from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model
 
 Floats = NDArray[np.float64]
+# nodes and weights exact for polynomials of degree 15; between slack and stretched the laws are smooth
 _GAUSS = np.polynomial.legendre.leggauss(8)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
 
 Floats = NDArray[np.float64]
-QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
+QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}  # the median and the 90 % interval, as everywhere
 
 
 @dataclass(frozen=True)
