@@ -156,7 +156,18 @@ def _order(value: float, digits: int) -> int:
 
 
 def span(low: Any, high: Any, digits: int = 3) -> str:
-    """An interval for people."""
+    """An interval for people.
+
+    Parameters
+    ----------
+    low, high : float
+    digits : int
+        Significant ones.
+
+    Returns
+    -------
+    str
+    """
     return f"{number(low, digits)} … {number(high, digits)}"
 
 

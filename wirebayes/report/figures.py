@@ -20,7 +20,19 @@ _SIZE = (4.7, 3.4)  # inches: two panels stand side by side on a page
 
 
 def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] = _SIZE) -> tuple[Figure, Any]:
-    """An empty panel with labelled axes."""
+    """An empty panel with labelled axes.
+
+    Parameters
+    ----------
+    xlabel, ylabel, title : str
+    size : (float, float)
+        Width and height, inches.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+    axes : matplotlib.axes.Axes
+    """
     figure = Figure(figsize=size, layout="constrained")
     axes: Any = figure.subplots()
     axes.set_xlabel(xlabel)
@@ -38,7 +50,15 @@ def legend(axes: Any, **where: Any) -> None:
 
 
 def legend_below(figure: Figure, axes: Any, columns: int = 2) -> None:
-    """A legend under the panel, where it hides nothing."""
+    """A legend under the panel, where it hides nothing.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    axes : matplotlib.axes.Axes
+        Whose labelled lines the legend names.
+    columns : int
+    """
     place: Any = "outside lower center"
     figure.legend(
         *axes.get_legend_handles_labels(), loc=place, ncols=columns, frameon=False, fontsize=8.5, handlelength=1.6
@@ -117,7 +137,21 @@ def logarithmic(axes: Any, which: str = "x") -> None:
 def marginals(
     draws: Mapping[str, Array], prior: Mapping[str, Array] | None = None, effects: tuple[Any, ...] = ()
 ) -> list[tuple[str, Figure]]:
-    """One histogram a parameter, the prior behind it: (name, figure)."""
+    """One histogram a parameter, the prior behind it.
+
+    Parameters
+    ----------
+    draws : mapping of name to (n,) array
+        Of the posterior; a parameter that does not vary is left out.
+    prior : mapping of name to (m,) array, optional
+        Draws of the prior.
+    effects : tuple of Effect
+        Those of the model, for the units of their amplitudes.
+
+    Returns
+    -------
+    list of (name, figure)
+    """
     out = []
     for name, values in draws.items():
         if np.ptp(values) == 0:

@@ -59,7 +59,21 @@ def _told(summary: dict[str, Any]) -> Section:
 
 
 def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) -> Section:
-    """Readings, verdict, intervals and residuals of one experiment."""
+    """Readings, verdict, intervals and residuals of one experiment.
+
+    Parameters
+    ----------
+    stored : Stored
+        The posterior of the experiment.
+    prior : dict of name to (m,) array
+        Draws of the prior.
+    summary : dict
+        The fit's ``summary.json``.
+
+    Returns
+    -------
+    Section
+    """
     sample, draws = stored.sample, stored.draws
     sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
     shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}

@@ -24,7 +24,22 @@ def measured(rows: Rows) -> Table:
 
 
 def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -> Table:
-    """Published and refitted parameters in one reading of the model."""
+    """Published and refitted parameters in one reading of the model.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Those of ``least_squares.json``.
+    likelihood : {"chain", "hold"}
+    history : {"saturating", "additive"}
+    law : {"hooke", "modified"}
+        Which rows are shown.
+    caption : str
+
+    Returns
+    -------
+    Table
+    """
     chosen = [r for r in rows if (r["likelihood"], r["history"], r["elastic_law"]) == (likelihood, history, law)]
     header = ["sample", "parameters", "k1, N", "B, mm N⁻ᵁ", "U", "k2, s⁻ᴺ", "N", "preload, mm"]
     header += ["rms, first five, N", "rms, rest, N", "rms, all, N", "parameters not constrained"]

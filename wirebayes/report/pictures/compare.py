@@ -12,7 +12,18 @@ _SEEN = 12.0  # worse by more than this many times the best-known spread is draw
 
 
 def save(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, Any]]) -> None:
-    """Write the pictures of one experiment into its folder."""
+    """Write the pictures of one experiment into its folder.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Of the experiment.
+    table : dict
+        Its entry in ``comparison.json``.
+    models : list of dict
+        What `wirebayes.comparison.compare.judge` returned for each model.
+    """
     save_figure(differences(name, table), folder / "differences.png")
     held = {m["name"]: m for m in models if m["failed"] is None and m["held_out"]}
     if table["base"] in held:

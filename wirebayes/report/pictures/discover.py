@@ -86,6 +86,15 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
     """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.png``.
 
     None for a pattern over what does not vary within the experiment.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the experiment; holds the ``plain`` posterior and receives the pictures.
+    verdict : dict
+        The experiment's entry in ``discovery.json``.
+    own_effects : Path, optional
+        File of a user's own effects.
     """
     stored = store.load(folder / "plain", own_effects=own_effects)
     sample, mask = stored.sample, stored.sample.protocol.mask

@@ -29,7 +29,17 @@ _COLOURS = (HOLD, CHAIN, "#5d8c4a")
 
 
 def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> None:
-    """Write the pictures that go with ``pose.json``; none when the pose cannot be held."""
+    """Write the pictures that go with ``pose.json``; none when the pose cannot be held.
+
+    Parameters
+    ----------
+    folder : Path
+    robot : Robot
+    asked : PoseRequest
+        The pose, its load and the times.
+    found : Answer
+        What was computed for it.
+    """
     if not found.courses or not found.courses[0.0].found.any():
         return
     content, pictures = found.content, {}
@@ -120,7 +130,22 @@ def _round(value: float) -> float:
 
 
 def in_time(drifts: Sequence[dict[str, Any]], key: str, label: str, title: str) -> Figure:
-    """One quantity against time with 90 % bands, one colour a specimen spread."""
+    """One quantity against time with 90 % bands, one colour a specimen spread.
+
+    Parameters
+    ----------
+    drifts : sequence of dict
+        One a specimen spread, at most two: ``times_s`` and the bands.
+    key : str
+        Which band is drawn.
+    label : str
+        Of the vertical axis.
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     figure, axes = panel("time, s", label, title)
     for entry, colour in zip(drifts, (CHAIN, HOLD), strict=True):
         spread = entry["specimen_spread"]
