@@ -1,7 +1,6 @@
 """Damaged, truncated and foreign files: every command that reads them works or ends in one plain line, exit code 2."""
 
 import collections
-import copy
 import json
 import random
 import shutil
@@ -14,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from tests.hostile.mutations import json_changed, netcdf_changed, scrambled, text_changed
 from wirebayes.cli import main
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
@@ -25,104 +25,8 @@ STORED = ROOT / "tests" / "data" / "results"
 SESSION = ROOT / "docs" / "example" / "linear-7-session.csv"
 ROBOTS = ROOT / "data" / "robots"
 HASTY = Policy(walkers=64, rounds=2, round_draws=1024, most_rounds=2, block=2, most_steps=2)
-WILD_TEXT = ["", "nan", "inf", "-1", "0", "1e308", "-1e308", "1e-320", "\x00", "\ud7ff", '"', "\r", "\n", ",", "=", "]"]
-WILD_JSON: list[Any] = [None, True, -1, 0, 1e308, -1e-320, 10**400, "", "x\ny", "<b>", [], [None], {}, {"a": 1}, [[[]]]]
-FOREIGN = [b"", b"\x89HDF\r\n\x1a\n", b"\xff\xfe\x00", b"[" * 100_000, b"{}", b"[]", b"0", b'"x"', b"null"]
 # the destructor of h5netcdf's File, which the command line silences
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-
-
-def scrambled(rng: random.Random, content: bytes) -> bytes:
-    """Bytes changed, cut off, repeated, or the whole of another file."""
-    way = rng.randrange(6)
-    at, end = sorted(rng.randrange(len(content) + 1) for _ in range(2))
-    if way == 0:
-        return content[:at]
-    if way == 1:
-        return content[:at] + content[end:]
-    if way == 2:
-        return content[:end] + content[at:]
-    if way == 3:
-        return rng.choice(
-            [b"", b"\x89HDF\r\n\x1a\n", b"\xff\xfe\x00", b"[" * 100_000, b"{}", b"[]", b"0", b'"x"', b"null"]
-        )
-    out = bytearray(content)
-    for _ in range(rng.choice([1, 3, 30])):
-        out[rng.randrange(len(out))] = rng.randrange(256)
-    return bytes(out)
-
-
-def words_changed(rng: random.Random, content: bytes) -> bytes:
-    """A number or word of a text replaced by a wild one, or a line moved, doubled or dropped."""
-    lines = content.decode("utf-8", "replace").splitlines(keepends=True)
-    for _ in range(rng.choice([1, 1, 1, 3])):
-        i = rng.randrange(len(lines))
-        way = rng.randrange(5)
-        if way == 0:
-            lines.insert(rng.randrange(len(lines)), lines[i])
-        elif way == 1 and len(lines) > 1:
-            del lines[i]
-        else:
-            separator = rng.choice([",", ",", " "])
-            cells = lines[i].split(separator)
-            wild = rng.choice([*WILD_TEXT, "9" * 5000, "0x" + "f" * 5000, "é", f"{rng.uniform(-10, 10):.3g}"])
-            cells[rng.randrange(len(cells))] = wild
-            lines[i] = separator.join(cells)
-    return "".join(lines).encode("utf-8", "surrogatepass")
-
-
-def json_changed(rng: random.Random, content: bytes) -> bytes:
-    """A value anywhere in a JSON document replaced, dropped or renamed."""
-    document = json.loads(content)
-    for _ in range(rng.choice([1, 1, 2, 5])):
-        here, places = document, []
-        while isinstance(here, dict | list) and here:
-            key = rng.choice(list(here) if isinstance(here, dict) else range(len(here)))
-            places.append((here, key))
-            here = here[key]
-        if not places:
-            break
-        parent, key = rng.choice(places)
-        way = rng.randrange(4)
-        if way == 0:
-            del parent[key]
-        elif way == 1 and isinstance(parent, dict):
-            parent[rng.choice(["", "name", "k1"])] = parent.pop(key)
-        else:
-            parent[key] = copy.deepcopy(rng.choice(WILD_JSON))  # a later change must not reach the list
-    return json.dumps(document).encode()
-
-
-def netcdf_changed(rng: random.Random, content: bytes, place: Path) -> bytes:
-    """A group, variable or attribute of a posterior gone, renamed, or of another kind."""
-    import h5py
-    import numpy as np
-
-    place.write_bytes(content)
-    with h5py.File(place, "r+") as file:
-        group = file[rng.choice(list(file))] if rng.random() < 0.8 else file
-        names = list(group)
-        way = rng.randrange(6)
-        name = rng.choice(names)
-        if way == 0:
-            del group[name]
-        elif way == 1:
-            group.move(name, f"{name}-else")
-        elif way in (2, 3) and isinstance(group[name], h5py.Dataset) and group[name].dtype.kind == "f":
-            values = group[name][...]
-            wild = rng.choice([np.nan, np.inf, -1.0, 0.0, 1e300, 1e-300, -1e29, 1e25])
-            if rng.random() < 0.5 or values.ndim == 0:
-                values[...] = wild
-            else:
-                values.flat[rng.randrange(values.size)] = wild
-            group[name][...] = values
-        elif group.attrs:
-            key = rng.choice(list(group.attrs))
-            if way == 4:
-                del group.attrs[key]
-            else:
-                group.attrs[key] = rng.choice(["", "[]", "[1]", '["x", "y"]', "nan", "{", 3.0, -1.0, "null"])
-    return place.read_bytes()
 
 
 @pytest.fixture(scope="module")
@@ -201,13 +105,11 @@ def damage_robot(seed: int, results: Path, folder: Path, capsys: pytest.CaptureF
     if rng.random() < 0.5:
         text = SESSION.read_bytes()
         session = folder / "session.csv"
-        session.write_bytes(
-            rng.choice([scrambled, words_changed, words_changed])(rng, b"".join(text.splitlines(True)[:4]))
-        )
+        session.write_bytes(text_changed(rng, b"".join(text.splitlines(True)[:4])))
     else:
         text = (ROBOTS / f"{robot}.toml").read_bytes()
         robot = str(folder / "robot.toml")
-        Path(robot).write_bytes(rng.choice([scrambled, words_changed, words_changed])(rng, text))
+        Path(robot).write_bytes(text_changed(rng, text))
     wires = ["--wires", str(results / "fit" / "simulated"), "--draws", "5", "--output", str(out)]
     command = ["calibrate", robot, str(session)] if session != SESSION or rng.random() < 0.3 else ["export", robot]
     return said([*command, *wires], out, capsys)

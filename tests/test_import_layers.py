@@ -8,7 +8,7 @@ import wirebayes
 ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors", "linear_algebra"},
-    {"units", "interrupt"},
+    {"units", "interrupt", "user_files"},
     {"workers"},
     {"wire"},
     {"io", "effects"},
@@ -23,7 +23,7 @@ LAYERS: list[set[str]] = [
     {"workflows"},
     {"cli"},
 ]
-ROBOT_MAY_USE = {"errors", "linear_algebra", "units", "wire", "robot"}
+ROBOT_MAY_USE = {"errors", "linear_algebra", "units", "user_files", "wire", "robot"}
 MAY_USE_ROBOT = {"report", "reproduce", "workflows", "cli", "__init__"}
 
 

@@ -16,6 +16,7 @@ _FACTORS: dict[str, dict[str, float]] = {
     "s": {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0, "h": 3600.0, "hr": 3600.0, "d": 86400.0},
 }  # fmt: skip
 _TEMPERATURES = {"F": "°C = (°F - 32) / 1.8", "K": "°C = K - 273.15"}
+_LONGEST = 80  # a word that is longer is no misspelt name, and is not compared with one
 _NAME = re.compile(r".*?[\s_\-/([]+°?(?P<unit>[^\W\d_]+)[\])]?")
 
 
@@ -34,6 +35,8 @@ def nearest(word: str, known: Sequence[str]) -> str:
         The nearest known word, or, where `word` names the same quantity in another unit, the factor between the two.
         A word in one unit is never suggested for a word in another.
     """
+    if len(word) > _LONGEST:
+        return ""
     unit = _unit(word)
     for name in known:  # a unit written without anything between
         quantity = name.rpartition("_")[0]

@@ -127,7 +127,7 @@ def test_a_picture_has_the_same_bytes_every_time():
         ("{", "no valid JSON"),
         ("[]", "found None"),
         ('{"command": "cook"}', "found 'cook'"),
-        ('{"command": "pose"}', "pose.json: no such file"),
+        ('{"command": "pose"}', "pose.json: found no such file"),
     ],
 )
 def test_a_folder_that_is_not_ours_is_one_plain_line(content, said, tmp_path, capsys):

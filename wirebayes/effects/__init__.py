@@ -1,6 +1,7 @@
 """The catalogue of effects, one small class each, a module per part of the bench."""
 
 import importlib.util
+import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -46,17 +47,19 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     """
     if own is None:
         return CATALOGUE
-    if not own.is_file():
-        raise InputError(f"{own}: no such file, expected a Python file with effects")
+    if not os.path.isfile(own):
+        raise InputError(f"{own}: found no such file, expected a Python file with effects")
     spec = importlib.util.spec_from_file_location(f"wirebayes_own_{own.stem}", own)
     if spec is None or spec.loader is None:
-        raise InputError(f"{own}: not a Python file (its name should end in .py)")
+        raise InputError(f"{own}: found no Python file by its name, expected one that ends in .py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # so that other processes can be sent its effects
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever the user's file raises is told in one line
-        raise InputError(f"{own}: cannot be run: {type(error).__name__}: {error}") from None
+        raise InputError(
+            f"{own}: cannot be run ({type(error).__name__}: {error}), expected a Python file with effects"
+        ) from None
     found = [
         v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Effect) and v.__module__ == spec.name
     ]
@@ -64,12 +67,15 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     for effect in found:
         lacking = [a for a in ("name", "place", "scope", "amplitudes", "sentence") if not hasattr(effect, a)]
         if lacking:
-            raise InputError(f"{own}: effect {effect.__name__} lacks {', '.join(lacking)}")
+            raise InputError(
+                f"{own}: found the effect {effect.__name__} that lacks {', '.join(lacking)}, expected all of them"
+            )
         if effect.name in CATALOGUE:
-            raise InputError(f"{own}: effect {effect.__name__} takes the name {effect.name}, which the catalogue has")
+            taken = f"the effect {effect.__name__} with the name {effect.name} of the catalogue"
+            raise InputError(f"{own}: found {taken}, expected another name")
         effects[effect.name] = effect
     if not effects:
-        raise InputError(f"{own}: no effect in it, expected a class derived from wirebayes.wire.effect.Effect")
+        raise InputError(f"{own}: found no effect in it, expected a class derived from wirebayes.wire.effect.Effect")
     return CATALOGUE | effects
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.io.readings import LARGEST, STRETCH, Hold, Table, frozen, read_text, readings_of, readings_table, shown
+from wirebayes.io.readings import LARGEST, STRETCH, Hold, Table, frozen, readings_of, readings_table, shown
 from wirebayes.io.toml_keys import Keys, read_toml
 from wirebayes.units import nearest
+from wirebayes.user_files import read_text
 from wirebayes.wire.protocol import Protocol
 
 __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
@@ -312,7 +314,7 @@ def _readings_path(keys: Keys) -> Path:
         inside = False
     if not inside:
         raise keys.complain("readings", shown(readings), expected)
-    if not (folder / readings).is_file():
+    if not os.path.isfile(folder / readings):
         raise keys.complain("readings", f"{shown(readings)}, which is no file there", expected)
     return folder / readings
 

@@ -1,5 +1,6 @@
 """A plan: tests that could be done, what is guessed of the wire, and what they are for; read from TOML."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from wirebayes.io.experiment import ENOUGH, LEAST_HOLDS, LEAST_READINGS, SHORTEST
-from wirebayes.io.readings import LARGEST, STRETCH, read_text, shown
+from wirebayes.io.readings import LARGEST, STRETCH, shown
 from wirebayes.io.toml_keys import Keys, read_toml
 from wirebayes.units import nearest
+from wirebayes.user_files import read_text
 
 KIND = "protocol"
 GUESSED = ("k1", "B", "U", "k2", "N", "preload", "sensor_sd", "setting_sd")
@@ -124,7 +126,7 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
     expected = "a time budget above 0 min"
     budget = top.number("budget_min", expected, above=0.0) if "budget_min" in document else None
     robot = top.string("robot", "a robot's name or file") if "robot" in document else None
-    if robot is not None and (path.parent / robot).is_file():
+    if robot is not None and os.path.isfile(path.parent / robot):
         robot = str(path.parent / robot)
     material = top.string("material", "a name") if "material" in document else "line"
     priors = top.priors()
@@ -235,7 +237,7 @@ def _path(top: Keys, key: str, expected: str) -> Path | None:
     if key not in top.table:
         return None
     path = top.source.parent / top.string(key, expected)
-    if not path.is_dir():
+    if not os.path.isdir(path):
         raise top.complain(key, f"{shown(top.table[key])}, which is no folder there", expected)
     return path
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.units import nearest
+from wirebayes.user_files import read_text
 
 REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
 OPTIONAL = ("temperature_C",)
@@ -29,7 +30,7 @@ LARGEST = {
     "temperature_C": 1e4,  # above the boiling point of every wire
 }
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 _NEWLINE = re.compile(r"\r\n|\n|\r")
 
@@ -74,45 +75,6 @@ def shown(value: object) -> str:
     except ValueError:  # Python does not print integers of thousands of digits
         return "a number of thousands of digits"
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def read_bytes(path: Path) -> bytes:
-    """The content of a file.
-
-    Raises
-    ------
-    InputError
-        Missing or unreadable.
-    """
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: found no such file, expected a readable file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: found a folder, expected a file") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{path}: cannot be read ({reason}), expected a readable file") from None
-
-
-def read_text(path: Path, expected: str = "text") -> str:
-    """The text of a UTF-8 file, without its byte-order mark; `expected` says what an empty file should hold.
-
-    Raises
-    ------
-    InputError
-        Missing, unreadable, empty, or not UTF-8 (names the line of the first bad byte).
-    """
-    raw = read_bytes(path)
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = len(_NEWLINE.split(raw[: error.start].decode("utf-8", "replace")))
-        found = f"byte 0x{error.object[error.start]:02x}"
-        raise InputError(f"{path}, line {line}: found {found}, expected UTF-8 text") from None
-    if not text.strip():
-        raise InputError(f"{path}, line 1, column 1: found an empty file, expected {expected}")
-    return text
 
 
 @dataclass(frozen=True)
@@ -319,12 +281,18 @@ def _holds(table: Table, length_mm: float, tension: Sequence[float]) -> tuple[Ho
             )
         )
         start += time[end - 1]
+    size = len(holds) * max(hold.time_s.size for hold in holds)
+    if size > MOST:
+        found = f"{len(holds)} holds, the longest of {max(hold.time_s.size for hold in holds)} readings"
+        expected = f"at most {MOST} as holds times readings of the longest; `wirebayes import` thins a recording"
+        raise InputError(f"{table.path}: found {found}, expected {expected}")
     if times_run_on([hold.time_s for hold in holds]) < RUN_ON_CERTAIN:
         expected = f"the time since hold {number[first[1]]} began, not since the test began (0 s at each hold's start)"
         raise table.complain(first[1], "time_s", table.cell(first[1], "time_s"), expected)
     return tuple(holds)
 
 
+MOST = 100_000  # padded readings: thousands of walkers and simulations of more fill the memory of a desk's computer
 STRETCH = 8.0  # the most elastic thread breaks at seven times its length
 RUN_ON_CERTAIN = 1e-4  # three holds of four readings; two holds of five may still be an odd protocol (0.004)
 

@@ -20,6 +20,7 @@ from typing import Any, Literal
 from wirebayes import __version__
 from wirebayes.errors import InputError
 from wirebayes.interrupt import unfinished
+from wirebayes.user_files import read_bytes
 
 CONFIGURATION = "configuration.json"
 COMPLETE = "complete.json"
@@ -103,9 +104,10 @@ def read_json(path: Path, otherwise: str = "") -> Any:
         It is absent or not JSON.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        raise InputError(otherwise or f"{path}: no such file, expected the results of a finished command") from None
+        return json.loads(read_bytes(path))
+    except InputError as error:
+        absent = otherwise or f"{path}: found no such file, expected the results of a finished command"
+        raise (InputError(absent) if not path.exists() else error) from None
     except (ValueError, RecursionError):
         raise InputError(f"{path}: found no valid JSON, expected what the command wrote") from None
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.errors import InputError
+from wirebayes.io.readings import shown
 
 Array = NDArray[Any]
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
@@ -185,20 +186,20 @@ def from_table(key: str, table: Any) -> Any:
     """
     if not isinstance(table, Mapping):
         raise InputError(
-            f'{key}: found {table!r}, expected a table such as {{ distribution = "normal", mean = 0.0, sd = 1.0 }}'
+            f'{key}: found {shown(table)}, expected a table such as {{ distribution = "normal", mean = 0.0, sd = 1.0 }}'
         )
     if set(table) == {"fixed"}:
         return _number(f"{key}.fixed", table["fixed"])
     form = table.get("distribution")
     if not isinstance(form, str) or form not in _FORMS:
-        found = repr(form) if "distribution" in table else "no such key"
+        found = shown(form) if "distribution" in table else "no such key"
         raise InputError(f"{key}.distribution: found {found}, expected one of {', '.join(_FORMS)} (or fixed = VALUE)")
     wanted, build = _FORMS[form]
     extra, missing = set(table) - {"distribution", *wanted}, set(wanted) - set(table)
     if extra or missing:
         raise InputError(
-            f"{key}: a {form} distribution takes {', '.join(wanted)}; "
-            f"found {', '.join(sorted(set(table) - {'distribution'})) or 'none'}"
+            f"{key}: found {shown(', '.join(sorted(set(table) - {'distribution'})) or 'nothing')}, "
+            f"expected {', '.join(wanted)} of a {form} distribution"
         )
     values = {name: _number(f"{key}.{name}", table[name]) for name in wanted}
     for name in ("sd", "sd_log", "median"):
@@ -210,6 +211,10 @@ def from_table(key: str, table: Any) -> Any:
 
 
 def _number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise InputError(f"{key}: found {value!r}, expected a finite number")
+    expected = f"a finite number of at most {_LARGEST:.0e} in size"
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
+        raise InputError(f"{key}: found {shown(value)}, expected {expected}")
     return float(value)
+
+
+_LARGEST = 1e100  # squares and exponentials of what is larger overflow

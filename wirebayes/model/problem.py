@@ -15,6 +15,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.model.prior import Prior, from_table, wire_defaults
+from wirebayes.units import nearest
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Protocol
@@ -228,9 +229,8 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
             if hits:
                 distributions[hits[0]] = wanted
             elif name not in everything and "." not in name:
-                raise InputError(
-                    f"{key}: no such parameter; known are {', '.join(sorted(everything))} and effect.parameter"
-                )
+                known = f"one of {', '.join(sorted(everything))}, or effect.parameter"
+                raise InputError(f"{key}: found no such parameter{nearest(name, sorted(everything))}, expected {known}")
 
 
 def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
@@ -17,6 +18,12 @@ CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
 COLOURS = {"chain": CHAIN, "hold": HOLD}
 WORDS = {"chain": "holds as one chain", "hold": "hold by hold"}
 _SIZE = (4.7, 3.4)  # inches: two panels stand side by side on a page
+
+
+def verbatim(text: str) -> str:
+    """A user's words for a picture as they stand: no formulas between dollars, a mark for what the font lacks."""
+    has = get_font(findfont(FontProperties())).get_char_index
+    return "".join(c if has(ord(c)) else "\ufffd" for c in text).replace("$", r"\$")
 
 
 def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] = _SIZE) -> tuple[Figure, Any]:

@@ -11,6 +11,7 @@ from wirebayes.io import data_checks
 from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
 from wirebayes.io.bench.undecided import Choices, Decimal, TimeSince, Undecided
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
+from wirebayes.user_files import read_bytes
 from wirebayes.workflows.options import PathLike, above_zero, check_choice, words
 from wirebayes.workflows.results import IMPORTED, ImportedTests, Place
 
@@ -97,7 +98,7 @@ def import_bench(
         tests.append(test)
     configuration = {
         "command": "import", "version": __version__,
-        "raw": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in paths},
+        "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
         "names": names, "length_mm": float(length_mm), "material": material, **vars(choices),
     }  # fmt: skip
     place = Place.at(output)

@@ -11,8 +11,9 @@ from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.sheet import is_moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
+from wirebayes.io.readings import shown
 
-_CLOCK = re.compile(r"(\d+):(\d{1,2})(?::(\d{1,2}))?(?:[.,](\d+))?")
+_CLOCK = re.compile(r"(\d{1,12}):(\d{1,2})(?::(\d{1,2}))?(?:[.,](\d+))?")
 _DAY = 86400.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
 
@@ -50,7 +51,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
         days.append(_day(table, row.line, column, day.strip()) if day else 0.0)
         found = _CLOCK.fullmatch(clock)
         if not found:
-            raise table.complain(row.line, column, repr(cell), "a time such as 0:01:30, as in the lines before")
+            raise table.complain(row.line, column, shown(cell), "a time such as 0:01:30, as in the lines before")
         clocks.append(found)
     short = next((i for i, m in enumerate(clocks) if m[3] is None), None)
     leading = 3600.0

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.thinning import MOST, thinned
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided, listed
 from wirebayes.io.experiment import Experiment, experiment_of
-from wirebayes.io.readings import OPTIONAL, REQUIRED, Table
+from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
 from wirebayes.io.toml_keys import Keys
 
 Floats = NDArray[np.float64]
@@ -33,6 +33,7 @@ _COLUMN_ROLES: dict[str, Role] = {
     "temperature_C": "temperature",
 }  # fmt: skip
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
+MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
 FAR_STEPS = 2.0  # and this many times the range of the test
 
 
@@ -118,6 +119,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     of_day = False
     if "time" not in values:
         values["time"], of_day = clock.seconds(table, columns["time"].index, columns["time"].unit)
+    _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
 
     def complain(row: int, role: str, found: str, expected: str) -> InputError:
@@ -219,7 +221,7 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
         if number is None:
             sign = "comma" if decimal == "comma" else "point"
             expected = f"a number (decimal {sign}, as elsewhere in the file)"
-            raise table.complain(row.line, column.index, repr(row.cell(column.index)), expected)
+            raise table.complain(row.line, column.index, shown(row.cell(column.index)), expected)
         out.append(number)
     return out
 
@@ -227,6 +229,15 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
 def _converted(column: Column, texts: list[str]) -> Floats:
     assert column.unit is not None
     return column.unit.convert(np.array([float(text) for text in texts]))
+
+
+def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[Any, Floats]) -> None:
+    """Refuse numbers that no bench can mean, before anything is computed with them."""
+    for name, role in _COLUMN_ROLES.items():
+        for row in np.flatnonzero(~(np.abs(values[role]) <= LARGEST[name]))[:1] if role in values else ():
+            line, index = table.rows[row].line, columns[role].index
+            expected = f"at most {LARGEST[name]:.0e} {UNITS[role]} in size"
+            raise table.complain(line, index, shown(table.rows[row].cell(index)), expected)
 
 
 def _from_zero(table: RawTable, column: Column, x: Floats, about: About, zero_mm: float | None) -> Floats:
@@ -249,11 +260,11 @@ def _hold_numbers(
         return None, []
     cells = table.column(column.index)
     plain = [plain_number(cell, decimal) for cell in cells]
-    if all(number is not None and float(number).is_integer() and float(number) >= 0 for number in plain):
+    if all(number is not None and float(number).is_integer() and 0 <= float(number) < MOST_HOLDS for number in plain):
         return np.array([int(float(number or 0)) for number in plain], dtype=np.int64), []
     odd = next((row for row in table.rows if is_number(row.cell(column.index))), None)
     if odd is not None:
-        raise table.complain(odd.line, column.index, repr(odd.cell(column.index)), "a whole number for each hold")
+        raise table.complain(odd.line, column.index, shown(odd.cell(column.index)), "a whole number for each hold")
     names = list(dict.fromkeys(cells))
     number_of = {name: i + 1 for i, name in enumerate(names)}
     numbers = np.array([number_of[cell] for cell in cells], dtype=np.int64)

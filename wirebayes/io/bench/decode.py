@@ -4,7 +4,7 @@ import codecs
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.io.readings import read_bytes
+from wirebayes.user_files import read_bytes
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
@@ -40,7 +40,7 @@ def decode(path: Path, raw: bytes) -> str:
         text = raw.decode(encoding)
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
-        found = f"a byte that is no {encoding.removesuffix('-sig').upper()}"
+        found = f"found a byte that is no {encoding.removesuffix('-sig').upper()}"
         raise InputError(f"{path}, line {line}: {found}, expected a text file") from None
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1

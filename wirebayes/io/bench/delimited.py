@@ -8,9 +8,12 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.sheet import Row, Sheet, is_value
 
 _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
+LONGEST_LINE = 100_000  # characters: thousands of columns; Python's csv refuses longer cells
 _LOOKED_AT = 2000  # lines: enough to see a habit
 _COMMENT = re.compile(r"\s*[\"']?(#|%|//)+\s*")
-_SEPARATOR = re.compile(r"\ufeff?\"?sep=(.)\"?\s*", re.IGNORECASE)  # the first line that Excel writes and obeys
+_SEPARATOR = re.compile(
+    r"\ufeff?\"?sep=([^\w\s\"']|\t)\"?\s*", re.IGNORECASE
+)  # the first line that Excel writes and obeys
 
 
 def sheet_of_text(path: Path, text: str) -> Sheet:
@@ -21,7 +24,11 @@ def sheet_of_text(path: Path, text: str) -> Sheet:
     InputError
         No sign splits the lines into columns of numbers.
     """
-    lines = text.splitlines()
+    lines = text.splitlines() or [""]
+    longest = max(range(len(lines)), key=lambda i: len(lines[i]))
+    if len(lines[longest]) > LONGEST_LINE:
+        found = f"a line of {len(lines[longest])} characters"
+        raise InputError(f"{path}, line {longest + 1}: found {found}, expected at most {LONGEST_LINE}")
     stated = _SEPARATOR.fullmatch(lines[0])
     if stated:
         lines[0] = ""
@@ -30,7 +37,7 @@ def sheet_of_text(path: Path, text: str) -> Sheet:
     scores = {sign: _score(sample, sign) for sign in candidates}
     best = max(scores, key=lambda sign: scores[sign])
     if not stated and scores[best][0] <= 0.0:
-        line = next(i for i, content in enumerate(lines, start=1) if content.strip())
+        line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
         expected = "cells between commas, semicolons, tabs or spaces"
         raise InputError(f"{path}, line {line}: found no columns of numbers, expected {expected}")
     return Sheet(path, _rows(lines, best), described=f"{_NAMES.get(best, best)} between cells")

@@ -74,7 +74,7 @@ def letters(column: int) -> str:
 
 def is_number(cell: str) -> bool:
     """Whether a cell looks like a number in any country's writing."""
-    return bool(_NUMBER.fullmatch(cell)) and any(c.isdigit() for c in cell)
+    return bool(_NUMBER.fullmatch(cell)) and any(c.isdigit() for c in cell.lower().partition("e")[0])
 
 
 def is_moment(cell: str) -> bool:

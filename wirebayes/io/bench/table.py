@@ -7,6 +7,7 @@ from wirebayes.io.bench.quantities import ROLES, unit_of
 from wirebayes.io.bench.sheet import Row, Sheet, is_value
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
+LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
 _SHOWN = 5  # rows that show how many columns there are
 
 
@@ -78,6 +79,11 @@ def find_table(sheet: Sheet) -> RawTable:
             f"{sheet.path}, line {rows[first].line}: found numbers without a header above them, expected a line of "
             "names and units such as displacement [mm], time [s], force [N]"
         )
+    wordy = next((column for column, cell in enumerate(head.cells) if len(cell) > LONGEST_HEADER), None)
+    if wordy is not None:
+        where = f"line {head.line}, column {sheet.column_name(wordy)}"
+        found = f"a header of {len(head.cells[wordy])} characters"
+        raise InputError(f"{sheet.path}, {where}: found {found}, expected at most {LONGEST_HEADER}")
     width = max(len(head.cells), *(len(row.cells) for row in rows[first : first + _SHOWN]))
     header = tuple(head.cell(column) for column in range(width))
     for column, name in enumerate(header):

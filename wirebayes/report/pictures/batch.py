@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wirebayes.report.figures import verbatim
+
 _SHOWN = {"k1": "k1 (N)", "B": "B (mm N⁻ᵁ) per m of length", "U": "U", "k2": "k2 (s⁻ᴺ)", "N": "N"}
 _MOST_BARS = 200  # specimens of which intervals are drawn: more are a smear
 _MOST_MATERIALS = 12  # columns whose labels can be read
@@ -42,7 +44,7 @@ def specimens_of_materials(rows: list[dict[str, Any]], far: list[dict[str, Any]]
             members = [row for row in rows if row["material"] == material and name in row["parameters"]]
             _column(axis, at, name, members, marked)
         axis.set_title(label, fontsize=9, loc="left")
-        axis.set_xticks(range(len(materials)), materials, rotation=90, fontsize=7)
+        axis.set_xticks(range(len(materials)), [verbatim(m) for m in materials], rotation=90, fontsize=7)
         axis.set_xlim(-0.6, len(materials) - 0.4)
         axis.tick_params(axis="y", which="both", labelsize=7)
         if name in ("k1", "B", "k2"):

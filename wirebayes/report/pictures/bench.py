@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.io.bench.convert import Recording
 from wirebayes.io.experiment import Experiment
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim
 
 Array = NDArray[Any]
 _MOST_NUMBERS = 40  # holds that can all be numbered in a picture
@@ -59,7 +59,8 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     upper.set_ylabel("displacement, mm")
     lower.set_ylabel("tension, N")
     lower.set_xlabel(f"time of the test, {unit}" + ("" if recording is not None else " (moves take none)"))
-    upper.set_title(f"{experiment.name}: {experiment.length_mm:g} mm of {experiment.material}; hold numbers above",
+    what = f"{experiment.name}: {experiment.length_mm:g} mm of {verbatim(experiment.material)}"
+    upper.set_title(f"{what}; hold numbers above",
                     fontsize=10.5, loc="left", color=INK, pad=16)  # fmt: skip
     for axes in (upper, lower):
         axes.spines[["top", "right"]].set_visible(False)

@@ -9,6 +9,8 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.report.figures import verbatim
+
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#bab0ac")
 _MOST = 6  # tests that a picture can hold
 
@@ -33,7 +35,7 @@ def widths_and_effects(plan: dict[str, Any], target: Path) -> None:
         quantities = row["parameters"] | row["creep"]
         share = [_share(quantities[n]) for n in names]
         places = np.arange(len(names)) + (i - (len(rows) - 1) / 2) * step
-        label = f"{row['rank']}. {row['name']}, {row['duration_min']:.3g} min"
+        label = f"{row['rank']}. {verbatim(row['name'])}, {row['duration_min']:.3g} min"
         left.plot(share, places, "o", color=_COLOURS[i], ms=4, label=label)
         there = [(at, row["effects"][e]) for at, e in enumerate(effects) if e in row["effects"]]
         seen = [(at, e["delta_prior"] / e["delta_80"]) for at, e in there if e["delta_80"]]

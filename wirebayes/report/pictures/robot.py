@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
 from wirebayes.report.pictures.robot_space import workspace_map
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
@@ -97,7 +97,7 @@ def scene(
         getattr(axes, f"set_{'xyz'[axis]}ticks")([float(position_m[axis])])  # flat: one tick is all there is room for
     axes.set_aspect("equal")
     axes.set_box_aspect(axes._box_aspect, zoom=0.94)
-    head = f"{robot.name}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"
+    head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"
     figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
     figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False, fontsize=8.5)
     return figure

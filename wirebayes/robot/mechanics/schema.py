@@ -1,6 +1,7 @@
 """Reads a robot's TOML file, strictly: every key known, every number finite, every complaint one line."""
 
 import math
+import os
 import tomllib
 from collections.abc import Callable
 from importlib import resources
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics.description import Drums, GivenWire, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.tensions import CHOICES
+from wirebayes.user_files import read_text
 
 Floats = NDArray[np.float64]
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
@@ -44,7 +46,7 @@ def read(name_or_file: str | Path) -> Robot:
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also what Python refuses: an integer of thousands of digits
-        raise InputError(f"{where}: not valid TOML: {error}") from None
+        raise InputError(f"{where}: found no valid TOML ({error}), expected the description of a robot") from None
     return _robot(_Table(table, where, ""))
 
 
@@ -53,14 +55,11 @@ def _text(name: str) -> tuple[str, str]:
         entry = resources.files("wirebayes") / "data" / "robots" / f"{name}.toml"
         return entry.read_text(encoding="utf-8"), f"{name} (shipped)"
     path = Path(name)
-    try:
-        return path.read_bytes().decode("utf-8"), name
-    except FileNotFoundError:
-        raise InputError(f"{name}: no such file, and no shipped robot of that name ({', '.join(shipped())})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{name}: not a UTF-8 text file") from None
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror})") from None
+    if not os.path.lexists(path):
+        raise InputError(
+            f"{name}: found no such file and no shipped robot of that name, expected a file or {', '.join(shipped())}"
+        )
+    return read_text(path, "the description of a robot"), name
 
 
 class _Table:
@@ -80,7 +79,7 @@ class _Table:
         self.asked.add(key)
         if key not in self.content:
             if default is None:
-                raise self.fail(key, "missing", expected)
+                raise self.fail(key, "found nothing", expected)
             return default
         return self.content[key]
 
@@ -120,7 +119,7 @@ class _Table:
     def finish(self) -> None:
         for key in self.content:
             if key not in self.asked:
-                raise self.fail(key, "unknown key", "one of " + ", ".join(sorted(self.asked)))
+                raise self.fail(key, "found an unknown key", "one of " + ", ".join(sorted(self.asked)))
 
 
 def _robot(t: _Table) -> Robot:
@@ -205,7 +204,7 @@ def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
             row["axis"] = leg.unit("swivel_axis")
         row |= _drum(leg) if actuator == "drum" else _drum(None)
         if row["wire"] != "default" and row["wire"] not in given:
-            raise leg.fail("wire", f"found {row['wire']!r}", "the name of a table under [wires], or no key")
+            raise leg.fail("wire", f"found {_shown(row['wire'])}", "the name of a table under [wires], or no key")
         leg.finish()
         out.append(row)
     return out

@@ -13,6 +13,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration.session import Session
+from wirebayes.user_files import read_text
 
 Floats = NDArray[np.float64]
 POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
@@ -51,12 +52,7 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
     InputError
         Naming line and column, what was found and what was expected.
     """
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a UTF-8 text file") from None
+    text = read_text(path, "the header " + ",".join(columns(robot, False)))
     return parse(str(path), text, robot, tension_sd_N, tilt_sd_rad)
 
 
@@ -73,7 +69,9 @@ def parse(
     try:
         numbered = [(lines.line_num, row) for row in lines if row]
     except csv.Error as error:
-        raise InputError(f"{source}: {place(lines.line_num)}: not CSV ({error}); expected cells with commas") from None
+        raise InputError(
+            f"{source}: {place(lines.line_num)}: found no CSV ({error}); expected cells with commas"
+        ) from None
     rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
     motors = bool(rows) and has_motors(rows[0])
@@ -84,7 +82,7 @@ def parse(
     cells = [_row(f"{source}: {place(line)}", row, wanted) for line, row in numbered[1:]]
     table = np.array(cells).reshape(-1, len(wanted))
     if not len(table):
-        raise InputError(f"{source}: no holds; expected at least one row")
+        raise InputError(f"{source}: found no holds; expected at least one row")
     w = robot.legs
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
     if motors and robot.drums is not None:
@@ -94,10 +92,10 @@ def parse(
     half = ~read_here & np.isfinite(measured).any(1)
     if half.any():
         raise InputError(
-            f"{source}: {place(numbered[int(np.argmax(half)) + 1][0])}: some readings are empty; expected all or none"
+            f"{source}: {place(numbered[int(np.argmax(half)) + 1][0])}: found some readings empty; expected all or none"
         )
     if not read_here.any():
-        raise InputError(f"{source}: no row has tensions; expected at least one")
+        raise InputError(f"{source}: found no row with tensions; expected at least one")
     turn = table[:, 4:7] if robot.degrees == 6 else np.tile(robot.home_rotation_rad, (len(table), 1))
     session = Session(
         table[:, 1:4], matrix(turn), joint, table[:, 7], read_here, tension_sd_N, tilt_sd_rad if tilted else None

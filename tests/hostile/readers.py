@@ -1,0 +1,114 @@
+"""Every reader of a user's text files, with a valid file for each, small enough to be read ten thousand times."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.conftest import CSV, TOML
+from wirebayes.io import plan_file
+from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.undecided import Choices
+from wirebayes.io.experiment import read_experiments
+from wirebayes.io.readings import protocol_holds, protocol_table
+from wirebayes.model.problem import build
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.self_calibration import session_file
+
+ROOT = Path(__file__).parents[2]
+PRIOR = """
+[experiment.prior]
+k1 = { distribution = "log-normal", median = 2000.0, sd_log = 0.5 }
+U = { fixed = 0.1 }
+"""
+PLAN = """material = "line"
+budget_min = 60.0
+aim = ["memory", "toe"]
+
+[guess]
+k1 = 1500.0
+B = { distribution = "log-normal", median = 100.0, sd_log = 0.5 }
+
+[[protocol]]
+name = "steps"
+length_mm = 1000.0
+resolution_N = 0.01
+step_mm = 1.0
+holds = 5
+unload = 2
+hold_s = 120.0
+readings = 5
+
+[[protocol]]
+length_mm = 500.0
+displacements_mm = [1.0, 2.0, 1.0]
+times_s = [0.0, 30.0, 120.0]
+temperatures_C = [20.0, 21.0]
+"""
+WARM = "".join(f"{a},{b}\n" for a, b in zip(CSV.split(), ["temperature_C", *"123456"], strict=True))
+PROTOCOL = "hold,displacement_mm,time_s,tension_N,temperature_C\n5,5,0,2.5,20\n5,5,60,,20\n6,6,0,,20.5\n"
+BENCH = """Prüfstand 3;Probe 7
+Datum;2024-03-05
+Stufe;Weg;Zeit;Kraft;Temp.
+;mm;s;N;°C
+1;1,0;0;2,120;20,1
+1;1,0;30;1,910;20,1
+1;1,0;60;1,862;20,2
+2;2,0;0;2,504;20,2
+2;2,0;45;2,270;20,2
+2;2,0;90;2,215;20,3
+3;3,0;0;3,050;20,3
+3;3,0;60;2,800;20,3
+"""
+RECORDED = "elapsed [s],position [mm],force [lbf]\n" + "".join(
+    f"{t / 2:.1f},{1 + t // 40},{(1 + t // 40) * (0.5 - 0.02 * np.log1p(t % 40)):.4f}\n" for t in range(200)
+)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """What is damaged, what must lie beside it, and how it is read."""
+
+    file: str
+    content: bytes
+    beside: dict[str, bytes]
+    read: Callable[[Path], Any]
+
+
+def experiments(path: Path) -> None:
+    for e in read_experiments(path):
+        build([e])
+
+
+def beside(path: Path) -> None:
+    """Readings, through the experiment file beside them."""
+    experiments(path.parent / "e.toml")
+
+
+def protocol(path: Path) -> None:
+    protocol_holds(protocol_table(path), 1000.0)
+
+
+def bench(path: Path) -> None:
+    convert(path, About("bench", "line", 1000.0), Choices())
+
+
+def session(path: Path) -> None:
+    session_file.read(path, schema.read("linear-7"), 1.0, 0.01)
+
+
+READERS = {
+    "experiment": Reader("e.toml", (TOML + PRIOR).encode(), {"a.csv": CSV.encode()}, experiments),
+    "readings": Reader("a.csv", CSV.encode(), {"e.toml": TOML.encode()}, beside),
+    "warm readings": Reader("a.csv", WARM.encode(), {"e.toml": TOML.encode()}, beside),
+    "plan": Reader("plan.toml", PLAN.encode(), {}, lambda path: plan_file.read_plan(path, ("memory", "toe"))),
+    "protocol": Reader("protocol.csv", PROTOCOL.encode(), {}, protocol),
+    "robot": Reader("robot.toml", (ROOT / "data/robots/linear-7.toml").read_bytes(), {}, schema.read),
+    "drums": Reader("robot.toml", (ROOT / "data/robots/hangprinter-4.toml").read_bytes(), {}, schema.read),
+    "session": Reader("session.csv", (ROOT / "docs/example/linear-7-session.csv").read_bytes(), {}, session),
+    "bench": Reader("raw.csv", BENCH.encode(), {}, bench),
+    "bench in cp1252": Reader("raw.txt", BENCH.encode("cp1252"), {}, bench),
+    "recording": Reader("raw.csv", RECORDED.encode(), {}, bench),
+}  # fmt: skip

@@ -1,0 +1,50 @@
+"""Files that a user named, read whole: absent, unreadable, endless and foreign ones end in one plain line."""
+
+import re
+import stat
+from pathlib import Path
+
+from wirebayes.errors import InputError
+
+_NEWLINE = re.compile(r"\r\n|\n|\r")
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file.
+
+    Raises
+    ------
+    InputError
+        Missing, unreadable, a folder, a pipe or a device.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # reading may never end
+            raise InputError(f"{path}: found a pipe or a device, expected a file")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: found no such file, expected a readable file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: found a folder, expected a file") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{path}: cannot be read ({reason}), expected a readable file") from None
+
+
+def read_text(path: Path, expected: str = "text") -> str:
+    """The text of a UTF-8 file, without its byte-order mark; `expected` says what an empty file should hold.
+
+    Raises
+    ------
+    InputError
+        Missing, unreadable, empty, or not UTF-8 (names the line of the first bad byte).
+    """
+    raw = read_bytes(path)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = len(_NEWLINE.split(raw[: error.start].decode("utf-8", "replace")))
+        found = f"byte 0x{error.object[error.start]:02x}"
+        raise InputError(f"{path}, line {line}: found {found}, expected UTF-8 text") from None
+    if not text.strip():
+        raise InputError(f"{path}, line 1, column 1: found an empty file, expected {expected}")
+    return text
