@@ -91,6 +91,46 @@ def test_slack_wires_do_not_mislead_the_calibration():
     assert (np.abs(known.length_m - real.length_m[slack][:1]) < known.length_sd_m).all()
 
 
+@pytest.mark.parametrize("moving", [False, True])
+def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
+    robot, rng, line = schema.read("hangprinter-4"), np.random.default_rng(8), _line()
+    session = _session(robot, line, 10, rng)
+    if moving:
+        session = replace(session, motion=rng.choice([-1.0, 1.0], session.joint_m.shape))
+    prior = Prior(line, 3e-3, spread=0.01, bias_sd_N=0.3)
+    mean, cov = prior.moments(robot.legs)
+    truth = rng.multivariate_normal(mean, cov, 6)
+    bias = truth[:, -robot.legs :]
+    real = predict(robot, prior, session, truth)
+    still = predict(robot, replace(prior, bias_sd_N=0.0), session, truth[:, : -robot.legs])
+    off = (real.readings - still.readings).reshape(6, -1, robot.legs) * session.tension_sd_N
+    np.testing.assert_allclose(off, bias[:, None] * session.bias_sign, atol=1e-9)
+    readings = real.readings + rng.normal(size=real.readings.shape)
+    known = calibrate(robot, prior, session, readings)
+    told = known.unknowns[:, -robot.legs :]
+    sd = np.sqrt(np.einsum("mdd->md", known.covariance))[:, -robot.legs :]
+    assert known.converged.all()
+    assert 0.6 < np.mean(((told - bias) / sd) ** 2) < 1.6
+    assert sd.mean() < 0.15  # half of what was known before
+    low, high = known.interval(0.9)
+    assert ((low <= real.length_m) & (real.length_m <= high)).mean() > 0.75
+    blind = calibrate(robot, replace(prior, bias_sd_N=0.0), session, readings)
+    assert np.median(blind.misfit) > 10 * np.median(known.misfit)
+    wrong = np.abs(blind.length_m - real.length_m).mean()
+    assert wrong > 1.5 * np.abs(known.length_m - real.length_m).mean()
+
+
+def test_a_bias_hides_what_readings_show():
+    rng = np.random.default_rng(1)
+    change, sign = 1e3 * rng.normal(size=(5, 4, 4)), rng.choice([-1.0, 1.0], (5, 4))
+    seen = observability.observe(change, 0.01, 5e-3, 0.2, sign)
+    # beside the formula: lengths and biases as one linear problem
+    rows = np.concatenate([change, sign[:, :, None] * np.eye(4)], 2).reshape(-1, 8) / 0.01
+    both = rows.T @ rows + np.diag([1 / 5e-3**2] * 4 + [1 / 0.2**2] * 4)
+    np.testing.assert_allclose(seen.sd_m, np.sqrt(np.diag(np.linalg.inv(both)))[:4], rtol=1e-6)
+    assert (seen.sd_m > observability.observe(change, 0.01, 5e-3).sd_m).all()
+
+
 @pytest.mark.slow
 @pytest.mark.statistical
 def test_intervals_cover_and_hooke_alone_does_not():

@@ -279,6 +279,35 @@ def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, ca
     assert not out.exists()
 
 
+def test_a_bias_is_estimated_when_asked_for_and_its_sign_may_follow_the_motion(fitted, session_csv, tmp_path, capsys):
+    file, _ = session_csv
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    legs = 7
+    for k, cells in enumerate(lines[1:]):
+        sign = 1 if k % 2 else -1
+        if cells[-1]:
+            cells[-legs] = str(float(cells[-legs]) + 0.3 * sign)
+        cells += [str(sign)] * legs
+    lines[0] += [f"motion_{i}" for i in range(1, legs + 1)]
+    file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
+    arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted)]
+    assert main([*arguments, "--output", str(tmp_path / "o")]) == 2
+    assert "session.csv: line 1: found directions of motion, but the sensors have no bias" in capsys.readouterr().err
+    assert main([*arguments, "--tension-bias", "-1", "--output", str(tmp_path / "o")]) == 2
+    out = tmp_path / "out"
+    assert main([*arguments, "--tension-bias", "0.2", "--output", str(out)]) == 0
+    said = json.loads((out / "calibrate.json").read_text())
+    assert said["prior"]["tension_bias_sd_N"] == 0.2 and said["prior"]["tension_bias_sign"] == "motion"
+    bias = said["with_creep_model"]["tension_bias_N"]
+    assert abs(bias["mean"][0] - 0.3) < 2 * bias["sd"][0] < 0.4
+    assert main(["report", str(out)]) == 0
+    assert "What each tension sensor reads too much" in (out / "report.html").read_text()
+    lines[2][-1] = "2"
+    file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
+    assert main([*arguments, "--tension-bias", "0.2", "--output", str(tmp_path / "o")]) == 2
+    assert "line 3, column motion_7: found '2'; expected 1 (pulled in last)" in capsys.readouterr().err
+
+
 def test_an_inclinometer_joins_in_and_is_checked(fitted, session_csv, tmp_path, capsys):
     file, truth = session_csv
     lines = file.read_text().splitlines()

@@ -5,7 +5,7 @@ from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import schema
 
 OPTIONAL = {"k1_N", "B_mm", "length_mm", "wire", "pulley_radius_m", "swivel_axis"} | {
-    "drum_radius_m", "drum_pitch_m", "drum_layer_turns", "drum_layer_height_m", "gear_ratio",
+    "tension_bias_N", "drum_radius_m", "drum_pitch_m", "drum_layer_turns", "drum_layer_height_m", "gear_ratio",
 }  # fmt: skip
 LAYERS = "drum_radius_m = 0.05\ndrum_layer_turns = 9\ndrum_layer_height_m = 5e-4"
 GOOD = """version = 1
@@ -84,6 +84,8 @@ def test_a_good_file_is_read(tmp_path):
         ('freedom = "position"', 'freedom = "all"', "freedom"),
         ('actuator = "linear"', 'actuator = "drum"', "leg[2].pulley_ratio"),
         ("[platform]\nmass_kg = 1.0", "platform = 3", "platform"),
+        ("[workspace]", "[sensors]\ntension_bias_N = -0.1\n[workspace]", "sensors.tension_bias_N"),
+        ("[workspace]", "[sensors]\nbias = 0.1\n[workspace]", "sensors.bias"),
         ('wire = "steel"', "drum_radius_m = -1", "leg[0].drum_radius_m"),
         ('wire = "steel"', "gear_ratio = 2.0", "leg[0].gear_ratio"),
         ('wire = "steel"', "drum_radius_m = 0.05\ndrum_layer_turns = 0.5", "leg[0].drum_layer_turns"),

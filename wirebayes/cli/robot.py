@@ -65,6 +65,12 @@ def calibrate(
     reference_sd: Annotated[
         float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the reference lengths.")
     ] = 5.0,
+    tension_bias: Annotated[
+        float | None,
+        typer.Option(
+            "--tension-bias", metavar="N", help="Standard deviation of each tension sensor's bias; estimated."
+        ),
+    ] = None,
     spread: Spread = 0.05,
     draws: Draws = 1000,
     experiment: ExperimentName = None,
@@ -79,7 +85,8 @@ def calibrate(
 
     found = run(
         robot, readings, wires, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
-        specimen_spread=spread, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed, output=output,
+        tension_bias=tension_bias, specimen_spread=spread, draws=draws, experiment=experiment, own_effects=own_effects,
+        seed=seed, output=output,
     )  # fmt: skip
     for line in found.messages:
         typer.echo(line, err=True)

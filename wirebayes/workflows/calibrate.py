@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ def calibrate(
     tension_sd: float = 0.02,
     tilt_sd: float = 1e-3,
     reference_sd: float = 5.0,
+    tension_bias: float | None = None,
     specimen_spread: float = 0.05,
     draws: int = 1000,
     experiment: str | None = None,
@@ -49,6 +51,10 @@ def calibrate(
         Standard error of the platform's normal, rad.
     reference_sd : float
         Standard error of the reference lengths, mm.
+    tension_bias : float, optional
+        Standard deviation of each tension sensor's bias, N: its zero or, where the readings say in which direction a
+        wire moved last (``motion_1`` and so on: 1 pulled in, -1 let out), friction between sensor and wire. Left out:
+        what the robot's file says, none unless it says one.
     specimen_spread : float
         Relative difference between wires of one line.
     draws : int
@@ -84,20 +90,23 @@ def calibrate(
     if not 0 <= specimen_spread < 1:
         raise InputError(f"--specimen-spread: found {specimen_spread:g}; expected a number from 0 to 1")
     machine = robot_of(robot)
+    bias = machine.tension_bias_N if tension_bias is None else float(tension_bias)
+    if not 0 <= bias < math.inf:
+        raise InputError(f"--tension-bias: found {bias:g}; expected a number of at least 0")
     if isinstance(readings, str | os.PathLike):
-        session, values = session_file.read(Path(readings), machine, tension_sd, tilt_sd)
+        session, values = session_file.read(Path(readings), machine, tension_sd, tilt_sd, bias > 0)
         read = content(Path(readings))
     else:
         text = _as_csv(readings, machine)
-        session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, _row)
+        session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, _row, bias > 0)
         read = hash_of({"readings": text})
     line = draws_of(wires, draws, experiment, own)
-    options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read)
+    options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read, *((bias,) if bias else ()))
     place = Place.at(output)
     decides = configuration("calibrate", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
     run = open_run(place.path, decides)
     if run.state != "done":
-        prior = Prior(line, 1e-3 * reference_sd, specimen_spread)
+        prior = Prior(line, 1e-3 * reference_sd, specimen_spread, bias_sd_N=bias)
         with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
             found = answer(machine, prior, session, values, seed)
         write_json(run.directory / "calibrate.json", found)
@@ -110,7 +119,9 @@ def _as_csv(columns: Any, robot: Robot) -> str:
     if not is_table(columns):
         raise InputError(f"readings: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
     names = list(columns.columns) if hasattr(columns, "columns") else list(columns)
-    wanted = session_file.columns(robot, session_file.NORMAL[0] in names, session_file.has_motors(names))
+    wanted = session_file.columns(
+        robot, session_file.NORMAL[0] in names, session_file.has_motors(names), session_file.has_motion(names)
+    )
     names = wanted if sorted(map(str, names)) == sorted(wanted) else names
     values = [plain(list(columns[name])) for name in names]
     rows = sorted({len(column) for column in values})

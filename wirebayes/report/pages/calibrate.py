@@ -16,7 +16,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         first.insert(0, Text("Not converged: do not use any of these lengths.", strong=True))
     sections = [
         Section("Summary", first),
-        Section("Lengths", [_lengths(creep, hooke)]),
+        Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
         Section("What to do", _next(found)),
     ]
     lead = "Zero-tension lengths of a robot's wires from its own joint values and tensions."
@@ -25,10 +25,17 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 def _done(found: dict[str, Any]) -> Points:
     prior = found["prior"]
+    biases = []
+    if "tension_bias_sd_N" in prior:
+        kind = "a constant each" if prior["tension_bias_sign"] == "constant" else "against the last motion of the wire"
+        biases = [
+            f"Biases of the tension sensors were estimated too, {kind}; before, {prior['tension_bias_sd_N']:g} N."
+        ]
     return Points("What was done", [
         f"{found['holds']} holds, {found['read']} of them read.",
         f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line were "
         f"assumed to differ by {100 * prior['specimen_spread']:g} %.",
+        *biases,
     ])  # fmt: skip
 
 
@@ -73,6 +80,16 @@ def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
     ]
     header = ["wire", "length now, mm", "90 %", "creep strain, mm per m", "Hooke's law alone, mm", "90 %"]
     return Table(header, lines, "Zero-tension length of every wire when the last hold ended, creep included.")
+
+
+def _biases(creep: dict[str, Any]) -> list[Block]:
+    if "tension_bias_N" not in creep:
+        return []
+    pairs = zip(creep["tension_bias_N"]["mean"], creep["tension_bias_N"]["sd"], strict=True)
+    rows = [[str(i + 1), *("–" if v is None else f"{v:.3f}" for v in (mean, sd))] for i, (mean, sd) in enumerate(pairs)]
+    return [
+        Table(["wire", "bias of its sensor, N", "standard error, N"], rows, "What each tension sensor reads too much.")
+    ]
 
 
 def _milli(value: float | None) -> str:

@@ -116,6 +116,8 @@ class Robot:
         None where all wires leave from fixed points.
     drums : Drums or None
         None where the joint values are lengths and no motor angles are known.
+    tension_bias_N : float
+        Standard deviation of a tension sensor's bias, for calibration; 0: no bias.
 
     Examples
     --------
@@ -146,6 +148,7 @@ class Robot:
     upper_m: Floats
     pulleys: Pulleys | None = None
     drums: Drums | None = None
+    tension_bias_N: float = 0.0
 
     @property
     def legs(self) -> int:

@@ -142,9 +142,11 @@ def _robot(t: _Table) -> Robot:
     lower, upper = space.triple("lower_m"), space.triple("upper_m")
     if np.any(upper < lower):
         raise space.fail("upper_m", f"found {upper.tolist()}", f"at least lower_m ({lower.tolist()}) on every axis")
+    sensors = t.table("sensors", {})
+    bias = sensors.number("tension_bias_N", 0.0, least=0)
     given = _given(t)
     legs = _legs(t, given)
-    for table in (rule, home, space, t):
+    for table in (rule, home, space, sensors, t):
         table.finish()
     stack: Callable[[str], Any] = lambda key: np.array([leg[key] for leg in legs])  # noqa: E731
     return Robot(
@@ -152,7 +154,7 @@ def _robot(t: _Table) -> Robot:
         stack("exit"), stack("platform"), stack("lines"), stack("beyond"), tuple(leg["actuator"] for leg in legs),
         stack("ratio"), stack("wire_m"), tuple(leg["wire"] for leg in legs), given, tension,
         position, turn, lower, upper, _pulleys(stack("pulley"), stack("axis")),
-        _drums(*(stack(key) for key in _DRUM)),
+        _drums(*(stack(key) for key in _DRUM)), bias,
     )  # fmt: skip
 
 

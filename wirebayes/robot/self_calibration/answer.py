@@ -46,6 +46,11 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
         "with_creep_model": _lengths(robot, prior, known),
         "by_hooke_alone": _lengths(robot, prior, plain),
     }
+    if prior.bias_sd_N > 0:
+        content["prior"] |= {
+            "tension_bias_sd_N": prior.bias_sd_N,
+            "tension_bias_sign": "constant" if session.motion is None else "motion",
+        }
     content["pose_now"] = content["joint_values_for_home_m"] = None
     if known.converged[0]:  # else nobody should send the robot anywhere by it
         turn = rotation.vector(known.rotation)[0]
@@ -61,7 +66,7 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
 def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
     half = float(norm.ppf(0.95)) * known.length_sd_m[0]
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
-    return {
+    told = {
         "converged": bool(known.converged[0]),
         "misfit": float(known.misfit[0]),
         "length_m": {
@@ -73,6 +78,10 @@ def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
         "creep_strain": known.creep[0],
         "reference_error_mm": {"mean": 1e3 * known.unknowns[0, : robot.legs], "sd": 1e3 * sd},
     }
+    if prior.bias_sd_N > 0:
+        bias_sd = np.sqrt(np.diag(known.covariance[0]))[-robot.legs :]
+        told["tension_bias_N"] = {"mean": known.unknowns[0, -robot.legs :], "sd": bias_sd}
+    return told
 
 
 def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator) -> dict[str, Any]:
@@ -83,7 +92,7 @@ def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Gener
     done = observability.sensitivity(
         robot, wires, session.position_m[session.read], session.rotation[session.read], zero, offset
     )[1]
-    seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m)
+    seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m, prior.bias_sd_N, session.bias_sign)
     x = rng.uniform(robot.lower_m, robot.upper_m, (CANDIDATES, 3))
     R = np.broadcast_to(rotation.matrix(robot.home_rotation_rad), (CANDIDATES, 3, 3))
     tau = inverse.tensions(robot, x, R)

@@ -81,7 +81,9 @@ class Observability:
     sentence: str
 
 
-def observe(change_N: Floats, tension_sd_N: float, prior_sd_m: float) -> Observability:
+def observe(
+    change_N: Floats, tension_sd_N: float, prior_sd_m: float, bias_sd_N: float = 0.0, sign: Floats | None = None
+) -> Observability:
     """Observability of the lengths from tensions at several poses.
 
     Parameters
@@ -90,9 +92,18 @@ def observe(change_N: Floats, tension_sd_N: float, prior_sd_m: float) -> Observa
         From `sensitivity`, a pose a row.
     tension_sd_N : float
     prior_sd_m : float
+    bias_sd_N : float
+        Of a bias of each sensor, which the readings show only against each other.
+    sign : (p, w) array, optional
+        How the bias enters each reading; default: as a constant.
     """
     w = change_N.shape[-1]
     information = (np.swapaxes(change_N, 1, 2) @ change_N).sum(0) / tension_sd_N**2
+    if bias_sd_N > 0:
+        sign = np.ones(change_N.shape[:2]) if sign is None else sign
+        mixed = (sign[:, :, None] * change_N).sum(0) / tension_sd_N**2
+        own = (sign**2).sum(0) / tension_sd_N**2 + 1.0 / bias_sd_N**2
+        information = information - mixed.T @ (mixed / own[:, None])
     if not np.isfinite(information).all():
         said = "What the readings show cannot be computed at these poses: nothing holds the platform there."
         return Observability(0, np.full(w, prior_sd_m), np.full(w, np.nan), np.inf, said)

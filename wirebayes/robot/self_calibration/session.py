@@ -1,6 +1,7 @@
 """A calibration session: what the robot did and read, what was known before, and what any unknowns predict.
 
-Unknown are the error of every wire's reference length, the line's parameters, and each specimen's own deviation.
+Unknown are the error of every wire's reference length, the line's parameters, each specimen's own deviation and, where
+a prior allows it, the bias of each tension sensor: its zero, or friction of guides and winch between it and the wire.
 """
 
 from dataclasses import dataclass, replace
@@ -34,6 +35,9 @@ class Session:
     tension_sd_N : float
     tilt_sd_rad : float or None
         Error of the two components of the platform's normal, when an inclinometer is on board.
+    motion : (p, w) array, optional
+        1 where a wire was pulled in last, -1 where it was let out, 0 where it did not move: the sign of its sensor's
+        bias. Without it the bias is a constant.
     """
 
     position_m: Floats
@@ -43,6 +47,13 @@ class Session:
     read: NDArray[np.bool_]
     tension_sd_N: float
     tilt_sd_rad: float | None = None
+    motion: Floats | None = None
+
+    @property
+    def bias_sign(self) -> Floats:
+        """(q, w) How the bias enters the tensions that were read."""
+        signs = np.ones_like(self.joint_m) if self.motion is None else self.motion
+        return np.asarray(signs[self.read])
 
 
 @dataclass(frozen=True)
@@ -57,12 +68,15 @@ class Prior:
         Relative, of k1, B and k2 from wire to wire.
     creeps : bool
         False: calibration by Hooke's law alone, lengths thought constant.
+    bias_sd_N : float
+        Standard deviation of a tension sensor's bias; 0: the sensors have none.
     """
 
     line: WireDraws
     reference_sd_m: float
     spread: float = 0.05
     creeps: bool = True
+    bias_sd_N: float = 0.0
 
     @property
     def names(self) -> list[str]:
@@ -70,17 +84,20 @@ class Prior:
         return [*CORE, *(column for effect in self.line.material() for column in effect.columns())]
 
     def moments(self, legs: int) -> tuple[Floats, Floats]:
-        """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens."""
+        """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""
         drawn = self.line.parameters
         values = np.array([np.log(drawn[k]) if k in CORE else drawn[k] for k in self.names])
         p, own = len(values), len(OWN) * legs
-        mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own)])
+        biased = legs if self.bias_sd_N > 0 else 0
+        mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own + biased)])
         cov = np.zeros((len(mean), len(mean)))
         cov[:legs, :legs] = self.reference_sd_m**2 * np.eye(legs)
         # A parameter that is given exactly still gets a relative uncertainty, far below anything that matters.
         cov[legs : legs + p, legs : legs + p] = np.cov(values) if self.line.count > 1 else 0.0
         cov[legs : legs + p, legs : legs + p] += 1e-12 * np.eye(p)
-        cov[legs + p :, legs + p :] = max(self.spread, 1e-6) ** 2 * np.eye(own)
+        specimens, sensors = slice(legs + p, legs + p + own), slice(legs + p + own, None)
+        cov[specimens, specimens] = max(self.spread, 1e-6) ** 2 * np.eye(own)
+        cov[sensors, sensors] = self.bias_sd_N**2 * np.eye(biased)
         return mean, cov
 
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
@@ -91,12 +108,16 @@ class Prior:
         if LENGTH_EXPONENT in self.line.parameters:
             values[LENGTH_EXPONENT] = self.line.parameters[LENGTH_EXPONENT].mean(keepdims=True)
         wires = for_robot(robot, replace(self.line, parameters=values))
-        own = unknowns[:, legs + p :].T.reshape(len(OWN), legs, n)
+        own = unknowns[:, legs + p : legs + p + len(OWN) * legs].T.reshape(len(OWN), legs, n)
         theta = dict(wires.theta) | {
             name: wires.theta[name] * np.exp(deviation) for name, deviation in zip(OWN, own, strict=True)
         }
         whole = replace(wires, theta=theta)
         return (whole if self.creeps else without_creep(whole)), unknowns[:, :legs]
+
+    def bias_N(self, legs: int, unknowns: Floats) -> Floats:
+        """Biases ``(n, w)`` of the tension sensors among unknowns ``(n, d)``; zero where sensors have none."""
+        return unknowns[:, -legs:] if self.bias_sd_N > 0 else np.zeros((len(unknowns), legs))
 
 
 @dataclass(frozen=True)
@@ -152,6 +173,7 @@ def predict(
     """
     wires, error = prior.wires(robot, unknowns)
     n, legs = len(unknowns), robot.legs
+    bias, sign = prior.bias_N(legs, unknowns), iter(session.bias_sign)
     state = fresh(legs, n)
     solved = np.ones(n, bool)
     tensions, poses, turns, lengths, begun = [], [], [], [], []
@@ -169,7 +191,7 @@ def predict(
             )
         solved &= here.found
         if session.read[k]:
-            tensions.append(here.tension_N)
+            tensions.append(here.tension_N + bias * next(sign))
             poses.append(here.position_m)
             turns.append(here.rotation)
             lengths.append(bare * (1 + state.strain(wires).T))

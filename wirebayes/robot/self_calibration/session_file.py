@@ -20,16 +20,18 @@ POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
 
 
-def columns(robot: Robot, tilted: bool, motors: bool = False) -> list[str]:
+def columns(robot: Robot, tilted: bool, motors: bool = False, moved: bool = False) -> list[str]:
     """The file's header: pose asked for, duration, joint values, tensions at the end, and the normal's components.
 
-    With `motors` the legs with a drum of known radius have their motor's angle in place of the joint value.
+    With `motors` the legs with a drum of known radius have their motor's angle in place of the joint value; with
+    `moved` the directions in which the wires moved last follow the tensions.
     """
     legs = range(1, robot.legs + 1)
     turned = _motors(robot) if motors else np.zeros(robot.legs, bool)
     joints = [f"motor_{i}_rad" if turned[i - 1] else f"joint_{i}_m" for i in legs]
     tensions = [f"tension_{i}_N" for i in legs]
-    return ["hold", *POSE, "duration_s", *joints, *tensions, *(NORMAL if tilted else ())]
+    motions = [f"motion_{i}" for i in legs] if moved else []
+    return ["hold", *POSE, "duration_s", *joints, *tensions, *motions, *(NORMAL if tilted else ())]
 
 
 def has_motors(names: Sequence[str]) -> bool:
@@ -37,15 +39,23 @@ def has_motors(names: Sequence[str]) -> bool:
     return any(str(name).startswith("motor_") for name in names)
 
 
+def has_motion(names: Sequence[str]) -> bool:
+    """Whether a header says in which direction the wires moved."""
+    return any(str(name).startswith("motion_") for name in names)
+
+
 def _motors(robot: Robot) -> NDArray[np.bool_]:
     return np.zeros(robot.legs, bool) if robot.drums is None else robot.drums.radius_m > 0
 
 
-def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> tuple[Session, Floats]:
+def read(
+    path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float, biased: bool = False
+) -> tuple[Session, Floats]:
     """A session and its standardised readings ``(r,)``.
 
     A row without tensions is a hold that was not read. With the columns ``normal_x,normal_y`` an inclinometer's
-    readings join in.
+    readings join in. Sensors that may be `biased` may read below zero, and directions of motion, ``motion_1`` and so
+    on, may be given for them only.
 
     Raises
     ------
@@ -53,7 +63,7 @@ def read(path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float) -> t
         Naming line and column, what was found and what was expected.
     """
     text = read_text(path, "the header " + ",".join(columns(robot, False)))
-    return parse(str(path), text, robot, tension_sd_N, tilt_sd_rad)
+    return parse(str(path), text, robot, tension_sd_N, tilt_sd_rad, biased=biased)
 
 
 def parse(
@@ -63,6 +73,7 @@ def parse(
     tension_sd_N: float,
     tilt_sd_rad: float,
     place: Callable[[int], str] = "line {}".format,
+    biased: bool = False,
 ) -> tuple[Session, Floats]:
     """The same of the text of a file, which errors call `source`; `place` says where a line stands, counted from 1."""
     lines = csv.reader(io.StringIO(text, newline=""))
@@ -74,12 +85,17 @@ def parse(
         ) from None
     rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
-    motors = bool(rows) and has_motors(rows[0])
-    wanted = columns(robot, tilted, motors)
+    motors, moved = (bool(rows) and given(rows[0]) for given in (has_motors, has_motion))
+    wanted = columns(robot, tilted, motors, moved)
     if not rows or rows[0] != wanted:
         found = ",".join(rows[0])[:200] if rows else "nothing"
         raise InputError(f"{source}: {place(1)}: found {found}; expected the header {','.join(wanted)}")
-    cells = [_row(f"{source}: {place(line)}", row, wanted) for line, row in numbered[1:]]
+    if moved and not biased:
+        raise InputError(
+            f"{source}: {place(1)}: found directions of motion, but the sensors have no bias; expected "
+            "--tension-bias N, or tension_bias_N under [sensors] in the robot's file"
+        )
+    cells = [_row(f"{source}: {place(line)}", row, wanted, biased) for line, row in numbered[1:]]
     table = np.array(cells).reshape(-1, len(wanted))
     if not len(table):
         raise InputError(f"{source}: found no holds; expected at least one row")
@@ -87,7 +103,8 @@ def parse(
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
     if motors and robot.drums is not None:
         joint = np.where(_motors(robot), paid_out(robot.drums, joint)[0], joint)
-    measured = table[:, 8 + w :]
+    motion = table[:, 8 + 2 * w : 8 + 3 * w] if moved else None
+    measured = np.delete(table[:, 8 + w :], np.s_[w : 2 * w], axis=1) if moved else table[:, 8 + w :]
     read_here = np.isfinite(measured).all(1)
     half = ~read_here & np.isfinite(measured).any(1)
     if half.any():
@@ -98,7 +115,14 @@ def parse(
         raise InputError(f"{source}: found no row with tensions; expected at least one")
     turn = table[:, 4:7] if robot.degrees == 6 else np.tile(robot.home_rotation_rad, (len(table), 1))
     session = Session(
-        table[:, 1:4], matrix(turn), joint, table[:, 7], read_here, tension_sd_N, tilt_sd_rad if tilted else None
+        table[:, 1:4],
+        matrix(turn),
+        joint,
+        table[:, 7],
+        read_here,
+        tension_sd_N,
+        tilt_sd_rad if tilted else None,
+        motion,
     )
     readings = [(tension[read_here] / tension_sd_N).ravel()]
     if tilted:
@@ -109,7 +133,7 @@ def parse(
 _LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
 
 
-def _row(place: str, row: list[str], names: list[str]) -> list[float]:
+def _row(place: str, row: list[str], names: list[str], biased: bool) -> list[float]:
     if len(row) != len(names):
         raise InputError(f"{place}: found {len(row)} cells; expected {len(names)}")
     out = []
@@ -125,7 +149,9 @@ def _row(place: str, row: list[str], names: list[str]) -> list[float]:
         allowed, kind = abs(value) < _LARGEST, "a finite number"
         if name == "duration_s":
             allowed, kind = 0 < value < _LARGEST, "a number above 0"
-        elif name.startswith("tension_"):
+        elif name.startswith("motion_"):
+            allowed, kind = value in (-1, 0, 1), "1 (pulled in last), -1 (let out) or 0"
+        elif name.startswith("tension_") and not biased:
             allowed, kind = 0 <= value < _LARGEST, "a finite number of at least 0"
         elif name in NORMAL:
             allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"

@@ -31,12 +31,13 @@ def start(robot: Robot, prior: Prior, session: Session, readings: Floats, iterat
     m, legs, d = len(readings), robot.legs, robot.degrees
     q = expected.position_m.shape[1]
     tau = readings[:, : q * legs].reshape(m * q, legs) * session.tension_sd_N
+    sd_N = float(np.hypot(session.tension_sd_N, prior.bias_sd_N))
     joint = session.joint_m[session.read]
     bare, offset = (np.tile(a, (m, 1)) for a in inverse.lengths(robot, joint))
     grown = np.tile(expected.read_length_m[0] / inverse.lengths(robot, joint)[0], (m, 1))
     stretch = stretched_length(wires, np.ones_like(tau.T), np.maximum(tau.T, 0.0)).T * grown
     # A slack wire only says that its loop is too long: it is left out here.
-    weight = (tau > 3 * session.tension_sd_N) / np.hypot(1e-4, bare * session.tension_sd_N / wires.theta["k1"].mean())
+    weight = (tau > 3 * sd_N) / np.hypot(1e-4, bare * sd_N / wires.theta["k1"].mean())
     x = np.tile(expected.position_m[0], (m, 1)).T
     R = np.tile(expected.rotation[0], (m, 1, 1))
     R = np.moveaxis(R, 0, -1)
@@ -51,8 +52,8 @@ def start(robot: Robot, prior: Prior, session: Session, readings: Floats, iterat
         balance, H = statics.unbalance_and_stiffness(robot, shape, R, tau.T, zero)
         K = np.stack([np.stack(row, -1) for row in H], -2) * (scale * scale.T)
         by_pose = np.concatenate([np.moveaxis(J * scale[:, None], -1, 0).swapaxes(1, 2) * weight[..., None],
-                                  K / session.tension_sd_N], 1)  # fmt: skip
-        residual = np.concatenate([gap * weight, (balance * scale).T / session.tension_sd_N], 1)
+                                  K / sd_N], 1)  # fmt: skip
+        residual = np.concatenate([gap * weight, (balance * scale).T / sd_N], 1)
         by_length = np.concatenate([-(stretch * weight)[:, None] * np.eye(legs), np.zeros((m * q, d, legs))], 1)
         # Poses are eliminated one by one; what is left speaks of the lengths.
         A = by_pose.swapaxes(1, 2) @ by_pose + 1e-9 * np.eye(d)
