@@ -16,6 +16,7 @@ from wirebayes.inference.fit import fit, seed_of
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
 from wirebayes.prediction.held_out import held_out, train_counts
+from wirebayes.report.blocks import save
 from wirebayes.report.pictures import compare as pictures
 
 SEED = 0
@@ -46,8 +47,8 @@ def main() -> None:
                         output.mkdir(parents=True, exist_ok=True)
                         name = f"{experiment.name}-{trained}-{likelihood}-{way.replace('_', '-')}"
                         title = f"{experiment.name}, {trained} holds, {pictures.WORDS[way]}"
-                        pictures.save_figure(pictures.bands(title, told(scores)), output / f"{name}.png")
-                        pictures.save_figure(pictures.pit(title, told(scores)), output / f"{name}-pit.png")
+                        save(pictures.bands(title, told(scores)), output / f"{name}.svg")
+                        save(pictures.pit(title, told(scores)), output / f"{name}-pit.svg")
 
 
 if __name__ == "__main__":

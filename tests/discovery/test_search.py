@@ -230,7 +230,7 @@ class ScrewWobble(Effect):
     assert "screw_wobble.a" in json.loads((out / "simulated" / "final" / "summary.json").read_text())["parameters"]
     # one picture a finding, and none of what shows no pattern
     seen = {w["covariate"].replace(" ", "-") for w in found["experiments"]["simulated"]["where"] if w["p"] <= 0.05}
-    drawn = {path.stem.removeprefix("where-") for path in (out / "simulated").glob("where-*.png")}
+    drawn = {path.stem.removeprefix("where-") for path in (out / "simulated").glob("where-*.svg")}
     assert seen and drawn == seen
 
 

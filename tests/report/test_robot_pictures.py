@@ -1,7 +1,7 @@
 import numpy as np
 
 from wirebayes.report.pictures.robot import _edges
-from wirebayes.report.pictures.robot_space import workspace_map
+from wirebayes.report.pictures.robot_space import workspace_maps
 from wirebayes.robot.motion.claim import WorkspaceDrift
 
 
@@ -23,7 +23,8 @@ def test_a_flat_workspace_is_mapped_in_its_own_plane():
     for flat, across in ((1, "x"), (0, "y")):
         where = np.insert(np.column_stack([x, z]), flat, 7.0, axis=1)
         drift = np.arange(6.0)[:, None] * np.array([[1e-3, np.nan, 1e-3]])
-        figure = workspace_map(WorkspaceDrift(where, drift, 0 * drift, np.ones((6, 2)), 1.0, 1.0))
-        (panel,) = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]  # nothing tilts: no second row
+        maps = workspace_maps(WorkspaceDrift(where, drift, 0 * drift, np.ones((6, 2)), 1.0, 1.0))
+        assert list(maps) == ["drift"]  # nothing tilts
+        (panel,) = [axes for axes in maps["drift"].axes if axes.get_label() != "<colorbar>"]
         assert (panel.get_xlabel(), panel.get_ylabel()) == (f"{across}, m", "z, m")
         np.testing.assert_allclose(panel.collections[0].get_array().ravel(), [0, 2, 4, 1, 3, 5])

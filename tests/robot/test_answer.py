@@ -43,7 +43,7 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     wanted = alone["drift"][0]["distance_mm"]["mean"]
     np.testing.assert_allclose(content["drift"][0]["distance_mm"]["mean"], wanted, rtol=1e-9)
     pictures.save_pose(tmp_path, robot, asked, found)
-    assert (tmp_path / "drift.png").exists()
+    assert (tmp_path / "drift.svg").exists()
 
 
 def test_one_draw_is_enough():

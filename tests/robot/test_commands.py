@@ -64,8 +64,8 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
         (loaded, controller) for loaded in (0.0, 3600.0) for controller in ("held_still", "creep_aware")
     }
     assert 0 < said["workspace"]["q05_drift_mm"] < said["workspace"]["q95_drift_mm"]
-    assert {path.stem for path in out[0].glob("*.png")} == {
-        "robot", "drift", "rotation", "pose-error", "error-budget", "workspace"
+    assert {path.stem for path in out[0].glob("*.svg")} == {
+        "robot", "drift", "rotation", "pose-error", "error-budget", "workspace-drift", "workspace-tilt"
     }  # fmt: skip
     if said["certificate"]["proved"] is not None:
         band = said["certificate"]["band"]
@@ -75,7 +75,13 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     assert main(["report", str(out[0])]) == 0
     page = (out[0] / "report.html").read_text()
     assert "Between calibrations" in page
-    assert (out[0] / "robot.png").stat().st_size > 1000
+    assert (out[0] / "robot.svg").stat().st_size > 1000
+    scene = json.loads((out[0] / "scene.json").read_text())
+    assert np.shape(scene["drifted"]) == (len(scene["times"]), len(scene["exits"]), 3)
+    assert np.shape(scene["tensions_N"]) == (len(scene["times"]), len(scene["exits"]))
+    moved = 1e3 * np.abs(np.subtract(scene["drifted"], scene["platform"])).max(axis=(1, 2))
+    assert moved[0] < moved[-1]
+    assert 'class="view"' in page
 
 
 def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
@@ -169,8 +175,8 @@ def test_a_robot_in_a_vertical_plane_is_a_robot(fitted, tmp_path, legs):
     assert said["forward"]["solved"] == 1.0
     assert [p["commanded"] for p in said["equilibria"]["poses"]] == [True]
     assert said["workspace"]["feasible"] == 1.0
-    assert (out / "workspace.png").is_file()
-    assert not (out / "rotation.png").exists()  # parallel lines: nothing turns
+    assert (out / "workspace-drift.svg").is_file()
+    assert not (out / "rotation.svg").exists()  # parallel lines: nothing turns
     assert main(["report", str(out)]) == 0
 
 

@@ -219,7 +219,7 @@ def test_a_discovered_experiment_has_both_posteriors_and_a_verdict(tests, tmp_pa
     assert float(row["p_global"]) == report["p_global"]
     assert row["check"] == ("passed" if report["p_global"] > 0.04 else "failed")
     assert many.final["spool-0"].within == "spool-0/final"
-    assert (tmp_path / "out" / "spool-0" / "spool-0.png").is_file()
+    assert (tmp_path / "out" / "spool-0" / "spool-0.svg").is_file()
     protocol = {"hold": [6], "displacement_mm": [6], "time_s": [0]}
     assert wb.predict(tmp_path / "out", protocol, experiment="spool-0")["mean_N"].shape == (1,)
     assert row["verdict"].replace("-", " ") in wb.write_report(many).read_text()

@@ -57,7 +57,7 @@ def test_check_says_what_was_understood(start, tmp_path, capsys):
         assert said in shown.out
     assert max(map(len, shown.out.splitlines())) <= 120
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["check.json", "complete.json", "configuration.json", "my-wire.png"]
+    assert names == ["check.json", "complete.json", "configuration.json", "my-wire.svg"]
     stored = json.loads((tmp_path / "out" / "check.json").read_text())
     assert main(["check", str(start), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == stored

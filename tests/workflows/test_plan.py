@@ -86,7 +86,7 @@ def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):
     page = (out / "report.html").read_text()
     assert "What a test would teach" in page
     assert "steady creep" in page
-    assert (out / "plan.png").is_file()
+    assert (out / "plan.svg").is_file()
     before = (out / "plan.json").read_bytes()
     assert main(["plan", str(plan_file), "--output", str(out)]) == 0
     assert (out / "plan.json").read_bytes() == before

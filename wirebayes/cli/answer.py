@@ -108,7 +108,7 @@ def next_step(result: Result) -> str:
     if isinstance(result, ImportedTests):
         names = list(result.summary()["experiments"])
         file = names[0] if len(names) == 1 else "experiments"
-        return f"look at {folder / names[0]}.png, then wirebayes check {folder / file}.toml"
+        return f"look at {folder / names[0]}.svg, then wirebayes check {folder / file}.toml"
     return f"read {folder}"
 
 

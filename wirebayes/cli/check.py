@@ -23,7 +23,7 @@ def check(
 ) -> None:
     """Say what was understood of an experiment file, what is suspicious, and what such a test can tell.
 
-    Exit code 0 means that the file can be used, 2 that it is bad. With --output: DIR/check.json and DIR/NAME.png.
+    Exit code 0 means that the file can be used, 2 that it is bad. With --output: DIR/check.json and DIR/NAME.svg.
     """
     from wirebayes.cli.answer import print_answer
     from wirebayes.cli.progress import progress

@@ -56,7 +56,7 @@ def import_bench(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Turn what benches write into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.png to look at.
+    """Turn what benches write into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.svg to look at.
 
     Each file is one experiment, named N after it; several also stand together in DIR/experiments.toml. Delimiter,
     decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and continuous

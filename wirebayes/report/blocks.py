@@ -2,15 +2,26 @@
 
 import base64
 import io
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import matplotlib
+import numpy as np
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from wirebayes.io.run_folder import plain, write_bytes
 
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
+_SENTENCE = 36  # characters; no number with its interval is longer
+_MOST_LINKS = 40  # of one kind; a list of more is a wall
+_DENSE = 1500  # points from which on an image takes less room than a path
 
 
 @dataclass(frozen=True)
@@ -26,14 +37,20 @@ class Table:
     words: dict[str, str] = field(default_factory=dict)
     kind: str = "table"
 
+    @property
+    def prose(self) -> frozenset[int]:
+        """Columns of sentences rather than numbers: they may break, and begin at the left."""
+        return frozenset(i for row in self.rows for i, cell in enumerate(row) if i and len(cell) > _SENTENCE)
+
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture inside the page."""
+    """A picture inside the page; a `wide` one is not shrunk to a phone but scrolls sideways."""
 
     source: str
     alt: str
     caption: str = ""
+    wide: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,7 +87,40 @@ class Columns:
     kind: str = "columns"
 
 
-Block = Table | Pictures | Text | Columns
+@dataclass(frozen=True)
+class Definitions:
+    """Terms and what they mean, under a heading; formulas in MathML may stand above them."""
+
+    heading: str
+    terms: Sequence[tuple[str, str]]
+    formulas: Sequence[str] = ()
+    kind: str = "definitions"
+
+
+@dataclass(frozen=True)
+class Links:
+    """Files beside the page and what each holds."""
+
+    files: Sequence[tuple[str, str]]
+    kind: str = "links"
+
+
+@dataclass(frozen=True)
+class View:
+    """A robot in 3-D that can be turned; `scene` is what ``view.js`` draws."""
+
+    scene: Mapping[str, Any]
+    alt: str
+    caption: str = ""
+    kind: str = "view"
+
+    @property
+    def data(self) -> str:
+        """The scene as JSON that cannot end a script element."""
+        return json.dumps(plain(self.scene), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
+
+
+Block = Table | Pictures | Text | Columns | Definitions | Links | View
 
 
 @dataclass(frozen=True)
@@ -99,26 +149,97 @@ class Page:
 
 def embedded(path: Path) -> str:
     """A picture file as a data address."""
-    return f"data:{_KINDS[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+    return _address(path.read_bytes(), path.suffix)
 
 
 def drawn(figure: Figure) -> str:
     """A figure as a data address."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg(figure)).decode('ascii')}"
+    return _address(svg(figure), ".svg")
+
+
+def _address(content: bytes, suffix: str) -> str:
+    if suffix == ".svg":  # text in a data address is smaller than base64 of it
+        return f"data:{_KINDS[suffix]},{quote(content, safe=_READ_AS_THEY_ARE)}"
+    return f"data:{_KINDS[suffix]};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+_READ_AS_THEY_ARE = " !$'()*+,-./:;=?@[]^_`{|}~"
 
 
 def svg(figure: Figure) -> bytes:
-    """A figure as SVG, the same bytes every time."""
+    """A figure as SVG, the same bytes every time: letters as text, dense layers as images, no more digits than show."""
+    for line in figure.findobj(Line2D):
+        if np.size(line.get_xdata(orig=False)) > _DENSE:
+            line.set_rasterized(True)
+    for cloud in figure.findobj(PathCollection):
+        if len(np.asarray(cloud.get_offsets())) > _DENSE:
+            cloud.set_rasterized(True)
     stream = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "wirebayes", "svg.fonttype": "path"}):
-        figure.savefig(stream, format="svg", dpi=160, metadata={"Date": None})
-    return stream.getvalue()
+    style: Any = {"svg.hashsalt": "wirebayes", "svg.fonttype": "none"}
+    with matplotlib.rc_context(style):
+        figure.savefig(stream, format="svg", dpi=160, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    text = stream.getvalue().decode("utf-8")
+    text = text[text.index("<svg") :].replace("<svg", f'<svg font-family="{_FONTS}"', 1)
+    for pattern, instead in _SHORTER:
+        text = pattern.sub(instead, text)
+    return _COORDINATES.sub(lambda path: _LONG.sub(_tenth, path[0]).replace(" L ", " "), text).encode("utf-8")
 
 
-def pictures_in(folder: Path) -> list[Picture]:
-    """Every picture of a folder, its name as the words for those who cannot see it."""
-    files = sorted(path for path in folder.iterdir() if path.suffix in _KINDS)
-    return [Picture(embedded(path), words(path.stem), words(path.stem)) for path in files]
+def _tenth(digits: re.Match[str]) -> str:
+    return f"{float(digits[0]):.1f}"
+
+
+_FONTS = "DejaVu Sans, Verdana, Arial, sans-serif"  # the first was measured with; the others are hardly wider
+_SHORTER = (
+    (re.compile(r"<!--.*?-->", re.DOTALL), ""),
+    (re.compile(r" font-family: [^;\"]*;?"), ""),  # one for the whole picture
+    (re.compile(r'<g id="[^"]*">'), "<g>"),
+    (re.compile(r"\s+"), " "),
+    (re.compile(r"> <"), ">\n<"),
+)
+_COORDINATES = re.compile(r'(?<= d=")[^"]*')
+_LONG = re.compile(r"\d+\.\d+")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as SVG, whole or not at all."""
+    write_bytes(path, svg(figure))
+
+
+def pictures_in(folder: Path, captions: Mapping[str, str]) -> list[Picture]:
+    """The pictures of a folder in the order of their captions, then others by their names.
+
+    Parameters
+    ----------
+    folder : Path
+    captions : mapping of file name without ending to caption
+    """
+    files = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in _KINDS}
+    told = {name: captions[name] for name in captions if name in files} | {
+        n: words(n) for n in files if n not in captions
+    }
+    return [Picture(embedded(files[name]), caption, caption) for name, caption in told.items()]
+
+
+def picture_file(folder: Path, name: str) -> Path | None:
+    """The file of a picture, or nothing where there is none."""
+    return next((path for path in (folder / f"{name}{kind}" for kind in _KINDS) if path.is_file()), None)
+
+
+def files_beside(folder: Path, told: Sequence[tuple[str, str]]) -> Links:
+    """Links to those files of a folder that are there; a name may be a pattern.
+
+    Parameters
+    ----------
+    folder : Path
+    told : sequence of (name, what it holds)
+    """
+    found = [
+        (path.relative_to(folder).as_posix(), holds)
+        for name, holds in told
+        for path in sorted(folder.glob(name))[:_MOST_LINKS]
+    ]
+    return Links([(quote(name), holds) for name, holds in found])
 
 
 def words(name: str) -> str:

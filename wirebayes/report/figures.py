@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from wirebayes.report.blocks import unit_text
 from wirebayes.results.store import unit_of
@@ -185,6 +186,84 @@ def marginals(
             legend(axes)
         out.append((name, figure))
     return out
+
+
+def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure | None:
+    """Every pair of parameters: the regions that hold 50 and 90 % of the draws; on the diagonal, each alone.
+
+    Parameters
+    ----------
+    draws : mapping of name to (n,) array
+    effects : tuple of Effect
+
+    Returns
+    -------
+    Figure or None
+        None for fewer than two parameters.
+    """
+    free = {name: values for name, values in draws.items() if np.ptp(values) > 0}
+    count = len(free)
+    if count < 2:
+        return None
+    figure = Figure(figsize=(1.15 * count + 0.8, 1.1 * count + 0.6), layout="constrained")
+    grid: Any = figure.subplots(count, count, sharex="col", squeeze=False)
+    scaled = {name: _straight(values) for name, values in free.items()}
+    for i, (row, (y, is_log_y)) in enumerate(scaled.items()):
+        for j, (column, (x, is_log_x)) in enumerate(scaled.items()):
+            axes = grid[i, j]
+            if j > i:
+                axes.set_axis_off()
+                continue
+            low, high = np.quantile(x, [0.002, 0.998])
+            if i == j:
+                heights, edges = np.histogram(x, np.linspace(low, high, 31))
+                axes.stairs(heights, edges, fill=True, color=CHAIN, alpha=0.75)
+            else:
+                _regions(axes, x, y)
+                axes.set_ylim(*np.quantile(y, [0.002, 0.998]))
+            axes.set_xlim(low, high)
+            _few_ticks(axes.xaxis, is_log_x)
+            _few_ticks(axes.yaxis, is_log_y)
+            beside, below = j == 0 < i, i == count - 1
+            axes.tick_params(labelsize=7, left=beside, labelleft=beside, bottom=below, labelbottom=below)
+            axes.tick_params(axis="x", rotation=45)
+            if i == j:
+                axes.set_yticks([])
+            if j == 0 < i:
+                axes.set_ylabel(named(row, effects).replace(", ", ",\n"), fontsize=8)
+            if i == count - 1:
+                axes.set_xlabel(named(column, effects).replace(", ", ",\n"), fontsize=8)
+    figure.align_labels()
+    return figure
+
+
+def _straight(values: Array) -> tuple[Array, bool]:
+    """The values, or their decimal logarithms where they are positive and spread widely."""
+    wide = values.min() > 0 and np.quantile(values, 0.95) > 4 * np.quantile(values, 0.05)
+    return (np.log10(values), True) if wide else (values, False)
+
+
+def _few_ticks(axis: Any, is_log: bool) -> None:
+    axis.set_major_locator(MaxNLocator(3, prune="both"))
+    if is_log:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{10**value:.2g}"))
+
+
+def _regions(axes: Any, x: Array, y: Array) -> None:
+    """Shade the densest cells that hold 50 and 90 % of the draws, smoothed over neighbours."""
+    limits = [np.quantile(v, [0.002, 0.998]) for v in (x, y)]
+    counts, xs, ys = np.histogram2d(x, y, bins=_CELLS, range=limits)
+    density = gaussian_filter(counts, 1.0)
+    ranked = np.sort(density.ravel())[::-1]
+    held = np.cumsum(ranked) / ranked.sum()
+    half, most = (float(ranked[np.searchsorted(held, share)]) for share in (0.5, 0.9))
+    if not 0 < most < half < ranked[0]:
+        return
+    middle = [(edges[1:] + edges[:-1]) / 2 for edges in (xs, ys)]
+    axes.contourf(*middle, density.T, levels=[most, half, ranked[0]], colors=["#b5c4d1", CHAIN])
+
+
+_CELLS = 22  # of a region's grid along each axis: fine enough to look smooth
 
 
 def residuals(

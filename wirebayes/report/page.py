@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from wirebayes import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
-from wirebayes.report.blocks import Page
+from wirebayes.report.blocks import Page, View
 
 # who knows how to tell a command's results; each module has ``page(folder, configuration)``
 _TELLERS = {
@@ -24,6 +24,8 @@ _TELLERS = {
     "plan": "wirebayes.report.pages.plan",
     "pose": "wirebayes.report.pages.pose",
     "calibrate": "wirebayes.report.pages.calibrate",
+    "export": "wirebayes.report.pages.export",
+    "simulate": "wirebayes.report.pages.simulate",
 }
 
 
@@ -60,4 +62,5 @@ def render(page: Page) -> str:
     """The page as HTML with everything inside."""
     environment = Environment(loader=PackageLoader("wirebayes.report", "."), undefined=StrictUndefined)
     environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
-    return environment.get_template("page.html.jinja").render(page=page, version=__version__) + "\n"
+    views = any(isinstance(block, View) for section in page.sections for block in section.blocks)
+    return environment.get_template("page.html.jinja").render(page=page, views=views, version=__version__) + "\n"

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.fit import seed_of
+from wirebayes.io.run_folder import write_json
 from wirebayes.report.blocks import number
 from wirebayes.report.pictures.paper_figures import drifts
-from wirebayes.report.pictures.robot import scene
+from wirebayes.report.pictures.robot import scene_points
 from wirebayes.report.pictures.robot_lines import budgets, drifts_in_time
-from wirebayes.report.pictures.robot_space import workspace_map
+from wirebayes.report.pictures.robot_space import workspace_maps
 from wirebayes.reproduce.pictures import Gallery
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics import draws, schema
@@ -81,11 +82,13 @@ def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
     for wire, stored in chains.items():
         wires = draws.for_robot(robot, as_line(stored, _FEW))
         found = claim.over_workspace(robot, wires, claim.grid(robot, _MAP))
-        figure = workspace_map(found, f"Robot {MAPPED} on {wire}: median drift within {claim.TIME_S:g} s")
-        alt = f"Median drift and tilt of {MAPPED} on new {wire} within a minute, over its workspace at three heights."
+        maps = workspace_maps(found, wire)
         low, high = (1e3 * f(np.nanmedian(found.distance_m, 1)) for f in (np.min, np.max))
         caption = f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace."
-        gallery.add("robot", f"map-{wire}", figure, alt, caption)
+        for quantity, figure in maps.items():
+            alt = f"Median {quantity} of {MAPPED} on new {wire} within a minute, over its workspace at three heights."
+            said = caption if quantity == "drift" else f"The tilt of {MAPPED} on {wire}, same places."
+            gallery.add("robot-map", f"{quantity}-{wire}", figure, alt, said)
 
 
 def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) -> None:
@@ -107,9 +110,7 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
         line = as_line(stored)
         course = drift.from_command(robot, draws.for_robot(robot, line), x, R, _TIMES_S)
         if not moved:
-            alt = f"{MAPPED} on new {wire} in three dimensions, and where creep takes its platform."
-            caption = "The drift is enlarged as the title says. Dotted: the wires after it."
-            gallery.add("robot", "scene", scene(robot, x, R, course), alt, caption)
+            write_json(gallery.folder / "scene.json", scene_points(robot, x, R, course))
         distance = 1e3 * np.linalg.norm(course.position_m - x, axis=-1)
         moved[wire] = np.where(course.found[:, None], distance, np.nan)
         budget[wire] = variance_shares.shares({name: line.parameters[name] for name in draws.CORE}, distance[:, -1])

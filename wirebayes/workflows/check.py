@@ -38,7 +38,7 @@ def check(
         A Python file with effects of your own.
     seed : int
     output : path, optional
-        Folder for ``check.json`` and a picture of each experiment, ``NAME.png``; a temporary one when left out.
+        Folder for ``check.json`` and a picture of each experiment, ``NAME.svg``; a temporary one when left out.
     progress : function of (name, done, total), optional
         Called as the work goes on.
 
@@ -84,7 +84,7 @@ def check(
             found[e.name] = _understood(e) | {
                 "warnings": warnings, "parameters": told.parameters, "effects": told.effects,
             }  # fmt: skip
-            understood(e, place.path / f"{e.name}.png")
+            understood(e, place.path / f"{e.name}.svg")
         report("check", len(experiments), len(experiments))
         write_json(place.path / CHECKED, {"experiments": found})
         run.finish()

@@ -214,5 +214,5 @@ def _pictures(found: search.Findings, output: Path, own_effects: Path | None) ->
 
     for e in (e for block in found.final for e in block.experiments):
         verdict = found.report["experiments"][e.name]
-        before_and_after(output / e.name, verdict, output / f"{e.name}.png", own_effects)
+        before_and_after(output / e.name, verdict, output / f"{e.name}.svg", own_effects)
         pictures_of_findings(output / e.name, verdict, own_effects)

@@ -60,7 +60,7 @@ def import_bench(
     zero_mm : float, optional
         Reading of the displacement where the wire has its zero-tension length.
     output : path, optional
-        Folder for ``NAME.toml``, ``NAME.csv`` and the picture ``NAME.png``; a temporary one when left out.
+        Folder for ``NAME.toml``, ``NAME.csv`` and the picture ``NAME.svg``; a temporary one when left out.
     ask : function of an undecided question that returns one of its answers, optional
         Asks a person instead of refusing.
 
@@ -147,7 +147,7 @@ def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> N
         write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
         sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {path.name}", *test.notes)]
         tables.append(toml_of(experiment, sentences))
-        understood(experiment, folder / f"{experiment.name}.png", test.recording)
+        understood(experiment, folder / f"{experiment.name}.svg", test.recording)
         found[experiment.name] = {
             "raw": path.name, "length_mm": experiment.length_mm, "material": experiment.material,
             "resolution_N": experiment.resolution_N or None, "holds": len(experiment.holds),

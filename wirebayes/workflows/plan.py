@@ -182,7 +182,7 @@ def plan(
     write_json(opened.directory / "plan.json", summary)
     from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
 
-    widths_and_effects(plain(summary), opened.directory / "plan.png")
+    widths_and_effects(plain(summary), opened.directory / "plan.svg")
     opened.finish()
     return Plan(place, own)
 

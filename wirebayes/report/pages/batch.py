@@ -6,7 +6,21 @@ from typing import Any
 
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.run_folder import read_json
-from wirebayes.report.blocks import Block, Columns, Page, Picture, Pictures, Points, Section, Table, Text, drawn, number
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    drawn,
+    files_beside,
+    number,
+)
+from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
 
@@ -22,11 +36,26 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     first: list[Block] = [Columns([_done(rows), _known(fitted), _unknown(rows, configuration)])]
     sections = [Section("Summary", first), Section("Specimens that lie apart", _outliers(fitted, far))]
     if fitted:
-        picture = Picture(drawn(specimens_of_materials(fitted, far)), "Parameters of all specimens by material.")
+        alt = "Parameters of all specimens by material."
+        picture = Picture(drawn(specimens_of_materials(fitted, far)), alt, _PICTURE, wide=True)
         sections.append(Section("Parameters by material", [Pictures([picture])]))
     sections.append(Section("Experiments", _table(rows), folded=len(rows) > 50))
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    effects = [effect for row in fitted for effect in (*row["effects"], row["best_effect"] or "")]
+    sections.append(meaning(("90 % interval", "p", "robust z"), effects))
     lead = "Each experiment was judged on its own; the table is summary.csv, the folders hold what each fit left."
     return Page("Many experiments", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+_PICTURE = "A dot a specimen, at its posterior median, with its 90 % interval; red ones lie apart from their material."
+_FILES = (
+    ("summary.csv", "a row an experiment, with intervals"),
+    ("batch.json", "the same as JSON, with outliers"),
+    ("*/discovery.json", "what one experiment's model is missing"),
+    ("*/summary.json", "one experiment's parameters"),
+    ("*/*.svg", "one experiment's readings against its models"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
 
 
 def _done(rows: list[dict[str, Any]]) -> Points:
@@ -41,7 +70,10 @@ def _known(fitted: list[dict[str, Any]]) -> Points:
     verdicts = Counter(row["verdict"] for row in fitted if row["verdict"])
     effects = Counter(effect for row in fitted for effect in row["effects"])
     said = [f"{count} × {verdict.replace('-', ' ')}" for verdict, count in verdicts.most_common()]
-    said += [f"{effect.replace('_', ' ')}: in {count} experiments" for effect, count in effects.most_common()]
+    said += [
+        f"{effect.replace('_', ' ')}: in {count} experiment{'s' * (count > 1)}"
+        for effect, count in effects.most_common()
+    ]
     checks = Counter(row["check"] for row in fitted if row["check"])
     said += [f"Model check: {checks['passed']} passed, {checks['failed']} failed."] if checks else []
     return Points("What is known", said or ["The parameters; nothing was looked for."])

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
-from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, number, span
+from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, files_beside, number, span
+from wirebayes.report.glossary import meaning
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -19,8 +20,16 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
         Section("What to do", _next(found)),
     ]
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(meaning(("90 % interval", "zero-tension length", "specimen spread"), model=False))
     lead = "Zero-tension lengths of a robot's wires from its own joint values and tensions."
     return Page(f"Calibration of {found['robot']}", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+_FILES = (
+    ("calibrate.json", "every number of this page as JSON"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
 
 
 def _done(found: dict[str, Any]) -> Points:

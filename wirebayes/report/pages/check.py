@@ -14,10 +14,20 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     embedded,
+    files_beside,
     number,
+    picture_file,
     span,
 )
+from wirebayes.report.glossary import SYMBOLS, meaning
 
+_FILES = (
+    ("import.json", "what was decided, as JSON"),
+    ("*.toml", "the experiment, for every other command"),
+    ("*.csv", "its readings"),
+    ("check.json", "every number of this page as JSON"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
 _TOLD = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
 
 
@@ -25,18 +35,21 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``check.json`` or ``import.json``, a section for each experiment."""
     imported = configuration["command"] == "import"
     found = read_json(folder / ("import.json" if imported else "check.json"))["experiments"]
-    sections = [
-        Section(name, (_imported(e) if imported else _checked(e)) + _picture(folder, name)) for name, e in found.items()
-    ]
+    tell = _imported if imported else _checked
+    sections = [Section(name, tell(e, _picture(folder, name))) for name, e in found.items()]
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     if imported:
         return Page(
             "What was imported", "A file of a bench, as it was understood: look at it before you fit.", sections
         )
+    sections.append(
+        meaning(("hold", "90 % interval", "prior"), [e for found_in in found.values() for e in found_in["effects"]])
+    )
     lead = "What was understood of the readings, what is odd about them, and what such a test can and cannot tell."
     return Page("What this test can tell", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
-def _imported(e: dict[str, Any]) -> list[Block]:
+def _imported(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     about = [
         f"From {e['raw']}.",
         f"{e['holds']} holds, {e['readings']} readings.",
@@ -44,10 +57,11 @@ def _imported(e: dict[str, Any]) -> list[Block]:
     ]
     notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
     odd = e["warnings"] or ["Nothing."]
-    return [Columns([Points("What it is", about), Points("What was done", notes), Points("What is odd", odd)])]
+    columns = [Points("What it is", about), Points("What was done", notes), Points("What is odd", odd)]
+    return [Columns(columns), *picture]
 
 
-def _checked(e: dict[str, Any]) -> list[Block]:
+def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     about = [
         f"{e['material']}, {number(e['length_mm'])} mm.",
         f"{e['recorded_holds']} recorded holds, {e['unrecorded_holds']} unrecorded, {e['readings']} readings.",
@@ -58,13 +72,19 @@ def _checked(e: dict[str, Any]) -> list[Block]:
     prior = [name for name, p in e["parameters"].items() if p["told_by"] == "prior"]
     blind += [f"Parameters it says nothing of: {', '.join(prior)}."] if prior else []
     columns = [Points("What it is", about), Points("What is odd", e["warnings"] or ["Nothing."])]
-    blocks: list[Block] = [Columns([*columns, Points("What it cannot tell", blind or ["Nothing to report."])])]
-    rows = [
-        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]), _TOLD[p["told_by"]]]
-        for name, p in e["parameters"].items()
+    blocks: list[Block] = [
+        Columns([*columns, Points("What it cannot tell", blind or ["Nothing to report."])]),
+        *picture,
     ]
+    rows = [
+        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]), _TOLD[p["told_by"]],
+         SYMBOLS.get(name, "–")]
+        for name, p in e["parameters"].items()
+    ]  # fmt: skip
     caption = "A first estimate by a short run of the sampler; fit gives the posterior."
-    blocks.append(Table(["parameter", "median", "90 % interval", "prior's 90 %", "told by"], rows, caption))
+    blocks.append(
+        Table(["parameter", "median", "90 % interval", "prior's 90 %", "told by", "what it is"], rows, caption)
+    )
     seen = [
         [_words(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]
         for name, effect in e["effects"].items()
@@ -83,10 +103,12 @@ def _checked(e: dict[str, Any]) -> list[Block]:
 
 
 def _picture(folder: Path, name: str) -> list[Block]:
-    file = folder / f"{name}.png"
-    if not file.is_file():
+    file = picture_file(folder, name)
+    if file is None:
         return []
-    return [Pictures([Picture(embedded(file), f"Displacement and tension of {name} over the whole test.")])]
+    alt = f"Displacement and tension of {name} over the whole test."
+    caption = "Displacement above, tension below, over the whole test. Shading marks every second hold."
+    return [Pictures([Picture(embedded(file), alt, caption, wide=True)])]
 
 
 def _words(effect: str) -> str:

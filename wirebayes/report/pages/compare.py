@@ -5,7 +5,24 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
-from wirebayes.report.blocks import Block, Page, Pictures, Section, Table, Text, number, pictures_in
+from wirebayes.report.blocks import Block, Page, Pictures, Section, Table, Text, files_beside, number, pictures_in
+from wirebayes.report.glossary import meaning
+
+_CAPTIONS = {
+    "differences": "How much better (right) or worse (left) each model predicts left-out holds than the base, with two "
+    "standard errors. Within the grey band the difference decides nothing.",
+    "held-out-errors": "Typical error on the last holds, predicted from the first ones; farther left is better.",
+    "held-out-free": "The held-out readings under the base model, predicted from earlier holds alone. Dots should lie "
+    "in the bands as often as the bands say.",
+    "held-out-given-first": "The same, each hold's first reading given.",
+    "pit-free": "Whether the bands are right: the step should stay within the shaded region. On the left half, a step "
+    "above the region means bands that are too narrow, one below it bands that are too wide.",
+    "pit-given-first": "The same, each hold's first reading given.",
+}
+_FILES = (
+    ("comparison.json", "every number of this page, and every held-out reading with its predicted quantiles"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -13,6 +30,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found = read_json(folder / "comparison.json")["experiments"]
     sections = [_section(folder, name, table) for name, table in found.items()]
     lead = "Each model predicts every hold from the others, and the last holds from the first; best first."
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    effects = [effect for table in found.values() for row in table["models"] for effect in row["name"].split(" + ")]
+    sections.append(meaning(("hold", "held out", "rms", "elpd", "weight"), effects))
     return Page("Models side by side", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -20,7 +40,7 @@ def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
     rows = table["models"]
     good = [r for r in rows if r.get("failed") is None]
     blocks: list[Block] = [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
-    if (folder / name).is_dir() and (pictures := pictures_in(folder / name)):
+    if (folder / name).is_dir() and (pictures := pictures_in(folder / name, _CAPTIONS)):
         blocks.append(Pictures(pictures))
     header = ["model", "weight", f"elpd − {table['base']}", "standard error", "held out: rms, N"]
     header += ["given first reading, N", "meaning"]

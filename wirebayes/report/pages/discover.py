@@ -16,10 +16,13 @@ from wirebayes.report.blocks import (
     Text,
     drawn,
     embedded,
+    files_beside,
     number,
+    picture_file,
     pictures_in,
     span,
 )
+from wirebayes.report.glossary import meaning, spoken
 from wirebayes.report.pages.paper_summary import listed
 from wirebayes.report.pictures.discover import waterfall
 
@@ -36,7 +39,19 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     )
     sections = [Section("Summary", [overview]), *(_section(folder, name, v) for name, v in found.items())]
     lead = "Simulation against measurement: where they disagree, which effect is missing, and whether adding it helps."
+    named = [e for v in found.values() for e in (*v["effects"], *v["probabilities"], *v["power"], *v.get("group", []))]
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(meaning(_TERMS, named))
     return Page("What the model is missing", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+_FILES = (
+    ("discovery.json", "every number of this page as JSON"),
+    ("*/*/summary.json", "parameters of a model"),
+    ("*/*/posterior.nc", "all draws of a model, opens with ArviZ"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
+_TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 
 
 def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
@@ -44,8 +59,8 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
     words = {
         "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
         "unknown": "Something is missing that no effect in the catalogue explains.",
-        "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}.",
-        "named": f"What is missing: {listed([_words(e) for e in v['effects']])}.",
+        "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}{_alike(v)}.",
+        "named": f"What is missing: {listed([_words(e) for e in v['effects']])}{_alike(v)}.",
         "partial": f"{listed([_words(e) for e in v['effects']]).capitalize()} is missing, and something else that no "
         "effect in the catalogue explains.",
     }
@@ -58,10 +73,11 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
         loose.append(f"Measure next: {v['next_measurement']}")
     columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in gap if p])]
     blocks.append(Columns([*columns, Points("What is not known", loose or ["Nothing to report."])]))
-    file = folder / f"{name}.png"
-    if file.is_file():
-        blocks.append(Pictures([Picture(embedded(file), f"Readings of {name} against the plain and the final model.")]))
-    if (folder / name).is_dir() and (others := pictures_in(folder / name)):
+    file = picture_file(folder, name)
+    if file is not None:
+        alt = f"Readings of {name} against the plain and the final model."
+        blocks.append(Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)]))
+    if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
         blocks.append(Pictures(others))
     if len(v.get("steps", [])) > 1 and v["steps"][0]["rmse_N"] is not None:
         figure = waterfall(v)
@@ -108,8 +124,25 @@ def _spoken(v: dict[str, Any]) -> str:
     return str(v["verdict"]).replace("-", " ")
 
 
-def _words(effect: str) -> str:
-    return "something unknown" if effect == "unknown" else effect.replace("_", " ")
+_BEFORE_AND_AFTER = (
+    "Measured minus predicted tension, hold after hold: above under the plain model, below with what was found. Shaded "
+    "holds were kept apart to test the models; both are fitted to all holds here."
+)
+_words = spoken
+
+
+def _patterns(v: dict[str, Any]) -> dict[str, str]:
+    """What the picture of each pattern shows."""
+    return {
+        f"where-{w['covariate'].replace(' ', '-')}": f"What the plain model leaves over: {w['sentence']}"
+        for w in v.get("where", [])
+    }
+
+
+def _alike(v: dict[str, Any]) -> str:
+    """The near-equivalents of what is named: a headline that hides them would promise too much."""
+    like = [_words(e) for e in v.get("group", []) if e not in (*v["effects"], *v["set"], "unknown")]
+    return f"; on this protocol hardly to be told apart from {listed(like)}" if like else ""
 
 
 def _share(v: dict[str, Any]) -> str:

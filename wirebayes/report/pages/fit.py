@@ -20,22 +20,30 @@ from wirebayes.report.blocks import (
     Table,
     Text,
     drawn,
+    files_beside,
     number,
     span,
     unit_text,
 )
+from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pages.paper_summary import listed
 from wirebayes.results.contraction import LEAST_CONTRACTION, contraction
 from wirebayes.results.store import Stored, experiments_in, load, prior_draws, unit_of
+from wirebayes.wire.effect import Effect
 
 Array = NDArray[Any]
 _DRAWS = 1000  # for bands in pictures: a 5 % quantile is then one between 3.6 % and 6.4 %
+_FILES = (
+    ("*/summary.json", "intervals, convergence and the model check as JSON"),
+    ("*/posterior.nc", "all draws, opens with ArviZ"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
 _SPOKEN = {"creep_2min_mm": "2 min", "creep_1h_mm": "1 h", "creep_1day_mm": "1 day"}
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section for each experiment of each fit in the folder."""
-    sections = []
+    sections, effects = [], dict[str, Effect]()
     for file in sorted(folder.glob("*/summary.json")):
         summary = read_json(file)
         if configuration.get("own_effects"):
@@ -43,9 +51,13 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
             continue
         names = experiments_in(file.parent / "posterior.nc")
         for name in names:
-            sections.append(section(load(file.parent, name), prior_draws(file.parent, name), summary))
+            stored = load(file.parent, name)
+            effects |= {effect.name: effect for effect in stored.sample.model.effects}
+            sections.append(section(stored, prior_draws(file.parent, name), summary))
     titles = listed([s.title for s in sections])
     lead = f"Posterior of {titles}: what the readings say about each parameter, compared with the prior."
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(meaning(("hold", "90 % interval", "prior", "shrunk by"), effects, effects))
     return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -82,13 +94,18 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects, trusted)]))
     alt = f"Measured minus predicted tension of {sample.name}, hold after hold, inside the 90 % band."
     measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
-    pictures = [Picture(drawn(measured), f"Tension of {sample.name} against displacement.")]
-    pictures.append(Picture(drawn(_residuals(stored)), alt, "Readings against replicates of the same holds."))
+    alt_measured = f"Tension of {sample.name} against displacement."
+    pictures = [Picture(drawn(measured), alt_measured, _READ)]
+    pictures.append(Picture(drawn(_residuals(stored)), alt, _LEFT))
     blocks.append(Pictures(pictures))
     blocks.append(_parameters(draws, shrunk, sample.model.effects))
     named = figures.marginals(draws, prior, sample.model.effects)
     told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
     blocks.append(Pictures(told, small=True))
+    pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects)
+    if pairs is not None:
+        alt = f"Posterior of {sample.name}, every pair of parameters."
+        blocks.append(Pictures([Picture(drawn(pairs), alt, _PAIRS, wide=True)]))
     taught = [t["sentence"] for t in summary["identifiability"].values()]
     blocks.append(
         Columns(
@@ -108,6 +125,18 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, caption)]))
     blocks.append(Text(_sampled(summary)))
     return Section(sample.name, blocks)
+
+
+_READ = "What was read: within each hold the tension falls from the dark point downwards."
+_LEFT = (
+    "What the model leaves over. Where the readings lie outside the band, or show a pattern within it, the model "
+    "misses something."
+)
+_PAIRS = (
+    "Every pair of parameters: half of the draws lie in the dark region, 90 % in the light one. A narrow ridge means "
+    "that the readings determine a combination of the two better than either; parameters over several powers of "
+    "ten have logarithmic axes."
+)
 
 
 def _check(summary: dict[str, Any]) -> dict[str, Any]:
@@ -169,12 +198,20 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tupl
     for name, values in draws.items():
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
         share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
-        lines.append([name, unit_text(unit_of(name, effects)) or "–", number(middle), span(low, high), share])
+        unit = unit_text(unit_of(name, effects)) or "–"
+        lines.append([name, unit, number(middle), span(low, high), share, _means(name, effects)])
     caption = (
+        "In the interval lies the parameter with a probability of 90 %, if the model is right. "
         "The interval before the test is the prior's; a parameter is well known if it shrank by at least "
         f"{100 * LEAST_CONTRACTION:.0f} %."
     )
-    return Table(["parameter", "unit", "median", "90 % interval", "shrunk by"], lines, caption)
+    return Table(["parameter", "unit", "median", "90 % interval", "shrunk by", "what it is"], lines, caption)
+
+
+def _means(name: str, effects: tuple[Effect, ...]) -> str:
+    """A parameter's meaning in a line."""
+    sentences = {c: e.sentence.rstrip(".") for e in effects for c in e.columns()}
+    return SYMBOLS.get(name) or sentences.get(name, "–")
 
 
 def _derived(summary: dict[str, Any]) -> Table:

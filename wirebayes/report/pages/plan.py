@@ -15,9 +15,13 @@ from wirebayes.report.blocks import (
     Table,
     Text,
     embedded,
+    files_beside,
     number,
+    picture_file,
     span,
 )
+from wirebayes.report.glossary import meaning
+from wirebayes.report.pictures.plan import is_given
 
 _AIMS = {"parameters": "what they tell of the material", "creep": "how well the creep after an hour would be known"}
 
@@ -27,13 +31,27 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found = read_json(folder / "plan.json")
     rows = found["protocols"]
     first: list[Block] = [Columns([_asked(found), _answered(found), _trusted(rows)]), _ranking(found)]
-    picture = folder / "plan.png"
-    if picture.is_file():
-        first.append(Pictures([Picture(embedded(picture), "Expected widths and detectable effects of each test.")]))
+    picture = picture_file(folder, "plan")
+    if picture is not None:
+        alt = "Expected widths and detectable effects of each test."
+        first.append(Pictures([Picture(embedded(picture), alt, _PICTURE, wide=True)]))
     sections = [Section("Summary", first)]
     sections += [Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1) for row in rows]
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    effects = [effect for row in rows for effect in row["effects"]]
+    sections.append(meaning(("hold", "90 % interval", "information", "δ"), effects))
     lead = "Each test was simulated many times before it is done, and fitted: how much would be known afterwards?"
     return Page("What a test would teach", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+_PICTURE = (
+    "Left: the uncertainty that each test would leave of each quantity, as a share of the guess's; right: how easily "
+    "it would show each effect."
+)
+_FILES = (
+    ("plan.json", "every number of this page as JSON"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
 
 
 def _asked(found: dict[str, Any]) -> Points:
@@ -98,7 +116,7 @@ def _protocol(row: dict[str, Any]) -> list[Block]:
             _words(n),
             *(number(q[key], 2) for key in ("sd_median", "sd", "width_90")),
             span(q["width_90_low"], q["width_90_high"], 2),
-            number(q["guess_sd"], 2),
+            "given" if is_given(q) else number(q["guess_sd"], 2),
         ]
         for n, q in quantities.items()
     ]
@@ -121,4 +139,7 @@ def _protocol(row: dict[str, Any]) -> list[Block]:
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return _SPOKEN.get(name, name.replace("_", " "))
+
+
+_SPOKEN = {"creep_longest_hold_mm": "creep after the longest hold, mm", "creep_1h_mm": "creep after 1 h, mm"}

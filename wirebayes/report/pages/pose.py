@@ -16,9 +16,13 @@ from wirebayes.report.blocks import (
     Table,
     Text,
     embedded,
+    files_beside,
     number,
+    picture_file,
     span,
 )
+from wirebayes.report.glossary import meaning
+from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.robot import CONTROLLERS
 
 _CAPTIONS = {
@@ -27,7 +31,9 @@ _CAPTIONS = {
     "rotation": "How far it turns. A symmetric pose turns only because specimens of one line differ.",
     "pose-error": "Distance from the pose, controllers with increasingly complete wire models, identical specimens.",
     "error-budget": "How much each parameter's uncertainty contributes to the variance of the drift.",
-    "workspace": "A level platform at other positions, new wires. White with a cross: no tensions hold it.",
+    "workspace-drift": "A level platform at other positions, new wires: how far it moves within a minute. White with a "
+    "cross: no tensions hold it.",
+    "workspace-tilt": "The same: how far it tilts.",
 }
 
 
@@ -39,14 +45,27 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         said = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
         blocks.insert(0, Text(said, strong=True))
     blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
-    files = {name: folder / f"{name}.png" for name in _CAPTIONS}
-    pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p.is_file()]
-    sections = [Section("Summary", blocks), Section("Pictures", [Pictures(pictures)] if pictures else [])]
+    view = robot_view(folder)
+    files = {name: picture_file(folder, name) for name in _CAPTIONS if not (view and name == "robot")}
+    pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p is not None]
+    sections = [Section("Summary", blocks), Section("The robot", view)]
+    sections += [Section("Pictures", [Pictures(pictures)] if pictures else [])]
     sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
     sections += [Section("Between calibrations", _between(pose)), Section("Sources of uncertainty", _doubts(pose))]
     sections += [Section("How many equilibria", _equilibria(pose))]
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    effects = pose.get("wires", {}).get("effects", [])
+    sections.append(meaning(_TERMS, effects))
     lead = "A platform on wires that creep: the commanded pose, and how the platform moves away from it."
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
+
+
+_FILES = (
+    ("pose.json", "every number of this page as JSON"),
+    ("scene.json", "points and tensions of the view that can be turned"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
+_TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "exit point")
 
 
 def _losses(pose: dict[str, Any]) -> list[str]:

@@ -5,15 +5,24 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
-from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded
+from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded, files_beside
+from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import paper_tables
 from wirebayes.report.pages.paper_summary import in_a_minute, listed, of_table_4, unbroken
 from wirebayes.report.pages.paper_tables import LEAST_COVERAGE, Rows
+from wirebayes.report.pages.robot_view import robot_view
 
 Tables = dict[str, Rows]
-Gallery = Callable[[str], list[Block]]
+Gallery = Callable[..., list[Block]]
 _ROBOT_TABLES = ("robot", "robot_claim", "robot_mass")
 _TABLES = ("measured", "least_squares", "posterior", "creep", "held_out", "sampling", *_ROBOT_TABLES)
+_FILES = (
+    ("*.csv", "the numbers of a table on this page"),
+    ("*.json", "the same as JSON, or the configuration"),
+    ("*/*/summary.json", "one fit: parameters and convergence"),
+    ("*/*/posterior.nc", "one fit: all draws, opens with ArviZ"),
+)
+_TERMS = ("hold", "90 % interval", "prior", "shrunk by", "held out", "rms", "drift", "tilt", "specimen spread")
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -21,6 +30,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     tables = {name: read_json(folder / f"{name}.json") for name in _TABLES if (folder / f"{name}.json").is_file()}
     gallery = _gallery(folder / "figures")
     sections = [build(tables, gallery) for needed, build in _SECTIONS if all(name in tables for name in needed)]
+    sections.append(Section("The robot in three dimensions", robot_view(folder / "figures")))
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(meaning(_TERMS))
     return Page(
         "Four wires that creep",
         "A wire held at a fixed stretch loses tension with time. A paper measured this on four wires and published "
@@ -36,10 +48,10 @@ def _gallery(folder: Path) -> Gallery:
     """Pictures of a section, by the index that was written with them."""
     index = read_json(folder / "index.json") if (folder / "index.json").is_file() else []
 
-    def pictures(section: str) -> list[Block]:
+    def pictures(section: str, small: bool = False) -> list[Block]:
         entries = [entry for entry in index if entry["section"] == section and (folder / entry["file"]).is_file()]
         found = [Picture(embedded(folder / entry["file"]), entry["alt"], entry["caption"]) for entry in entries]
-        return [Pictures(found)] if found else []
+        return [Pictures(found, small)] if found else []
 
     return pictures
 
@@ -190,7 +202,7 @@ def _robot(tables: Tables, gallery: Gallery) -> Section:
     blocks.append(paper_tables.robot(tables["robot"]))
     if "robot_mass" in tables:
         blocks.append(paper_tables.robot_mass(tables["robot_mass"]))
-    return Section("What it means for a robot", [*blocks, *gallery("robot")])
+    return Section("What it means for a robot", [*blocks, *gallery("robot"), *gallery("robot-map", small=True)])
 
 
 def _claim(rows: Rows) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wirebayes.report.figures import verbatim
+from wirebayes.report.figures import logarithmic, verbatim
 
 _SHOWN = {"k1": "k1 (N)", "B": "B (mm N⁻ᵁ) per m of length", "U": "U", "k2": "k2 (s⁻ᴺ)", "N": "N"}
 _MOST_BARS = 200  # specimens of which intervals are drawn: more are a smear
@@ -48,7 +48,7 @@ def specimens_of_materials(rows: list[dict[str, Any]], far: list[dict[str, Any]]
         axis.set_xlim(-0.6, len(materials) - 0.4)
         axis.tick_params(axis="y", which="both", labelsize=7)
         if name in ("k1", "B", "k2"):
-            axis.set_yscale("log")
+            logarithmic(axis, "y")
     return figure
 
 

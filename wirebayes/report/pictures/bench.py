@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.io.bench.convert import Recording
 from wirebayes.io.experiment import Experiment
+from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim
 
 Array = NDArray[Any]
@@ -71,4 +72,4 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     )
     place: Any = "outside lower center"
     figure.legend(shown.values(), shown.keys(), loc=place, ncols=len(shown), frameon=False, fontsize=8.5)
-    figure.savefig(target, dpi=130)
+    save(figure, target)

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend, panel
+from wirebayes.report.blocks import save
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel
 
 _SEEN = 12.0  # worse by more than this many times the best-known spread is drawn at the edge
 
 
-def save(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, Any]]) -> None:
+def save_pictures(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, Any]]) -> None:
     """Write the pictures of one experiment into its folder.
 
     Parameters
@@ -24,22 +25,17 @@ def save(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, 
     models : list of dict
         What `wirebayes.comparison.compare.judge` returned for each model.
     """
-    save_figure(differences(name, table), folder / "differences.png")
+    save(differences(name, table), folder / "differences.svg")
     held = {m["name"]: m for m in models if m["failed"] is None and m["held_out"]}
     if table["base"] in held:
-        save_figure(held_out_errors(name, table), folder / "held-out-errors.png")
+        save(held_out_errors(name, table), folder / "held-out-errors.svg")
         for way, readings in held[table["base"]]["held_out"].items():
             if way in ("free", "given_first") and readings:
-                save_figure(bands(f"{name}: {WORDS[way]}", readings), folder / f"held-out-{way.replace('_', '-')}.png")
-                save_figure(pit(f"{name}: {WORDS[way]}", readings), folder / f"pit-{way.replace('_', '-')}.png")
+                save(bands(f"{name}: {WORDS[way]}", readings), folder / f"held-out-{way.replace('_', '-')}.svg")
+                save(pit(f"{name}: {WORDS[way]}", readings), folder / f"pit-{way.replace('_', '-')}.svg")
 
 
 WORDS = {"free": "held out, predicted freely", "given_first": "held out, given first reading"}
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a picture whose bytes do not depend on the day."""
-    figure.savefig(path, dpi=150, metadata={"Software": None})
 
 
 def differences(name: str, table: dict[str, Any]) -> Figure:
@@ -69,9 +65,9 @@ def held_out_errors(name: str, table: dict[str, Any]) -> Figure:
     for way, colour, label in (("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")):
         found = [(place, r["held_out"][way]["rmse_N"]) for place, r in enumerate(rows) if r["held_out"][way]]
         axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
-    axes.set_xscale("log")
+    logarithmic(axes)
     _names(axes, rows)
-    legend(axes, loc="best")
+    legend_below(figure, axes, 4)
     return figure
 
 
@@ -96,7 +92,7 @@ def bands(title: str, scores: dict[str, Any]) -> Figure:
     axes.axhline(0, color=CHAIN, lw=1)
     axes.scatter(place, r["observed_N"] - q[3], s=14, color=INK, zorder=3, label="measured − median")
     axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
-    legend(axes, loc="best")
+    legend_below(figure, axes, 4)
     return figure
 
 
@@ -108,5 +104,5 @@ def pit(title: str, scores: dict[str, Any]) -> Figure:
     axes.fill_between(level, low, high, color=CHAIN, alpha=0.2, lw=0, label="95 % band, all levels at once")
     axes.plot([0, 1], [0, 1], color=QUIET, lw=1)
     axes.step(level, [(values <= x).mean() for x in level], where="post", color=INK, lw=1.5, label="measured")
-    legend(axes, loc="best")
+    legend_below(figure, axes, 4)
     return figure

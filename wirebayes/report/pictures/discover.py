@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.model import likelihoods
+from wirebayes.report.blocks import save
 from wirebayes.results import store
 from wirebayes.wire.staircase import Linearised, linearise
 
@@ -39,7 +40,7 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
     """
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
     unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
-    added = " + ".join([*verdict["accepted"], *unknown]) or "nothing"
+    added = " + ".join([e.replace("_", " ") for e in verdict["accepted"]] + unknown) or "nothing"
     titles = {"plain": "plain model", "final": f"with {added}"}
     for axis, model in zip(axes, titles, strict=True):
         _residuals(axis, store.load(folder / model, own_effects=own_effects), verdict["held_out"]["holds"])
@@ -48,7 +49,7 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
     axes[1].set_xlabel("hold number; within each hold, time runs to the right")
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
-    figure.savefig(target, dpi=130)
+    save(figure, target)
     plt.close(figure)
 
 
@@ -66,7 +67,7 @@ def waterfall(verdict: dict[str, Any]) -> Figure:
     bars = [(0.0, heights[0], _MEASURED)]
     bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
     bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
-    figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
+    figure, axis = plt.subplots(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
     labels = [f"{heights[0]:.3g} N", *(f"{b - a:+.2g} N".replace("-", "−") for a, b in pairwise(heights))]
     labels += [f"{max(heights[-1] - floor, 0.0):.2g} N", f"{floor:.2g} N"]
     for x, ((low, high, colour), label) in enumerate(zip(bars, labels, strict=True)):
@@ -75,7 +76,7 @@ def waterfall(verdict: dict[str, Any]) -> Figure:
     ends = [heights[0], *heights[1:], floor]
     for x, height in enumerate(ends):
         axis.plot([x + 0.35, x + 0.65], [height, height], color="0.4", lw=0.8)
-    axis.set_xticks(range(len(names)), [textwrap.fill(n, 16) for n in names], fontsize=9)
+    axis.set_xticks(range(len(names)), [textwrap.fill(n, 12) for n in names], fontsize=9)
     axis.set_ylabel("rms error on held-out holds (N)")
     axis.margins(y=0.12)
     axis.spines[["top", "right"]].set_visible(False)
@@ -83,7 +84,7 @@ def waterfall(verdict: dict[str, Any]) -> Figure:
 
 
 def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Path | None = None) -> None:
-    """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.png``.
+    """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.svg``.
 
     None for a pattern over what does not vary within the experiment.
 
@@ -108,7 +109,7 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
         # a pattern within holds is hidden by their levels
         within = finding["covariate"] == "time in hold"
         left = (residual - level if within else residual)[mask]
-        figure, axis = plt.subplots(figsize=(9.0, 3.4), layout="constrained")
+        figure, axis = plt.subplots(figsize=_PANEL, layout="constrained")
         axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
         groups = np.array_split(np.argsort(x, kind="stable"), min(len(np.unique(x)), _GROUPS))
         middles = [(x[g].mean(), left[g].mean()) for g in groups]
@@ -116,9 +117,9 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.set_xlabel(_LABELS[finding["covariate"]])
         axis.set_ylabel("measured − plain model (N)" + (",\nless its hold's mean" if within else ""))
-        axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 110)), loc="left", fontsize=10)
+        axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
         axis.legend(fontsize=8, frameon=False)
-        figure.savefig(folder / f"where-{finding['covariate'].replace(' ', '-')}.png", dpi=130)
+        save(figure, folder / f"where-{finding['covariate'].replace(' ', '-')}.svg")
         plt.close(figure)
 
 
@@ -171,6 +172,7 @@ def _residuals(axis: Axes, stored: store.Stored, held: list[int]) -> None:
 
 _SHOWN = 0.05  # p of a pattern that is worth a picture
 _GROUPS = 12  # points of the line of means: each is the mean of some five readings of a test like the paper's
+_PANEL = (5.4, 3.4)  # inches: letters can be read where a phone shows it
 _LABELS = {
     "hold": "hold number",
     "displacement": "displacement (mm)",

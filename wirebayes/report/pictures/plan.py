@@ -9,6 +9,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.report.blocks import save
 from wirebayes.report.figures import verbatim
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#bab0ac")
@@ -59,11 +60,19 @@ def widths_and_effects(plan: dict[str, Any], target: Path) -> None:
         axis.set_axisbelow(True)
         axis.tick_params(axis="x", labelsize=8)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
-    figure.savefig(target, dpi=130)
+    save(figure, target)
 
 
 def _share(width: dict[str, float]) -> float:
-    return width["sd_median"] / width["guess_sd"] if width["guess_sd"] else np.nan
+    return np.nan if is_given(width) else width["sd_median"] / width["guess_sd"]
+
+
+def is_given(width: dict[str, float]) -> bool:
+    """Whether the guess states a value without uncertainty, so that there is nothing to compare with."""
+    return width["guess_sd"] <= _ROUNDING * width["sd_median"]
+
+
+_ROUNDING = 1e-9  # of a standard deviation: what is left of a zero
 
 
 def _words(name: str) -> str:

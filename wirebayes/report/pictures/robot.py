@@ -10,8 +10,10 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from wirebayes.io.run_folder import write_json
+from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
-from wirebayes.report.pictures.robot_space import workspace_map
+from wirebayes.report.pictures.robot_space import workspace_maps
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.drift import Course
@@ -52,9 +54,10 @@ def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> 
     if "shared_draw" in content["variance_shares"]:
         pictures["error-budget"] = error_budget(content["variance_shares"])
     if found.workspace is not None:
-        pictures["workspace"] = workspace_map(found.workspace)
+        pictures |= {f"workspace-{name}": figure for name, figure in workspace_maps(found.workspace).items()}
     for name, figure in pictures.items():
-        figure.savefig(folder / f"{name}.png", dpi=160)
+        save(figure, folder / f"{name}.svg")
+    write_json(folder / "scene.json", scene_points(robot, asked.position_m, asked.rotation, found.courses[0.0]))
 
 
 def scene(
@@ -71,15 +74,12 @@ def scene(
     exaggeration : float, optional
         Default: a round factor that makes the drift a twentieth of the robot.
     """
-    shift = course.position_m[course.found, -1].mean(0) - position_m
-    turn = course.rotation[course.found, -1].mean(0) - rotation
+    told = scene_points(robot, position_m, rotation, course, exaggeration)
+    exaggeration, here = told["exaggeration"], told["platform"]
+    there = here + exaggeration * (told["drifted"][-1] - here)
     size = np.ptp(robot.exit_m, axis=0).max()
-    if exaggeration is None:
-        exaggeration = _round(0.05 * size / max(np.linalg.norm(shift), 1e-12))
     figure = Figure(figsize=(6.0, 5.2))
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
-    here = position_m + robot.platform_m @ rotation.T
-    there = position_m + exaggeration * shift + robot.platform_m @ (rotation + exaggeration * turn).T
     for i, (a, p, q) in enumerate(zip(robot.exit_m, here, there, strict=True)):
         axes.plot(*(a + traced(robot.pulleys, i, p - a)).T, color=QUIET, lw=1.0)
         axes.plot(*(a + traced(robot.pulleys, i, q - a)).T, color=HOLD, lw=0.7, ls=":")
@@ -103,6 +103,46 @@ def scene(
     return figure
 
 
+def scene_points(
+    robot: Robot, position_m: Floats, rotation: Floats, course: Course, exaggeration: float | None = None
+) -> dict[str, Any]:
+    """What a view of the robot draws: exit points, platform points and edges, and the mean drift at each time.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m, rotation : (3,), (3, 3) arrays
+    course : Course
+        Its mean over the draws is taken.
+    exaggeration : float, optional
+        Default: a round factor that makes the last drift a twentieth of the robot.
+
+    Returns
+    -------
+    dict
+        ``name``, ``exits``, ``platform`` (w, 3), ``drifted`` (t, w, 3), ``wires`` (w lines, about their pulleys), all
+        in m and in the world; ``edges``, ``times``, ``exaggeration``, ``tensions_N`` (t, w), medians, at nine times.
+    """
+    here = position_m + robot.platform_m @ rotation.T
+    position, turned = course.position_m[course.found].mean(0), course.rotation[course.found].mean(0)
+    shown = np.unique(np.linspace(0, len(position) - 1, min(len(position), _MOST_TIMES)).round().astype(int))
+    drifted = position[shown, None] + np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
+    if exaggeration is None:
+        size = np.ptp(robot.exit_m, axis=0).max()
+        exaggeration = _round(0.05 * size / max(float(np.linalg.norm(position[-1] - position_m)), 1e-12))
+    return {
+        "name": robot.name,
+        "exits": robot.exit_m,
+        "platform": here,
+        "wires": [a + traced(robot.pulleys, i, p - a) for i, (a, p) in enumerate(zip(robot.exit_m, here, strict=True))],
+        "edges": list(_edges(robot.platform_m)),
+        "drifted": drifted,
+        "times": [f"{t:.3g} s" if t < 1000 else f"{t:.0f} s" for t in course.times_s[shown]],
+        "tensions_N": np.median(course.tension_N[course.found][:, shown], axis=0),
+        "exaggeration": exaggeration,
+    }
+
+
 def _edges(points: Floats) -> Iterator[tuple[int, int]]:
     """Pairs of platform points that an edge joins: the hull's edges, without those inside a flat face."""
     spread = points - points.mean(0)
@@ -122,6 +162,9 @@ def _edges(points: Floats) -> Iterator[tuple[int, int]]:
             i, j = sorted((int(simplex[k]), int(simplex[k - 1])))
             normals.setdefault((i, j), []).append(equation[:3])
     yield from (pair for pair, (a, b) in normals.items() if a @ b < 0.99)
+
+
+_MOST_TIMES = 9  # of a view: stops of its slider
 
 
 def _round(value: float) -> float:

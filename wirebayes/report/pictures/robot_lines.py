@@ -25,7 +25,7 @@ def drifts_in_time(drifts_mm: Mapping[str, Array], times_s: Array, limit_mm: flo
         The paper's.
     """
     figure, axes = panel("time, s", "distance from the pose, mm", title)
-    for (name, drift), colour in zip(drifts_mm.items(), _cycle(len(drifts_mm)), strict=True):
+    for (name, drift), colour in zip(drifts_mm.items(), cycle(len(drifts_mm)), strict=True):
         low, middle, high = np.nanquantile(drift, [0.05, 0.5, 0.95], axis=0)
         axes.plot(times_s, middle, color=colour, label=name)
         axes.fill_between(times_s, low, high, color=colour, alpha=0.18, lw=0)
@@ -48,7 +48,7 @@ def budgets(shares: Mapping[str, Mapping[str, float]], title: str) -> Figure:
     parameters = list(dict.fromkeys(name for own in shares.values() for name in own))
     lines = list(shares)[::-1]
     done = np.zeros(len(lines))
-    for name, colour in zip(parameters, _cycle(len(parameters)), strict=True):
+    for name, colour in zip(parameters, cycle(len(parameters)), strict=True):
         width = np.array([100 * max(shares[line].get(name, 0.0), 0.0) for line in lines])
         axes.barh(lines, width, left=done, color=colour, label=name, height=0.6)
         done = done + width
@@ -58,5 +58,5 @@ def budgets(shares: Mapping[str, Mapping[str, float]], title: str) -> Figure:
     return figure
 
 
-def _cycle(count: int) -> list[str]:
+def cycle(count: int) -> list[str]:
     return [_COLOURS[i % len(_COLOURS)] for i in range(count)]

@@ -12,33 +12,42 @@ from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S, Workspace
 Floats = NDArray[np.float64]
 
 
-def workspace_map(result: WorkspaceDrift, title: str = "") -> Figure:
-    """Median drift and tilt over the workspace, a row each, a column a slice; where no wires hold it, a cross.
+def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]:
+    """Median drift and tilt over the workspace, slices above each other, so that a phone shows them whole.
 
-    Slices are level; those of a robot in a vertical plane lie in it.
+    Where no wires hold the platform, a cross. Slices are level; those of a robot in a vertical plane lie in it.
 
     Parameters
     ----------
     result : WorkspaceDrift
         On a regular grid.
     title : str
+
+    Returns
+    -------
+    dict of str to Figure
+        ``drift`` and, where anything tilts, ``tilt``.
     """
     across_axis, along_axis, slice_axis = _axes(result.position_m)
     slices = np.unique(result.position_m[:, slice_axis])
-    rows = [
-        (1e3 * result.median_distance_m, f"drift, mm\n(claim: {1e3 * DISTANCE_M:g})"),
-        (np.degrees(result.median_tilt_rad), f"tilt, degrees\n(claim: {np.degrees(TILT_RAD):.3g})"),
-    ]
-    if not np.nanmax(rows[1][0], initial=0.0):
-        rows = rows[:1]  # parallel lines: nothing tilts
-    figure = Figure(figsize=(max(2.1 * len(slices), 3.4) + 1.6, 0.7 + 2.0 * len(rows)), layout="constrained")
-    panels: Any = figure.subplots(len(rows), len(slices), sharex=True, sharey=True, squeeze=False)
-    figure.suptitle(title or f"Median drift within {TIME_S:g} s", fontsize=10.5, x=0.02, ha="left", color=INK)
+    fields = {
+        "drift": (1e3 * result.median_distance_m, f"drift, mm (claim: {1e3 * DISTANCE_M:g})"),
+        "tilt": (np.degrees(result.median_tilt_rad), f"tilt, degrees (claim: {np.degrees(TILT_RAD):.3g})"),
+    }
+    if not np.nanmax(fields["tilt"][0], initial=0.0):
+        del fields["tilt"]  # parallel lines: nothing tilts
     across, along = (np.unique(result.position_m[:, k]) for k in (across_axis, along_axis))
-    for line, (value, label) in zip(panels, rows, strict=True):
+    height = 2.6 * (np.ptp(along) / max(np.ptp(across), 1e-9) if len(across) > 1 else 1.0)
+    figures = {}
+    for name, (value, label) in fields.items():
+        size = (4.0, 0.8 + len(slices) * (min(max(height, 1.0), 3.6) + 0.35))
+        figure = Figure(figsize=size, layout="constrained")
+        panels: Any = figure.subplots(len(slices), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        said = f"median {name} within {TIME_S:g} s"
+        figure.suptitle(f"{title}: {said}" if title else said.capitalize(), fontsize=10.5, x=0.02, ha="left", color=INK)
         image: Any = None
         low, high = (f(value[np.isfinite(value)], initial=np.inf * s) for f, s in ((np.min, 1), (np.max, -1)))
-        for axes, level in zip(line, slices, strict=True):
+        for axes, level in zip(panels, slices[::-1], strict=True):
             here = result.position_m[:, slice_axis] == level
             field = np.full((len(along), len(across)), np.nan)
             x, y = result.position_m[here][:, [across_axis, along_axis]].T
@@ -49,14 +58,13 @@ def workspace_map(result: WorkspaceDrift, title: str = "") -> Figure:
                 image = axes.pcolormesh(_edges(across), _edges(along), field, vmin=low, vmax=high, rasterized=True)
             axes.set_aspect("equal")
             axes.tick_params(labelsize=8)
-        line[0].set_ylabel(f"{'xyz'[along_axis]}, m")
+            axes.set_title(f"{'xyz'[slice_axis]} = {level:.3g} m", fontsize=9.5)
+            axes.set_ylabel(f"{'xyz'[along_axis]}, m")
+        panels[-1].set_xlabel(f"{'xyz'[across_axis]}, m")
         if image is not None:
-            figure.colorbar(image, ax=line, label=label)
-    for axes, level in zip(panels[0], slices, strict=True):
-        axes.set_title(f"{'xyz'[slice_axis]} = {level:.3g} m", fontsize=9.5)
-    for axes in panels[-1]:
-        axes.set_xlabel(f"{'xyz'[across_axis]}, m")
-    return figure
+            figure.colorbar(image, ax=list(panels), label=label)
+        figures[name] = figure
+    return figures
 
 
 def _axes(position_m: Floats) -> tuple[int, int, int]:

@@ -1,0 +1,117 @@
+"""A browser without a window, driven over a pipe in its own protocol: no driver, no port, nothing to install."""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+EXECUTABLE = next((found for found in map(shutil.which, NAMES) if found), None)
+
+
+# the browser reads from descriptor 3 and writes to 4
+_START = """import fcntl, os, sys
+pair = [fcntl.fcntl(int(number), fcntl.F_DUPFD, 10) for number in sys.argv[1:3]]
+os.dup2(pair[0], 3), os.dup2(pair[1], 4)
+os.execv(sys.argv[3], sys.argv[3:])"""
+
+
+class Tab:
+    """One page of the browser; what it did wrong is collected as it happens."""
+
+    def __init__(self, send: int, receive: int) -> None:
+        self._send, self._receive, self._unread = send, receive, b""
+        self._count, self._session = 0, ""
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        self._loaded = False
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        """Ask the browser for something and wait for its answer."""
+        self._count += 1
+        message = {"id": self._count, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._send, json.dumps(message).encode() + b"\0")
+        while (answer := self._next()).get("id") != self._count:
+            self._note(answer)
+        assert "error" not in answer, answer
+        return answer["result"]
+
+    def open(self, page: Path, width: int, height: int = 900) -> None:
+        """Show a page as wide as a screen of `width`, and forget what earlier ones did."""
+        self.errors, self.requests, self._loaded = [], [], False
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.call("Page.navigate", url=page.as_uri())
+        while not self._loaded:
+            self._note(self._next())
+
+    def run(self, script: str) -> Any:
+        """The value of an expression in the page, once its promise is kept."""
+        found = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def press(self, key: str, code: int, text: str = "") -> None:
+        """Press a key and let it go."""
+        shared = {"key": key, "code": key, "windowsVirtualKeyCode": code}
+        self.call("Input.dispatchKeyEvent", type="keyDown", text=text, **shared)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **shared)
+
+    def screenshot(self, target: Path) -> None:
+        """A picture of the whole page."""
+        content = self.call("Page.getLayoutMetrics")["cssContentSize"]
+        clip = {"x": 0, "y": 0, "width": content["width"], "height": content["height"], "scale": 1}
+        shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)
+        target.write_bytes(base64.b64decode(shot["data"]))
+
+    def _next(self) -> Any:
+        while b"\0" not in self._unread:
+            piece = os.read(self._receive, 1 << 20)
+            assert piece, "the browser went away"
+            self._unread += piece
+        message, _, self._unread = self._unread.partition(b"\0")
+        return json.loads(message)
+
+    def _note(self, event: Any) -> None:
+        method, told = event.get("method"), event.get("params", {})
+        if method == "Page.loadEventFired":
+            self._loaded = True
+        elif method == "Runtime.exceptionThrown":
+            self.errors.append(str(told["exceptionDetails"].get("exception", told)))
+        elif method == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning", "assert"):
+            self.errors.append(str(told["args"]))
+        elif method == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
+            self.errors.append(told["entry"]["text"])
+        elif method == "Network.requestWillBeSent" and not told["request"]["url"].startswith("data:"):
+            self.requests.append(told["request"]["url"])
+
+
+@contextmanager
+def tab(profile: Path) -> Iterator[Tab]:
+    """A running browser with one tab."""
+    assert EXECUTABLE is not None
+    (their_read, send), (receive, their_write) = os.pipe(), os.pipe()
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run")
+    command = [EXECUTABLE, *options, f"--user-data-dir={profile}", "--remote-debugging-pipe"]
+    start = [sys.executable, "-c", _START, str(their_read), str(their_write), *command]
+    browser = subprocess.Popen(start, pass_fds=(their_read, their_write), stderr=subprocess.DEVNULL)
+    os.close(their_read)
+    os.close(their_write)
+    try:
+        yield Tab(send, receive)
+    finally:
+        os.close(send)
+        os.close(receive)
+        browser.terminate()
+        browser.wait(30)

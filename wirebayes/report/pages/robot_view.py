@@ -1,0 +1,24 @@
+"""A robot that can be turned, from the points that a command left in ``scene.json``."""
+
+from pathlib import Path
+
+from wirebayes.io.run_folder import read_json
+from wirebayes.report.blocks import Block, View, number
+
+FILE = "scene.json"
+
+
+def robot_view(folder: Path) -> list[Block]:
+    """The view, or nothing where the folder has no such file."""
+    if not (folder / FILE).is_file():
+        return []
+    scene = read_json(folder / FILE)
+    known = [tension for row in scene["tensions_N"] for tension in row if tension is not None]
+    reach = f", from {number(min(known))} N (blue) to {number(max(known))} N (red)" if known else ""
+    caption = (
+        f"Wires coloured by their median tension{reach}; a broken line is a slack wire. Blue platform: the commanded "
+        f"pose. Red platform with dotted wires: the mean drift, enlarged {scene['exaggeration']:g} times. Squares: "
+        "exit points with the number of their wire. Drag, or press a button, to turn it."
+    )
+    alt = f"Robot {scene['name']}: exit points, wires and platform where it was sent and where creep takes it."
+    return [View(scene, alt, caption)]

@@ -1,0 +1,67 @@
+"""The page of ``wirebayes simulate``: the tests that were made up, and the truth behind them."""
+
+from pathlib import Path
+from typing import Any
+
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.io.experiment import read_experiments
+from wirebayes.io.run_folder import read_json
+from wirebayes.report import figures
+from wirebayes.report.blocks import (
+    Block,
+    Page,
+    Picture,
+    Pictures,
+    Section,
+    Table,
+    Text,
+    drawn,
+    files_beside,
+    number,
+    unit_text,
+)
+from wirebayes.report.glossary import SYMBOLS, meaning, spoken
+from wirebayes.results.store import unit_of
+
+_MOST = 12  # tests of which a page shows the readings
+_FILES = (
+    ("experiments.toml", "the tests, for every other command"),
+    ("*.csv", "readings of one test"),
+    ("truth.json", "the true parameters and effects"),
+    ("configuration.json", "what was asked, with version and seed"),
+)
+
+
+def page(folder: Path, configuration: dict[str, Any]) -> Page:
+    """The content of ``truth.json`` and of the experiments beside it."""
+    truths = read_json(folder / "truth.json")["experiments"]
+    experiments = read_experiments(folder / "experiments.toml")
+    sections = [_section(e, truths[e.name]) for e in experiments[:_MOST]]
+    if len(experiments) > _MOST:
+        more = Text(f"The first {_MOST} of {len(experiments)} tests are shown; the files hold all.")
+        sections.append(Section("More tests", [more]))
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(meaning(("hold",), configuration["effects"]))
+    lead = "Tests that were never done: readings of an invented wire, whose true parameters are known."
+    return Page("Simulated tests", lead, sections, f"Seed {configuration.get('seed')}.")
+
+
+def _section(e: Any, truth: dict[str, Any]) -> Section:
+    effects = truth.get("effects", [])
+    said = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
+    picture = Picture(
+        drawn(figures.measured(e.protocol(), e.tension(), e.name)),
+        f"Tension of {e.name} against displacement.",
+        "Within each hold the tension falls from the dark point downwards.",
+    )
+    known = tuple(named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
+    lines = [
+        [name, number(value), unit_text(unit_of(name, known)) or "–", SYMBOLS.get(name, "size of an effect")]
+        for name, value in truth["parameters"].items()
+    ]
+    blocks: list[Block] = [
+        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {said}."),
+        Pictures([picture]),
+        Table(["parameter", "true value", "unit", "what it is"], lines, "What an analysis should find."),
+    ]
+    return Section(e.name, blocks)
