@@ -21,6 +21,7 @@ from wirebayes.io.run_folder import plain, write_bytes
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
 _SENTENCE = 36  # characters; no number with its interval is longer
 _MOST_LINKS = 40  # of one kind; a list of more is a wall
+_DPI = 120  # of layers drawn as images
 _DENSE = 1500  # points from which on an image takes less room than a path
 
 
@@ -177,7 +178,7 @@ def svg(figure: Figure) -> bytes:
     stream = io.BytesIO()
     style: Any = {"svg.hashsalt": "wirebayes", "svg.fonttype": "none"}
     with matplotlib.rc_context(style):
-        figure.savefig(stream, format="svg", dpi=160, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+        figure.savefig(stream, format="svg", dpi=_DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = stream.getvalue().decode("utf-8")
     text = text[text.index("<svg") :].replace("<svg", f'<svg font-family="{_FONTS}"', 1)
     for pattern, instead in _SHORTER:
