@@ -1,7 +1,8 @@
-"""Linear algebra on stacks of matrices, with an answer for every one of them: NaN where a matrix has none.
+"""Linear algebra on stacks of matrices, with a result for every one of them: NaN where a matrix has none.
 
 At the edge of a posterior a model overflows, a wire goes slack and derivatives vanish. numpy then raises for the whole
-stack because of one matrix. Here the others keep their answers, to the last bit, and the caller sees which have none.
+stack because of one matrix. Here the results of the others are unchanged to the last bit, and the caller sees which
+have none.
 """
 
 from collections.abc import Callable

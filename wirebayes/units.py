@@ -1,4 +1,4 @@
-"""Units in the names of columns and keys: another unit is named with its factor, never taken for a typing mistake."""
+"""Units in the names of columns and keys: another unit is named with its factor, never mistaken for a typing error."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Files that a user named, read whole: absent, unreadable, endless and foreign ones end in one plain line."""
+"""Files named by a user, read whole: absent, unreadable, endless and foreign ones end in a one-line error."""
 
 import re
 import stat

@@ -1,4 +1,4 @@
-"""Independent work on all cores; what comes out does not depend on how many there are."""
+"""Independent work on all cores; the results do not depend on how many there are."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""``wirebayes batch``: many experiments, each fitted and discovered on its own, in one table."""
+"""``wirebayes batch``: many experiments in one table, each fitted and searched for missing effects."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``wirebayes import``: what benches write, turned into experiment files."""
+"""``wirebayes import``: files of test benches, turned into experiment files."""
 
 import sys
 from pathlib import Path

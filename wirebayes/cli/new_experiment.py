@@ -1,4 +1,4 @@
-"""``wirebayes init``: a start for one's own measurements."""
+"""``wirebayes init``: a file to start from for one's own measurements."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,9 +1,9 @@
-"""The test again from starting points with larger effects, to which the parameters have already adapted.
+"""The global test from starting points with larger effects, to which the parameters have already adapted.
 
-The plain fit bends to take in what is missing, and from where it ends a large effect may look like nothing. So each
-effect is led up a ladder of amplitudes: at every rung the parameters follow by Gauss-Newton steps, and its log Bayes
-factor is taken there, linear over the stretch of amplitudes that the rung stands for. Simulated data sets climb the
-same ladders, so what is found on the way has its chance level.
+The plain fit bends to absorb what is missing, and from where the fit ends a large effect may look like nothing. So the
+amplitude of each effect is raised along a path: at every step the parameters follow by Gauss-Newton steps, and the
+effect's log Bayes factor is evaluated there, linear over the range of amplitudes that the step stands for. Simulated
+data sets follow the same paths, which gives the distribution of the result under chance.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,7 @@
-"""The gate to every verdict: fit, strike out gross errors, and ask whether anything at all is missing.
+"""The global test that precedes every verdict: fit, exclude gross errors, and test whether anything is missing at all.
 
-The question is one global test whose p-value comes from data sets simulated at the fit and refitted. `discover` and the
-check at the end of every fit ask it here, so they give the same answer to the same readings.
+Its p-value comes from data sets simulated at the fit and refitted. `discover` and the check at the end of every fit
+both use it, so they give the same answer for the same readings.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Gross errors: single readings that no effect explains, found before anything else rests on them."""
+"""Gross errors: single readings that no effect explains, excluded before the tests that follow."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,8 +1,9 @@
-"""A fitted plain model made linear: residuals, what the parameters can absorb, and what each effect would add.
+"""A fitted plain model, linearised: residuals, what the parameters can absorb, and what each effect would add.
 
 Everything later rests on inner products in the metric ``V0(ρ) = I + ρ K Kᵀ`` of readings divided by their standard
-deviation: K is the derivative by the setting errors, ρ their unknown size against the sensor's error. The overall
-scale of the noise is integrated out, ρ is summed over a grid, so no test trusts the noise of a model that may be wrong.
+deviation: K is the derivative by the setting errors, ρ their unknown size relative to the sensor's error. The overall
+scale of the noise is integrated out and ρ is summed over a grid, so no test relies on the noise that a possibly wrong
+model has estimated.
 """
 
 from collections.abc import Callable, Iterator, Sequence

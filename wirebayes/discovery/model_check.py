@@ -1,6 +1,6 @@
 """Does the fitted model describe its own readings? The check at the end of every fit.
 
-It is the global test of `wirebayes.discovery.global_test`, with the fitted effects inside: p comes from data sets
+It is the global test of `wirebayes.discovery.global_test`, with the fitted effects in the model: p comes from data sets
 simulated at the fit and refitted, so the readings are not used twice, and for one experiment it is the p that
 `discover` reports.
 """

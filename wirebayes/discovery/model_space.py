@@ -1,7 +1,7 @@
 """Probabilities over models: sets of effects, each with or without a smooth remainder in each material.
 
-A set is judged with everything it explains, so a name is credited for what it takes off the remainder, and the
-remainder's probability is part of the answer.
+A set is evaluated together with the remainder, so an effect is credited for what it explains of the remainder, and the
+probability of a remainder is part of the answer.
 """
 
 from collections.abc import Mapping, Sequence

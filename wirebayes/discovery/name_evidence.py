@@ -1,4 +1,4 @@
-"""From screened candidates to names: refit those that stand a chance and add up the evidence of their forms."""
+"""From screened candidates to effects: refit the promising ones and sum the evidence of their forms."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What could have been seen: detectable amplitudes, look-alikes, what this protocol hides, and what to measure next."""
+"""Detectable amplitudes, similar effects, what this protocol cannot show, and what to measure next."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

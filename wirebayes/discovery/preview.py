@@ -1,7 +1,7 @@
-"""What a test can and cannot tell, before a fit or a search is run: parameters by a short run, effects by their size.
+"""What a test can and cannot determine, before a long fit or search: parameters by a short run, effects by their size.
 
-An effect is seen where the global test of `discover` would detect it in 80 % of tests like this one, simulated at the
-rough fit and refitted (`wirebayes.discovery.power`).
+An effect counts as detectable where the global test of `discover` would detect it in 80 % of tests like this one,
+simulated at the rough fit and refitted (`wirebayes.discovery.power`).
 """
 
 from collections.abc import Mapping

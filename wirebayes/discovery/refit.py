@@ -1,7 +1,8 @@
-"""Which effect: every candidate refitted nonlinearly, judged on one scale of evidence beside the flexible reference.
+"""Which effect: every candidate refitted without linearisation, its evidence compared with the flexible reference.
 
-Every effect's amplitude has the same prior in units of what it does to these readings (δ, uniform up to `LARGEST`), so
-none is preferred for the units of its amplitude. Its evidence is then its best refitted posterior plus a constant.
+The amplitude of every effect has the same prior in units of its influence on these readings (δ, uniform up to
+`LARGEST`), so none is preferred for the units of its amplitude. Its evidence is then its best refitted posterior
+density plus a constant.
 """
 
 from collections.abc import Sequence

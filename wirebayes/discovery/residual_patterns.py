@@ -1,4 +1,4 @@
-"""Where simulation and measurement disagree: residual patterns along what was varied, each with a simulated p-value."""
+"""Where model and measurement disagree: residual patterns along what was varied, each with a simulated p-value."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

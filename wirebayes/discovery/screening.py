@@ -1,7 +1,7 @@
-"""Candidates for the missing effect, judged linearly over all blocks of a file, and the global test on them.
+"""Candidates for the missing effect, evaluated linearly over all blocks of a file, and the global test on them.
 
-An effect of the material has an amplitude a material, an effect of the instrument or the environment one a file, an
-event one at its hold of its experiment: the scope decides which blocks a candidate acts on, and what they share.
+An effect of the material has one amplitude per material, an effect of the instrument or the environment one per file,
+an event one at its hold of its experiment: the scope decides on which blocks a candidate acts, and what they share.
 """
 
 from collections.abc import Mapping, Sequence

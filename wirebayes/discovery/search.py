@@ -1,7 +1,8 @@
 """Find the missing effect: nothing is missing, this is, one of these is, or something that is not in the catalogue.
 
-The order is: gross errors; fits; one global test calibrated by refitted simulations; names by refitted evidence beside
-a flexible reference; further effects by leave-one-hold-out; the gap on held-out holds; what could not have been seen.
+The order is: gross errors; fits; one global test calibrated by refitted simulations; effects by refitted evidence
+beside a flexible reference; further effects by leave-one-hold-out; the gap on held-out holds; what could not be
+detected.
 """
 
 from collections.abc import Callable, Mapping, Sequence

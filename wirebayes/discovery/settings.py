@@ -1,6 +1,6 @@
-"""What a search for the missing effect is asked, and every threshold behind its verdict.
+"""The settings of a search for the missing effect, and every threshold behind its verdict.
 
-How each number was set is told in docs/thresholds.rst; none was chosen with the paper's wires in sight.
+docs/thresholds.rst says how each number was set.
 """
 
 from collections.abc import Mapping

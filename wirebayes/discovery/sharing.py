@@ -1,7 +1,7 @@
-"""One instrument, several materials: what each material's samples know of an amplitude counts for the others too.
+"""One instrument, several materials: what the samples of one material say about an amplitude counts for the others too.
 
-Materials share no other parameter, so the likelihood of a shared amplitude is the product of theirs, and to one of them
-the others are a prior of it: normal, or log-normal for an amplitude that cannot change sign.
+Materials share no other parameter, so the likelihood of a shared amplitude is the product of theirs, and for one of
+them the others act as a prior: normal, or log-normal for an amplitude that cannot change sign.
 """
 
 from collections.abc import Mapping, Sequence

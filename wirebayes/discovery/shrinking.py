@@ -1,4 +1,4 @@
-"""Does the gap shrink on unseen holds? Plain, each accepted effect in turn, a smooth discrepancy, the final model."""
+"""Does the gap shrink on unseen holds? Plain model, each accepted effect in turn, smooth discrepancy, final model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

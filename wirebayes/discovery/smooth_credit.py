@@ -1,4 +1,4 @@
-"""What a name would take off the smooth remainder: its log Bayes factor with the remainder in the model, linearly."""
+"""What an effect explains of the smooth remainder: its log Bayes factor with the remainder in the model, linearised."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The reference *something I do not know*: a smooth discrepancy over hold and time, as a few functions of readings."""
+"""The reference for something unknown: a smooth discrepancy over hold and time, as a few functions of the readings."""
 
 from typing import Any
 

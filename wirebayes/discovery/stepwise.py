@@ -1,7 +1,7 @@
-"""The search through sets of effects: forward from each set within reach of the best, every set kept.
+"""The search through sets of effects: forward from each set close enough to the best, every set kept.
 
-The evidence of a set is a chain of refits, each effect refitted beside those before it. The prior of an amplitude is
-fixed once, on the plain fit, so the order of the chain does not matter.
+The evidence of a set comes from a chain of refits, each effect refitted beside those before it. The prior of an
+amplitude is fixed once, on the plain fit, so the order of the chain does not matter.
 """
 
 from collections.abc import Mapping, Sequence

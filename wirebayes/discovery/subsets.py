@@ -1,6 +1,6 @@
-"""Evidence of something that may act on any of several materials: every number of them, and each choice, alike.
+"""Evidence of something that may be present in any of several materials: every number of them, and each choice, alike.
 
-The share of materials in which it acts is unknown and uniform, so the materials support each other: where most show it,
+The proportion of materials that have it is unknown and uniform, so the materials support each other: if most show it,
 it is expected in the next.
 """
 

@@ -1,4 +1,4 @@
-"""From the probabilities of models to a verdict for each material, in the order that the thresholds demand."""
+"""From the probabilities of models to a verdict for each material, in the order in which the thresholds apply."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

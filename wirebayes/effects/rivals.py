@@ -1,7 +1,7 @@
-"""Rivals of eq (5): other time laws, and eq (2) without any. Not missing effects, so not in the catalogue.
+"""Alternatives to eq (5): other time laws, and eq (2) without any. Not missing effects, so not in the catalogue.
 
-A time law returns the share of the creep reached by a time, whatever eq (5) said. Where it has no plateau, the creep
-of eq (4) is what is reached after a day.
+A time law returns the share of the creep reached by a time, in place of that of eq (5). Where it has no plateau, the
+creep of eq (4) is what is reached after a day.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
-"""What is added when something is missing that has no name: a discrepancy less certain the farther it extrapolates.
+"""The model of something missing that has no name: a discrepancy that is less certain the farther it extrapolates.
 
-Two random walks over the order of holds, one for the level and one for the course within the hold, bent at a few
-knots. Beyond the training holds the walks go on, so the bands widen there instead of promising what was not seen.
+Two random walks over the order of holds, one for the level and one for the course within the hold, piecewise linear
+between a few knots. Beyond the training holds the walks continue, so the bands widen there.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How long a chain remembers, and whether ensembles agree."""
+"""Autocorrelation, effective sample size, and whether independent ensembles agree."""
 
 from typing import Any
 

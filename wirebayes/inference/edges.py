@@ -1,4 +1,4 @@
-"""Amplitudes that end at an edge, as scores that are standard normal under their prior."""
+"""Amplitudes whose prior ends at an edge, transformed to scores that are standard normal under that prior."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""One fit: a problem sampled to the policy's satisfaction, thinned to what is worth storing."""
+"""One fit: a problem sampled until the policy is satisfied, thinned to the draws worth storing."""
 
 import hashlib
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Samples of one material with the effects accepted so far: fitted, ready to be tested for one more effect."""
+"""Samples of one material fitted with the effects accepted so far, ready to be tested for one more effect."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,6 +1,6 @@
-"""The paper's identification: least squares from many starts, in every reading of its model.
+"""The paper's identification: least squares from many starts, in every interpretation of its model.
 
-Least squares weighs all readings alike and knows neither priors nor setting errors; it is here to be compared with the
+Least squares weights all readings equally and has neither priors nor setting errors; it is here to be compared with the
 published parameters, and with the posterior.
 """
 

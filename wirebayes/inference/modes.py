@@ -1,6 +1,6 @@
 """Modes of the posterior: batched Newton steps from many starts, and the normal approximation at each.
 
-Every row is an optimisation of its own; rows may also have readings of their own (refits of simulated data).
+Every row is an optimisation of its own; rows may also have their own readings (refits of simulated data).
 """
 
 from collections.abc import Callable, Sequence

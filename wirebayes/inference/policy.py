@@ -1,4 +1,4 @@
-"""What is asked of a chain before its draws are believed."""
+"""What a chain has to satisfy before its draws are used."""
 
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,6 +1,6 @@
-"""Posterior draws in a fraction of a second, for decisions made many times over: a short run of the same sampler.
+"""Posterior draws in a fraction of a second, for decisions that are made many times: a short run of the same sampler.
 
-For numbers that are reported, sample with `wirebayes.inference.fit`, which asks for convergence.
+For numbers that are reported, sample with `wirebayes.inference.fit`, which requires convergence.
 """
 
 from typing import Any

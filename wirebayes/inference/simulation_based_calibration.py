@@ -1,7 +1,7 @@
-"""Simulation-based calibration: draw a truth from the prior, simulate, fit, and see where the truth lies.
+"""Simulation-based calibration: draw a truth from the prior, simulate, fit, and compute the rank of the truth.
 
-If prior, simulator, likelihood and sampler belong together, the share of posterior draws below the truth is uniform for
-every quantity of parameters and readings. The band here holds the empirical distributions of all quantities at once.
+If prior, simulator, likelihood and sampler are consistent, the share of posterior draws below the truth is uniform for
+every quantity of parameters and readings. The band here contains the empirical distributions of all quantities jointly.
 """
 
 from collections.abc import Callable, Mapping

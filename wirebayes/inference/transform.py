@@ -1,19 +1,19 @@
-"""The coordinates that are sampled: what the data see, so that the curved ridge in (B, k2, N) lies nearly straight.
+"""The coordinates that are sampled: what the data determine, so that the curved ridge in (B, k2, N) is nearly straight.
 
-Positive parameters become logarithms; amplitudes that end at an edge (half-normal and uniform priors) become what is
-standard normal under their prior, so that no draw falls over the edge and none is held up there; others count in
-standard deviations of their prior. Then, one after the other,
+Positive parameters become logarithms; amplitudes whose prior ends at an edge (half-normal and uniform priors) become
+what is standard normal under their prior, so that no proposal leaves the support; others are measured in standard
+deviations of their prior. Then, one after the other,
 
 - log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
-- log B becomes the log tension lost in a hold, root mean square over the holds of the test, if the first readings are
-  taken for the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
-  creep is linear in B, so G needs no B and one pass along the holds.
+- log B becomes the log tension lost in a hold, root mean square over the holds of the test, with the first readings
+  taken as the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
+  creep is linear in B, so G does not depend on B and takes one pass along the holds.
 
-The map is triangular and these two steps have unit Jacobian. Specimens' values that are partially pooled come last
+The map is triangular and these two steps have unit Jacobian. Values of partially pooled specimens come last
 (`wirebayes.inference.specimens`).
 
-What bend and what funnel remain, a proposal learns (`wirebayes.inference.sampler.transport_map`), for which the columns
-have an order: errors before what they blur, the shape of the creep before its amount and the stiffness.
+The proposal learns the remaining curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the
+columns are ordered: errors before what they widen, the shape of the creep before its amount and the stiffness.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Readings that a wire on a bench hardly gives: checks before a fit, each a sentence with what to change.
 
-What is certainly wrong is refused where the file is read (`wirebayes.io.readings`); what may be honest is warned of
-here.
+What is certainly wrong is refused where the file is read (`wirebayes.io.readings`); what is possible but unlikely gets
+a warning here.
 """
 
 from collections.abc import Callable

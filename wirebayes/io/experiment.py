@@ -1,4 +1,4 @@
-"""What was measured: tests of one wire each, read from TOML beside CSV and checked to the last field."""
+"""Tests of one wire each, read from TOML and CSV files and checked completely."""
 
 import hashlib
 import json

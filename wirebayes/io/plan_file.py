@@ -1,4 +1,4 @@
-"""A plan: tests that could be done, what is guessed of the wire, and what they are for; read from TOML."""
+"""A plan, read from TOML: tests that could be done, a guess of the wire, and the aim."""
 
 import os
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
-"""The strict reader of a readings' CSV: every complaint names the file, the line and the column.
+"""The strict reader of a readings' CSV: every error names the file, the line and the column.
 
-The format: UTF-8 (a byte-order mark is accepted), one header line with the columns in any order, one reading a line,
-fields separated by commas, plain decimal numbers with optional spaces round them, any line ending, blank lines only at
+The format: UTF-8 (a byte-order mark is accepted), one header line with the columns in any order, one reading per line,
+fields separated by commas, plain decimal numbers with optional spaces around them, any line ending, blank lines only at
 the end. There are no comments, no quotes and no empty cells.
 """
 

@@ -1,4 +1,4 @@
-"""What is written: whole files or none, and folders that belong to one configuration.
+"""Writing results: whole files or none, and folders that belong to one configuration.
 
 A folder of results holds ``configuration.json``, the resolved configuration that made it. The same configuration
 resumes there, another is refused; so nothing is ever mixed or overwritten.

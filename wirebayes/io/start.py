@@ -1,4 +1,4 @@
-"""A start: a commented experiment file and a small CSV, to be replaced by one's own."""
+"""A commented experiment file and a small CSV to start from."""
 
 NAME = "my-wire"
 TOML = """\

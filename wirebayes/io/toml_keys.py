@@ -1,4 +1,4 @@
-"""One TOML table asked for its keys, so that every complaint says where it stands."""
+"""The keys of one TOML table, read so that every error says where it stands."""
 
 import re
 import tomllib

@@ -1,8 +1,8 @@
 """Sensor, setting and rounding error: the probability of readings given a staircase.
 
 Readings are Gaussian with covariance ``V = (sensor² + resolution²/12) I + setting² J Jᵀ``, J the derivative of all
-readings by all setting errors. What one hold leaves to the next is a single number, the creep carried on, so the
-normal density factors hold by hold in linear time: a Kalman filter whose state is that number.
+readings by all setting errors. One hold passes a single number on to the next, the carried creep, so the normal density
+factors hold by hold in linear time: a Kalman filter whose state is that number.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,8 @@
-"""Amplitudes that readings depend on linearly, integrated out of a posterior and drawn back into it.
+"""Amplitudes on which the readings depend linearly, integrated out of a posterior and drawn afterwards.
 
-Given everything else, such amplitudes are normal if their priors are. So what is walked is the posterior of everything
-else, with them integrated out, and every draw of it is completed by a draw of them: together, a draw of the whole.
+Given all other parameters, such amplitudes are normal if their priors are. So the sampler works on the posterior of the
+other parameters, with the amplitudes integrated out, and each of its draws is completed by a draw of the amplitudes:
+together, a draw of the whole posterior.
 """
 
 from dataclasses import dataclass, replace

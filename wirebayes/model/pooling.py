@@ -1,8 +1,8 @@
-"""Partial pooling: specimens cut from one line that are alike, but not the same.
+"""Partial pooling: specimens cut from one line that are similar, but not identical.
 
 Each specimen has its own value of some positive material parameters, log-normal about the line's with a spread that is
-learned. With a small spread the samples share everything, as `build` has it; with a wide one each is fitted by itself.
-The coordinates that are sampled: `wirebayes.inference.specimens`.
+estimated. With a small spread the samples share everything, as `build` has it; with a wide one each is fitted
+separately. The coordinates that are sampled: `wirebayes.inference.specimens`.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """From holds to a log posterior: which parameter belongs to which sample, and the batched density.
 
-Columns are named ``k1``, ``preload`` …, effect amplitudes ``effect.parameter``. Where several samples are fitted at
-once, a column of one sample is ``preload[sample]`` and one of a material ``k1[material]``; the most special name wins.
+Columns are named ``k1``, ``preload`` …, effect amplitudes ``effect.parameter``. If several samples are fitted jointly,
+a column of one sample is ``preload[sample]`` and one of a material ``k1[material]``; the most specific name is used.
 """
 
 from collections.abc import Mapping, Sequence

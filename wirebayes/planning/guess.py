@@ -1,4 +1,4 @@
-"""Draws of what is guessed of a wire before a test: from a plan's tables, an earlier fit, or readings."""
+"""Draws of the wire's parameters guessed before a test: from a plan's tables, an earlier fit, or readings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Planned tests in the order of what they teach within the time there is."""
+"""Planned tests, ranked by what they would teach within the available time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

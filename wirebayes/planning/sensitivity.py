@@ -1,7 +1,7 @@
-"""Which missing effects a test not yet done would show, how large they would have to be, and which it would confuse.
+"""Which missing effects a planned test would detect, how large they would have to be, and which it would confuse.
 
-The guess's centre stands for the fit. Tests simulated there, each refitted, give the level that chance reaches in the
-global test of `wirebayes.discovery`; an effect is seen where its evidence passes that level.
+The centre of the guess stands for the fit. Tests simulated there, each refitted, give the distribution of the global
+test of `wirebayes.discovery` under chance; an effect is detected where its evidence exceeds that level.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
-"""How wide the posterior of a test not yet done will be: the test simulated many times, each fitted approximately.
+"""The expected width of the posterior of a planned test: the test simulated many times, each fitted approximately.
 
-A truth is drawn from the guess, readings from the truth with setting, sensor and rounding errors. The posterior is
-climbed from the truth; draws of a Student t at the mode, weighted by the posterior, give its widths. So what bends the
-posterior is seen, and what a fit's priors add is in it; a second mode far from the truth is not.
+A truth is drawn from the guess, readings from the truth with setting, sensor and rounding errors. The mode of the
+posterior is found from the truth; draws of a Student t at the mode, weighted by the posterior, give its widths. These
+include the curvature of the posterior and the priors of a fit; a second mode far from the truth is not found.
 """
 
 from collections.abc import Mapping

@@ -1,11 +1,11 @@
 """Leave one hold out: how well each hold's readings are predicted from all the others.
 
 Leaving a hold out drops its readings, never its displacement and duration: the wire creeps there all the same. The
-posterior without a hold is reached from the full one by Pareto-smoothed importance sampling with the ratios
-``1 / p(readings of the hold | all other readings, parameters)``; where the ratios' tail is too heavy to trust, that
-posterior is sampled itself, and the hold's density is the ratio of the two posteriors' normalising constants, which
-draws of both tell far better than the density's mean over either: where the mean hangs on a few draws that the left-out
-hold happens to like, the draws of the full posterior are the many of their kind.
+posterior without a hold is obtained from the full one by Pareto-smoothed importance sampling with the ratios ``1 /
+p(readings of the hold | all other readings, parameters)``. Where the tail of the ratios is too heavy, that posterior is
+sampled itself, and the density of the hold is the ratio of the two posteriors' normalising constants. Draws of both
+posteriors estimate this ratio much better than the mean of the density over either: that mean may depend on a few draws
+that happen to fit the left-out hold, while the draws of the full posterior are mostly of this kind.
 """
 
 from collections.abc import Callable

@@ -1,11 +1,11 @@
-"""Predicted readings: parameter, setting, sensor and rounding error, given the training readings and what went before.
+"""Predicted readings: parameter, setting, sensor and rounding error, given the training readings and the earlier holds.
 
 For each posterior draw the setting errors of the training holds are drawn given the training readings (a normal
-distribution, to the linearisation of the likelihood); then the whole staircase, past and future, is walked with exact
-setting errors. So the creep carried on, and whatever effects carry beside it, is what the readings say it is.
+distribution, to the linearisation of the likelihood); then the whole staircase, past and future, is computed with exact
+setting errors. So the carried creep, and whatever effects carry beside it, is what the readings imply.
 
 A first reading that is given later conditions the predicted readings jointly, parameters and setting errors at once:
-each draw is moved by the regression of all readings on the given ones, which is exact where they are jointly normal.
+each draw is shifted by the regression of all readings on the given ones, which is exact where they are jointly normal.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a protocol file asks of a stored posterior: replicates, holds that continue the test, or a fresh sample."""
+"""What a protocol file requests of a stored posterior: replicates, holds that continue the test, or a new sample."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

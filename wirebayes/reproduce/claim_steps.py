@@ -1,4 +1,4 @@
-"""The paper's claim taken apart: from its own parameters, read as printed, to what the chain says of a workspace."""
+"""The paper's claim step by step: from its own parameters, read as printed, to what the chain says of a workspace."""
 
 from collections.abc import Mapping
 from dataclasses import replace

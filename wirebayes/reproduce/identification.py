@@ -1,4 +1,4 @@
-"""Table 4 beside least squares of our own: published and refitted parameters in every reading of the model."""
+"""Table 4 beside our own least squares: published and refitted parameters in every interpretation of the model."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

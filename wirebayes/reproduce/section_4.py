@@ -1,6 +1,7 @@
 """Section 4 of the paper, the robot: the one place where the reproduced fits and the robot meet.
 
-The paper gives no coordinates of its robot, so its claim is asked of two representative ones, over their workspace.
+The paper gives no coordinates of its robot, so its claim is evaluated for two representative ones, over their
+workspace.
 """
 
 from collections.abc import Mapping, Sequence

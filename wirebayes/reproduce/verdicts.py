@@ -1,4 +1,4 @@
-"""What the readings say of each published value: inside the posterior's interval, outside, or not theirs to say.
+"""What the readings say about each published value: inside the posterior's interval, outside, or not determined.
 
 A parameter counts as determined by the readings when its 90 % interval, on a logarithmic scale, has less than a third
 of the width it had before the test. The share by which it shrank is its *contraction*.

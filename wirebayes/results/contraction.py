@@ -1,4 +1,4 @@
-"""By how much readings shrank the 90 % interval of a quantity, against the prior's."""
+"""By how much the readings shrank the 90 % interval of a quantity, relative to the prior's."""
 
 from typing import Any
 

@@ -1,9 +1,9 @@
-"""How much the data taught, said aloud: prior against posterior, sensitivity to the prior, and the ridges.
+"""What the data determine, in words: prior against posterior, sensitivity to the prior, and correlated parameters.
 
-Power scaling raises the prior (or the likelihood) to a power a little above and below one and asks how far the
+Power scaling raises the prior (or the likelihood) to a power slightly above and below one and measures how far the
 posterior moves (Kallioinen et al., Detecting and diagnosing prior and likelihood sensitivity with power-scaling): a
-distance of `SENSITIVE` for each doubling of the power matters. Positive parameters count by their logarithms, so that
-a prior made weaker keeps its median.
+distance of `SENSITIVE` for each doubling of the power matters. Positive parameters are measured by their logarithms, so
+that a weakened prior keeps its median.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Many fits at once: each in a folder of its own, on all cores, resumed where a run was cut off."""
+"""Many fits at once: each in its own folder, on all cores, resumed after an interruption."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Which models an undecided answer stands for: their probabilities and where their posteriors lie."""
+"""The models behind an ambiguous answer: their probabilities and where their posteriors are stored."""
 
 from collections.abc import Sequence
 from pathlib import Path

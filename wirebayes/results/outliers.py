@@ -1,8 +1,8 @@
-"""Specimens whose parameters lie far from those of their material's others.
+"""Specimens whose parameters lie far from those of the others of their material.
 
 A robust z: the distance of a specimen's posterior median from the median of all specimens of the material, divided by
-what is expected of it, which is the specimens' own spread (from the median absolute deviation) and the width of this
-specimen's posterior. Neither a few outliers nor one badly determined specimen moves it much.
+the expected distance, which combines the spread of the specimens (from the median absolute deviation) and the width of
+this specimen's posterior. Neither a few outliers nor one badly determined specimen affects it much.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Elasticity with effects: the strain whose product with k1 is the tension, its slope, and the way back."""
+"""Elasticity with effects: the strain whose product with k1 is the tension, its slope, and the inverse."""
 
 from typing import Any
 

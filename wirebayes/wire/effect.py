@@ -1,4 +1,4 @@
-"""The common face of an effect: a change of one quantity at one named place of the model.
+"""The interface of an effect: a change of one quantity at one named place of the model.
 
 The staircase calls effects by place and knows none by name; a user's own effect is a subclass in the user's file.
 """

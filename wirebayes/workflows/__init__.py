@@ -1,4 +1,4 @@
-"""What people ask for, each in a module: joins inference, results, discovery, robots and pages.
+"""What users run, each in a module: joins inference, results, discovery, robots and pages.
 
-`wirebayes` offers these functions by name; the command line parses words, calls them and prints.
+`wirebayes` offers these functions by name; the command line parses arguments, calls them and prints.
 """

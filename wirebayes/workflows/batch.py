@@ -1,4 +1,4 @@
-"""Many experiments, each on its own: fitted, discovered, in one table with those that lie apart."""
+"""Many experiments, each by itself: fitted, searched for missing effects, in one table that marks outliers."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""What was understood of an experiment file, what is suspicious in it, and what such a test can tell."""
+"""What was understood of an experiment file, what is suspicious in it, and what such a test can determine."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A start for one's own measurements."""
+"""A file to start from for one's own measurements."""
 
 from pathlib import Path
 

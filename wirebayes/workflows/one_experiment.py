@@ -1,7 +1,7 @@
-"""One experiment of a batch: fitted, or discovered, in a folder of its own that comes back as files.
+"""One experiment of a batch: fitted, or searched for missing effects, in a folder of its own that comes back as files.
 
-Whoever computes needs no folder in common with whoever asks, so it may be another machine. Work travels as bytes, also
-within one machine: then arrays lie in memory alike everywhere, and results agree to the last bit.
+The worker needs no folder in common with the machine that runs the batch, so it may be another machine. Work is sent as
+bytes, also within one machine: then arrays have the same memory layout everywhere, and results agree to the last bit.
 """
 
 import pickle

@@ -1,4 +1,4 @@
-"""What the functions of the public face are given, checked and brought into one form."""
+"""The arguments of the public functions, checked and brought into one form."""
 
 import os
 from collections.abc import Callable, Iterable, Sequence

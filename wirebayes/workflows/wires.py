@@ -1,4 +1,4 @@
-"""What a robot is given: a fitted wire, its own description, and the configuration of what is computed."""
+"""Inputs of the robot's commands: a fitted wire, the robot's description, and the configuration of the run."""
 
 import json
 import os

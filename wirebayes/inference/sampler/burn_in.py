@@ -1,12 +1,13 @@
-"""Burn-in: from a search for modes to a proposal worth freezing, and walkers in their places.
+"""Burn-in: from a search for modes to a proposal that can be frozen, and walkers distributed over the modes.
 
-The annealed population of the search gives the first proposal. Then, round by round, it is fitted to weighted draws
-of itself, which also tell how good it is: the acceptance it would have, and how far the log of posterior over proposal,
-at its 99.9 % quantile over the posterior, lies above its median. Until it is frozen it draws more from its wide parts
-than it will then, for what lies far out is learned from few draws. While hardly a draw would be accepted, walkers of
-the density to a power below one look further: a warm density has the same places and lower walls between them.
+The annealed population of the search gives the first proposal. Then, round by round, the proposal is fitted to its own
+draws, weighted by posterior over proposal. These weights also measure its quality: the acceptance rate it would have,
+and the distance from the median of the log weight under the posterior to its 99.9 % quantile. Until it is frozen, the
+proposal draws more from its wide components than afterwards, because the tails would otherwise be learned from few
+draws. While hardly a draw would be accepted, walkers explore the density to a power below one: it has the same modes,
+with lower barriers between them.
 
-Walkers are placed by weight at last, so that none is left in a far mode of no weight.
+At the end walkers are placed by weight, so that none is left in a distant mode of negligible weight.
 """
 
 from dataclasses import replace

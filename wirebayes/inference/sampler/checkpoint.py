@@ -1,7 +1,7 @@
-"""The resume file: plain values as JSON and named arrays in one zip archive, which nothing in it can make run code.
+"""The resume file: plain values as JSON and named arrays in one zip archive, whose content is never executed.
 
-``state.json`` holds the format's number, which fit the file belongs to, and the plain values; it is read and checked
-before any array. Arrays are ``.npy`` files beside it, as in numpy's ``.npz``; nested names are joined by dots.
+``state.json`` holds the number of the format, the fit to which the file belongs, and the plain values; it is read and
+checked before any array. Arrays are ``.npy`` files beside it, as in numpy's ``.npz``; nested names are joined by dots.
 """
 
 import json

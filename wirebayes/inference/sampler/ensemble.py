@@ -6,10 +6,11 @@ block, until for every parameter
 - the effective sample size, from the spread of the walkers' means, is at least `Policy.ess`,
 - the kept steps span five autocorrelation times, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`, and
-- no place that matters outweighs a pool of draws of the frozen proposal (`burn_in.overlooked`),
+- no region of the posterior is underrated by the frozen proposal so much that one place there outweighs a pool of draws
+  (`burn_in.overlooked`),
 
-or until `Policy.most_steps`: then the result says *not converged*, and why. Where a first look promises that another
-proposal would be done sooner, what was kept counts as burn-in, and teaches that one.
+or until `Policy.most_steps`: then the result says *not converged*, and why. If the first kept draws show that a better
+proposal would need fewer evaluations in total, they count as burn-in, and the proposal is learned again from them.
 """
 
 from collections.abc import Callable

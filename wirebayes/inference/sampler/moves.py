@@ -1,4 +1,4 @@
-"""emcee moves: pools of draws of a frozen proposal, and differential evolution in coordinates that it straightens."""
+"""emcee moves: pools of draws of a frozen proposal, and differential evolution in its straightened coordinates."""
 
 from collections.abc import Sequence
 from typing import Any

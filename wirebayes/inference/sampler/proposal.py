@@ -1,8 +1,8 @@
-"""What the learned move draws from: mixtures in straightened coordinates, one as things are, and the start's.
+"""What the learned move draws from: mixtures in straightened coordinates, one in plain coordinates, and the first one.
 
-The close part resembles the posterior. Two wide ones, fitted to the posterior to a power, keep the ratio of posterior
-over proposal in bounds in the tails: along bends the straightened one, where the straightening goes astray the plain
-one. The start's keeps small modes in reach.
+The close component resembles the posterior. Two wide ones, fitted to the posterior to a power, keep the ratio of
+posterior to proposal bounded in the tails: the one in straightened coordinates along curved ridges, the one in plain
+coordinates where the straightening map extrapolates badly. The mixture of the start keeps small modes within reach.
 """
 
 from collections.abc import Mapping

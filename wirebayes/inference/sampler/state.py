@@ -1,4 +1,4 @@
-"""Walkers: their state between two stretches of work, which a file can hold, and the stretches themselves."""
+"""The state of the walkers, which can be written to a file, and the stretches of the run between two states."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

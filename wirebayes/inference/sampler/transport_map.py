@@ -1,11 +1,11 @@
-"""A map that straightens a cloud of points: each coordinate less its mean, over its scale, given those before it.
+"""A triangular map that straightens points: each coordinate minus its mean, over its scale, given those before it.
 
-The mean is a quadratic and the logarithm of the scale a linear function of the coordinates before: a ridge that bends
-and a funnel (a setting error that widens everything it allows) become nearly a round heap. What is left, coordinate by
-coordinate, is made even by a sinh-arcsinh map, which knows skewness: of an exponent U whose lower end the data hardly
-bound, say. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The whole is triangular,
-so its Jacobian is the product of the slopes, and it has an inverse whatever its coefficients. Beyond the points it was
-fitted to, quadratics go on as straight lines and scales stay at what they were on the border.
+The mean is a quadratic and the logarithm of the scale a linear function of the preceding coordinates: a curved ridge
+and a funnel (a setting error that widens everything it allows) become nearly round. The residual of each coordinate is
+made symmetric by a sinh-arcsinh transformation, for skewed marginals such as that of an exponent U whose lower end the
+data hardly bound. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The map is
+triangular, so its Jacobian is the product of the slopes, and it has an inverse for any coefficients. Outside the range
+of the points to which it was fitted, quadratics continue as straight lines and scales keep their value at the border.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""A raw file of a bench as the experiment that it holds, with everything that was understood on the way."""
+"""A raw bench file as the experiment that it contains, with everything that was understood on the way."""
 
 import json
 import re

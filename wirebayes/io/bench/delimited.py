@@ -1,4 +1,4 @@
-"""Text as cells: which sign stands between them is seen from the lines, quotes are taken off."""
+"""Text as cells: the delimiter is inferred from the lines, quotes are removed."""
 
 import csv
 import re

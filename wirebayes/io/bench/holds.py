@@ -1,4 +1,4 @@
-"""Readings cut into holds: by a column of hold numbers, by the displacement, or by times that start anew.
+"""Readings divided into holds: by a column of hold numbers, by the displacement, or by times that start again.
 
 Times of the whole test become times since each hold began, which is its first reading; moves take none.
 """

@@ -1,7 +1,7 @@
-"""Which sign is the decimal one, seen from all numbers of a file; then numbers are plain.
+"""Which sign is the decimal one, inferred from all numbers of a file.
 
 A comma followed by three digits may be either; so may a point where semicolons separate. Any other number in the file
-that can be read in one way only decides for all of them.
+that can be read in only one way decides for all of them.
 """
 
 import re

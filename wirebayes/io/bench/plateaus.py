@@ -1,7 +1,7 @@
-"""A continuous recording cut into holds: where the displacement stays, between moves.
+"""A continuous recording divided into holds: where the displacement stays constant, between moves.
 
-The displacement is split where its mean changes most, again and again (binary segmentation), until no split explains
-more than noise would. Neighbours at one level are joined; pieces that are short or lean are moves.
+The displacement is divided where its mean changes most, repeatedly (binary segmentation), until no division explains
+more than noise would. Neighbours at one level are joined; segments that are short or sloping are moves.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Cells as a file has them, each with its place, before anything is understood of them."""
+"""Cells as a file has them, each with its place, before they are interpreted."""
 
 import re
 from dataclasses import dataclass

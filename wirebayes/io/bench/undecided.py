@@ -1,4 +1,4 @@
-"""Two readings are possible, and nothing in the file says which: a person may choose, a program is refused."""
+"""Two interpretations are possible, and nothing in the file decides: a person may choose, a program gets an error."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
