@@ -98,6 +98,8 @@ def next_step(result: Result) -> str:
     if isinstance(result, Comparison):
         return "wirebayes fit FILE.toml with the options of the best model, or wirebayes discover FILE.toml"
     if isinstance(result, Pose):
+        if (folder / "corrections.csv").is_file():
+            return f"give the controller the joint values of {folder / 'corrections.csv'}"
         return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
     if isinstance(result, Calibration):
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"
@@ -242,11 +244,13 @@ def _pose(found: dict[str, Any]) -> list[str]:
     if not found["feasible"]:
         return [f"{found['robot']}: {found['sentence']}"]
     lines = []
+    measured = found.get("history", {}).get("kind") == "measured"
+    said = "is away from where it is meant to be" if measured else "has drifted"
     for drift in found["drift"]:
         far, time = drift["distance_mm"], drift["times_s"][-1]
         if far["q50"] is not None:
             lines.append(
-                f"{found['robot']}: after {time:g} s the platform has drifted by {far['q50'][-1]:.3g} mm "
+                f"{found['robot']}: after {time:g} s the platform {said} by {far['q50'][-1]:.3g} mm "
                 f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
             )
     return lines or [f"{found['robot']}: no draw of the wires could be solved"]

@@ -10,6 +10,9 @@ from wirebayes.cli.options import AsJson, ExperimentName, Output, OwnEffects, Qu
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
 Wires = Annotated[Path, typer.Option("--wires", metavar="FOLDER", help="A folder with a posterior.nc.")]
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
+TensionError = Annotated[
+    float, typer.Option("--tension-sd", metavar="N", help="Standard error of a tension, in newtons.")
+]
 Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative difference between wires of one line.")]
 
 
@@ -27,7 +30,28 @@ def pose(
         Path | None,
         typer.Option("--other-fit", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
     ] = None,
-    draws: Draws = 1000,
+    joints: Annotated[
+        Path | None,
+        typer.Option("--joints", metavar="FILE.csv", help="Joint values over time: where was the platform?"),
+    ] = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option("--trajectory", metavar="FILE.csv", help="Commanded poses and loads over time: where does it go?"),
+    ] = None,
+    payload: Annotated[float, typer.Option("--payload", metavar="KG", help="Carried beside the platform's mass.")] = 0,
+    payload_at: Annotated[
+        str | None, typer.Option("--payload-at", metavar="X,Y,Z", help="Its centre in the platform's frame, metres.")
+    ] = None,
+    tension_sd: TensionError = 0.02,
+    tilt_sd: Annotated[
+        float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of roll and pitch in --joints.")
+    ] = 1e-3,
+    reference_sd: Annotated[
+        float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the lengths that joints stand for.")
+    ] = 0.0,
+    draws: Annotated[
+        int | None, typer.Option("--draws", min=1, help="Posterior draws used; default: 1000, 200 over time.")
+    ] = None,
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
@@ -36,16 +60,22 @@ def pose(
 ) -> None:
     """Kinematics on creeping wires; drift and pose error with uncertainty bands.
 
-    Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects are worth.
+    Of one pose, or over time: --joints takes measured values and finds the pose, --trajectory takes commanded poses and
+    finds the drift. Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects
+    are worth.
     """
     from wirebayes.cli.answer import conclude
+    from wirebayes.cli.progress import progress
     from wirebayes.workflows.pose import pose as run
 
-    found = run(
-        robot, wires, position=position, rotation=rotation, times=times, tolerance=tolerance,
-        tolerance_tilt=tolerance_tilt, specimen_spread=spread, other_fit=other_fit, draws=draws, experiment=experiment,
-        own_effects=own_effects, seed=seed, output=output,
-    )  # fmt: skip
+    with progress() as report:
+        found = run(
+            robot, wires, position=position, rotation=rotation, times=times, tolerance=tolerance,
+            tolerance_tilt=tolerance_tilt, specimen_spread=spread, other_fit=other_fit, joints=joints,
+            trajectory=trajectory, payload=payload, payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd,
+            reference_sd=reference_sd, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed,
+            output=output, progress=report,
+        )  # fmt: skip
     for line in found.messages if found.computed else ():
         typer.echo(line, err=True)
     conclude(found, as_json=as_json, quiet=quiet)
@@ -56,9 +86,7 @@ def calibrate(
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Poses, joints and tensions, in order.")],
     wires: Wires,
     output: Output,
-    tension_sd: Annotated[
-        float, typer.Option("--tension-sd", metavar="N", help="Standard error of a tension, in newtons.")
-    ] = 0.02,
+    tension_sd: TensionError = 0.02,
     tilt_sd: Annotated[
         float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of the platform's normal.")
     ] = 1e-3,

@@ -1,7 +1,5 @@
 """The zero-tension lengths of a robot's wires, from its own readings."""
 
-import csv
-import io
 import math
 import os
 from pathlib import Path
@@ -10,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.arrays import is_table
-from wirebayes.io.run_folder import open_run, plain, write_json
+from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration import session_file
 from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.session import Prior
 from wirebayes.workflows.options import PathLike, above_zero, check_seed, path_of
 from wirebayes.workflows.results import POSTERIOR, Calibration, Place
+from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import RobotLike, Wires, configuration, content, draws_of, folder_of, hash_of, robot_of
 
 
@@ -98,7 +96,7 @@ def calibrate(
         read = content(Path(readings))
     else:
         text = _as_csv(readings, machine)
-        session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, _row, bias > 0)
+        session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, row_place, bias > 0)
         read = hash_of({"readings": text})
     line = draws_of(wires, draws, experiment, own)
     options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read, *((bias,) if bias else ()))
@@ -116,24 +114,11 @@ def calibrate(
 
 def _as_csv(columns: Any, robot: Robot) -> str:
     """Columns in memory, in any order, as the text that the reader checks."""
-    if not is_table(columns):
-        raise InputError(f"readings: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
-    names = list(columns.columns) if hasattr(columns, "columns") else list(columns)
-    wanted = session_file.columns(
-        robot, session_file.NORMAL[0] in names, session_file.has_motors(names), session_file.has_motion(names)
-    )
-    names = wanted if sorted(map(str, names)) == sorted(wanted) else names
-    values = [plain(list(columns[name])) for name in names]
-    rows = sorted({len(column) for column in values})
-    if len(rows) > 1:
-        raise InputError(f"readings: found columns of {rows} rows, expected as many in each")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows(["" if value is None else value for value in row] for row in zip(*values, strict=True))
-    return text.getvalue()
 
+    def ordered(names: list[str]) -> list[str]:
+        wanted = session_file.columns(
+            robot, session_file.NORMAL[0] in names, session_file.has_motors(names), session_file.has_motion(names)
+        )
+        return wanted if sorted(names) == sorted(wanted) else names
 
-def _row(line: int) -> str:
-    """Where a line of `_as_csv` stands in the columns."""
-    return "columns" if line == 1 else f"row {line - 2} (from 0)"
+    return as_csv("readings", columns, ordered)

@@ -1,26 +1,33 @@
 """A pose of a robot on creeping wires."""
 
 import math
+from typing import Any
 
+from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_json
+from wirebayes.robot.history.history import with_payload
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import answer
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.workflows.options import (
     Numbers,
     PathLike,
+    Progress,
     above_zero,
     check_seed,
     numbers,
     path_of,
     rising_times,
+    silent,
     text_of,
 )
+from wirebayes.workflows.pose_history import checked_errors, pose_history
 from wirebayes.workflows.results import POSTERIOR, Place, Pose
 from wirebayes.workflows.wires import RobotLike, Wires, configuration, content, draws_of, folder_of, robot_of
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed through every row
 
 
 def pose(
@@ -34,13 +41,24 @@ def pose(
     tolerance_tilt: float = 0.055,
     specimen_spread: float = 0.05,
     other_fit: Wires | None = None,
-    draws: int = 1000,
+    joints: Any = None,
+    trajectory: Any = None,
+    payload: float = 0.0,
+    payload_at: Numbers | None = None,
+    tension_sd: float = 0.02,
+    tilt_sd: float = 1e-3,
+    reference_sd: float = 0.0,
+    draws: int | None = None,
     experiment: str | None = None,
     own_effects: PathLike | None = None,
     seed: int = 0,
     output: PathLike | None = None,
+    progress: Progress = silent,
 ) -> Pose:
     """Kinematics of a robot on creeping wires; drift and pose error with uncertainty bands.
+
+    Of one pose; of measured joint values over time (`joints`), which tell where the platform was; or of commanded poses
+    and loads over time (`trajectory`). Over time it also writes ``poses.csv`` and ``corrections.csv``.
 
     Parameters
     ----------
@@ -48,7 +66,7 @@ def pose(
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
         The line that the wires are cut from; of findings the final model.
     position : (3,) array, optional
-        Of the platform in m; the robot's home pose when left out.
+        Of the platform in m; the robot's home pose when left out. With `joints`: about where it starts.
     rotation : (3,) array, optional
         Rotation vector in rad; of the home pose when left out.
     times : sequence of float
@@ -61,8 +79,20 @@ def pose(
         Relative difference between wires of one line.
     other_fit : Posterior or path, optional
         Another fit of the line, which one more controller uses.
-    draws : int
-        Posterior draws used, evenly thinned.
+    joints : path of a CSV, DataFrame, or mapping of name to (t,) array, optional
+        Joint values over time, and tensions, roll and pitch, payload and commanded poses where they are known.
+    trajectory : path of a CSV, DataFrame, or mapping of name to (t,) array, optional
+        Commanded poses over time, and payload.
+    payload : float
+        Carried beside the platform's own mass, kg.
+    payload_at : (3,) array, optional
+        Its centre of mass in the platform's frame, m; the platform's own when left out.
+    tension_sd, tilt_sd : float
+        Standard errors of measured tensions, N, and of roll and pitch, rad.
+    reference_sd : float
+        Standard error of the lengths that measured joint values stand for, mm.
+    draws : int, optional
+        Posterior draws used, evenly thinned; 1000 when left out, 200 over time.
     experiment : str, optional
         Which one, where several were fitted.
     own_effects : path, optional
@@ -70,6 +100,7 @@ def pose(
     seed : int
     output : path, optional
         Folder for the results.
+    progress : function of name, done and total, optional
 
     Returns
     -------
@@ -79,22 +110,45 @@ def pose(
     Raises
     ------
     InputError
-        Something that was given is wrong.
+        Something that was given is wrong; in a table with line and column.
 
     Examples
     --------
     >>> held = wb.pose("linear-7", posterior, times=[0, 60], draws=40, output="out/pose")
     >>> held.summary()["drift"][0]["times_s"]
     [0.0, 60.0]
+    >>> path = {"time_s": [0, 60, 3600], "x_m": [0, 0.1, 0.1], "y_m": [0, 0, 0], "z_m": [0.6, 0.6, 0.6]}
+    >>> moved = wb.pose("linear-7", posterior, trajectory=path | {"payload_kg": [0, 0.2, 0.2]}, draws=20)
+    >>> moved.summary()["history"]["rows"]
+    3
     """
     own, seed = path_of(own_effects), check_seed(seed)
+    over_time = joints is not None or trajectory is not None
+    draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
     machine = robot_of(robot)
+    payload = float(payload)
+    if not 0 <= payload < math.inf:
+        raise InputError(f"--payload: found {payload:g}; expected kilograms, 0 or more")
+    machine = with_payload(
+        machine, payload, machine.centre_of_mass_m if payload_at is None else numbers("--payload-at", payload_at, 3)
+    )
     line = draws_of(wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
     moments = rising_times(times)
     tolerance, tolerance_tilt, specimen_spread = float(tolerance), float(tolerance_tilt), float(specimen_spread)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
+    carried = (payload, None if payload_at is None else text_of(payload_at))
+    if over_time:
+        if other_fit is not None or text_of(times) != text_of(TIMES_S):
+            raise InputError("--times and --other-fit: found beside a history; expected them for a single pose only")
+        errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
+        decides = configuration(
+            "pose", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, experiment, *carried,
+            None if position is None else text_of(position), None if rotation is None else text_of(rotation),
+        )  # fmt: skip
+        return pose_history(machine, line, joints, trajectory, errors, (where, matrix(turn)), seed, decides,
+                            Place.at(output), own, progress)  # fmt: skip
     other = None if other_fit is None else draws_of(other_fit, draws, experiment, own)
     asked = PoseRequest(
         where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed
@@ -102,7 +156,7 @@ def pose(
     limits = (tolerance, tolerance_tilt, specimen_spread)
     at = (None if values is None else text_of(values) for values in (position, rotation))
     other_draws = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
-    options = (experiment, *at, text_of(times), *limits, other_draws)
+    options = (experiment, *at, text_of(times), *limits, other_draws, *carried)
     place = Place.at(output)
     decides = configuration("pose", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
     run = open_run(place.path, decides)

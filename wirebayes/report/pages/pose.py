@@ -22,6 +22,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.glossary import meaning
+from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.robot import CONTROLLERS
 
@@ -40,6 +41,8 @@ _CAPTIONS = {
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``pose.json`` and the pictures beside it."""
     pose = read_json(folder / "pose.json")
+    if "history" in pose:
+        return pose_history.page(folder, configuration, pose)
     blocks: list[Block] = [Columns([_asked(pose), *_answers(pose)])]
     if not pose.get("feasible", True):
         said = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")

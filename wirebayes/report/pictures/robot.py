@@ -84,7 +84,7 @@ def scene(
         axes.plot(*(a + traced(robot.pulleys, i, p - a)).T, color=QUIET, lw=1.0)
         axes.plot(*(a + traced(robot.pulleys, i, q - a)).T, color=HOLD, lw=0.7, ls=":")
     for points, colour, name in ((here, CHAIN, "commanded"), (there, HOLD, "drifted")):
-        for i, j in _edges(robot.platform_m):
+        for i, j in platform_edges(robot.platform_m):
             axes.plot(*points[[i, j]].T, color=colour, lw=1.6)
         axes.plot(*points.T, color=colour, lw=0, marker="o", ms=3.5, label=name)
     axes.scatter(*robot.exit_m.T, color=INK, s=14, label="exit points")
@@ -129,13 +129,13 @@ def scene_points(
     drifted = position[shown, None] + np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
     if exaggeration is None:
         size = np.ptp(robot.exit_m, axis=0).max()
-        exaggeration = _round(0.05 * size / max(float(np.linalg.norm(position[-1] - position_m)), 1e-12))
+        exaggeration = round_factor(0.05 * size / max(float(np.linalg.norm(position[-1] - position_m)), 1e-12))
     return {
         "name": robot.name,
         "exits": robot.exit_m,
         "platform": here,
         "wires": [a + traced(robot.pulleys, i, p - a) for i, (a, p) in enumerate(zip(robot.exit_m, here, strict=True))],
-        "edges": list(_edges(robot.platform_m)),
+        "edges": list(platform_edges(robot.platform_m)),
         "drifted": drifted,
         "times": [f"{t:.3g} s" if t < 1000 else f"{t:.0f} s" for t in course.times_s[shown]],
         "tensions_N": np.median(course.tension_N[course.found][:, shown], axis=0),
@@ -143,7 +143,7 @@ def scene_points(
     }
 
 
-def _edges(points: Floats) -> Iterator[tuple[int, int]]:
+def platform_edges(points: Floats) -> Iterator[tuple[int, int]]:
     """Pairs of platform points that an edge joins: the hull's edges, without those inside a flat face."""
     spread = points - points.mean(0)
     rank = int((np.linalg.svd(spread, compute_uv=False) > 1e-3 * max(np.abs(spread).max(), 1e-12)).sum())
@@ -167,7 +167,8 @@ def _edges(points: Floats) -> Iterator[tuple[int, int]]:
 _MOST_TIMES = 9  # of a view: stops of its slider
 
 
-def _round(value: float) -> float:
+def round_factor(value: float) -> float:
+    """A round number, 1, 2 or 5 times a power of ten, not above the value (and not below 1)."""
     decade = 10.0 ** np.floor(np.log10(max(value, 1.0)))
     return float(max(1.0, decade * max(f for f in (1, 2, 5) if f * decade <= max(value, 1.0))))
 

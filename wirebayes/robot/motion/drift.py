@@ -123,7 +123,7 @@ def hold(
     Course
     """
     times = np.asarray(times_s, float)
-    walk = _Walk(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
+    walk = Walk(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
     n, legs = walk.n, robot.legs
     position, rotation = np.empty((n, len(times), 3)), np.empty((n, len(times), 3, 3))
     tension, status = np.empty((n, len(times), legs)), np.empty((n, len(times)), np.int64)
@@ -138,8 +138,26 @@ def hold(
     return Course(times, position, rotation, tension, status, walk.creep.state(), walk.falls())
 
 
-class _Walk:
-    """One hold on its way: creep's state, the pose of every draw, and which draws still have one."""
+class Walk:
+    """One hold on its way: creep's state, the pose of every draw, and which draws still have one.
+
+    Parameters
+    ----------
+    robot, wires, joint_m, carried, follow, tolerance
+        As in `hold`.
+    start : (3,) or (n, 3), (3, 3) or (n, 3, 3) arrays
+        Where the first forward solution starts from.
+    error_m : (n, w) array or float
+        What the zero-tension lengths before creep are beyond what the joint values say.
+
+    Attributes
+    ----------
+    here : Equilibria
+        The poses now.
+    live : (n,) bool array
+        Draws whose platform has not fallen.
+    creep : HoldCreep
+    """
 
     def __init__(
         self,
@@ -147,11 +165,13 @@ class _Walk:
         wires: Wires,
         joint_m: Floats | Callable[[float], Floats],
         start: tuple[Floats, Floats],
-        carried: CreepState | None,
-        follow: Follow,
-        tolerance: float,
+        carried: CreepState | None = None,
+        follow: Follow = "current",
+        tolerance: float = _TOLERANCE,
+        error_m: Floats | float = 0.0,
     ) -> None:
         self.robot, self.wires, self.joint, self.tolerance = robot, wires, joint_m, tolerance
+        self.error_m = error_m
         self.n = max(v.shape[-1] for v in wires.theta.values())
         state = carried or fresh(robot.legs, self.n)
         self.lengths = self._lengths(0.0, state)
@@ -172,6 +192,7 @@ class _Walk:
     def _lengths(self, time_s: float, state: CreepState) -> tuple[Floats, Floats]:
         joint = self.joint(time_s) if callable(self.joint) else self.joint
         bare, offset = inverse.lengths(self.robot, np.broadcast_to(joint, (self.n, self.robot.legs)))
+        bare = bare + self.error_m
         return bare * (1.0 + state.strain(self.wires).T), np.broadcast_to(offset, bare.shape)
 
     def to(self, stop_s: float) -> None:
@@ -188,6 +209,16 @@ class _Walk:
                 self.step = factor * length
             else:  # cut short by the time that was asked for: no reason to go on so cautiously
                 self.step = max(self.step, factor * length)
+
+    def load(self, robot: Robot) -> None:
+        """Go on with another mass on the platform; the wires' clocks run on."""
+        self.robot = robot
+        zero = np.where(self.live[:, None], self.lengths[0], np.nan)
+        self.here = forward.solve(robot, self.wires, zero, self.lengths[1], self.here.position_m, self.here.rotation)
+        fell = self.live & ~self.here.found
+        self.fall_s[fell], self.live = self.creep.time_s, self.live & ~fell
+        creep, self.slope = self.creep, None
+        creep.amount = np.where(self.live, creep.amount_at(self.here.tension_N.T), creep.amount)
 
     def _try(self, time: float) -> float:
         """One step by prediction and correction; taken unless its error, which is returned, is too large."""

@@ -81,7 +81,8 @@ class Prior:
     @property
     def names(self) -> list[str]:
         """The line's parameters among the unknowns."""
-        return [*CORE, *(column for effect in self.line.material() for column in effect.columns())]
+        exponent = [name for name in (LENGTH_EXPONENT,) if name in self.line.parameters]
+        return [*CORE, *(column for effect in self.line.material() for column in effect.columns()), *exponent]
 
     def moments(self, legs: int) -> tuple[Floats, Floats]:
         """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""
@@ -105,8 +106,6 @@ class Prior:
         n, legs, p = len(unknowns), robot.legs, len(self.names)
         columns = unknowns[:, legs : legs + p].T
         values = {k: np.exp(c) if k in CORE else c for k, c in zip(self.names, columns, strict=True)}
-        if LENGTH_EXPONENT in self.line.parameters:
-            values[LENGTH_EXPONENT] = self.line.parameters[LENGTH_EXPONENT].mean(keepdims=True)
         wires = for_robot(robot, replace(self.line, parameters=values))
         own = unknowns[:, legs + p : legs + p + len(OWN) * legs].T.reshape(len(OWN), legs, n)
         theta = dict(wires.theta) | {

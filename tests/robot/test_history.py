@@ -1,0 +1,335 @@
+"""Poses from measured joint values, against a simulation of its own: Euler angles, a stiff integrator."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.robot.independent import Rig
+from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
+from wirebayes.cli import main
+from wirebayes.errors import InputError
+from wirebayes.robot.history import commanded, corrections, table
+from wirebayes.robot.history.estimate import estimate, predicted
+from wirebayes.robot.history.follow import clock_starts, follow, uncreeping
+from wirebayes.robot.history.history import History, roll_and_pitch, with_payload
+from wirebayes.robot.history.readings import Information, Sensors
+from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.motion import inverse
+
+CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
+
+
+def _line(n, sd=0.05, seed=0):
+    rng = np.random.default_rng(seed)
+    return draws.WireDraws({k: v * np.exp(sd * rng.standard_normal(n)) for k, v in CORE.items()}, 1000.0)
+
+
+def _told(robot, times, position, holds=None, payload=None):
+    """Joint values of a controller that knows the mean wire and no creep, moving evenly between the times."""
+    mean = {k: np.array([[v]]) for k, v in CORE.items()}
+    wires = uncreeping(draws.for_robot(robot, draws.WireDraws({k: v[0] for k, v in mean.items()}, 1000.0)))
+    payload = np.zeros(len(times)) if payload is None else np.asarray(payload, float)
+    history = History(
+        np.asarray(times, float), None, np.asarray(position, float), np.tile(np.eye(3), (len(times), 1, 1)), payload,
+        np.zeros((len(times), 3)), None if holds is None else np.asarray(holds),
+    )  # fmt: skip
+    tau = commanded.wanted_tensions(robot, history)
+    joint = [
+        inverse.commands(history.robot_at(robot, k), wires, x[None], np.eye(3)[None], t[None]).joint_m[0]
+        for k, (x, t) in enumerate(zip(history.position_m, tau, strict=True))
+    ]
+    return replace(history, joint_m=np.array(joint), position_m=None, rotation=None)
+
+
+def _simulated(robot, theta, history, extra_m=0.0):
+    """Poses and tensions at the rows: every wire's creep by a stiff integrator, ``dg/du = k2 (B tau^U - g)``."""
+    times, q = history.times_s, None
+    g, since = np.zeros(robot.legs), times[0]
+    rigs = {}
+    for m in set(history.payload_kg):  # a payload at the reference point
+        centre = robot.centre_of_mass_m * robot.mass_kg / (robot.mass_kg + m)
+        loaded = replace(robot, mass_kg=robot.mass_kg + m, centre_of_mass_m=centre)
+        rigs[m] = Rig(loaded, "hooke", theta["k1"])
+    near = {}
+
+    def pose(time, g, row):
+        rig = rigs[history.payload_kg[row]]
+        joint = [np.interp(time, times, column) for column in history.joint_m.T]
+        zero = (np.array(joint) + extra_m)[None] * (1 + g / 1000.0)
+        start = near.get("q", rig.start(robot.home_m))
+        there, ok = rig.newton(start, zero)
+        assert ok.all()
+        near["q"] = there
+        return rig, there, rig.tension(there, zero)[0]
+
+    places, turns, tensions = [], [], []
+    for k in range(len(times)):
+        if k:
+            low, high = ((t - since) ** theta["N"] for t in times[k - 1 : k + 1])
+
+            def rate(u, g, row=k - 1, since=since):
+                time = since + max(u, 0.0) ** (1 / theta["N"])
+                tau = pose(time, g, row)[2]
+                return theta["k2"] * (theta["B"] * np.maximum(tau, 0) ** theta["U"] - g)
+
+            g = solve_ivp(rate, (low, high), g, "LSODA", rtol=1e-7, atol=1e-9).y[:, -1]
+            if history.hold[k] != history.hold[k - 1]:
+                since = times[k]
+        rig, q, tau = pose(times[k], g, k)
+        x, R = rig.place(q)
+        places.append(x[0] + rig.middle), turns.append(R[0]), tensions.append(tau)
+    return np.array(places), np.array(turns), np.array(tensions)
+
+
+def _theta(wires, j):
+    """One column's parameters, a value a wire."""
+    return {k: v[:, min(j, v.shape[1] - 1)] if k != "N" else float(v.flat[min(j, v.size - 1)])
+            for k, v in wires.theta.items()}  # fmt: skip
+
+
+TIMES = [0.0, 60.0, 70.0, 400.0, 420.0, 900.0]
+HOLDS = [1, 1, 2, 2, 3, 3]
+
+
+def _places(robot):
+    a, b = robot.home_m, robot.home_m + 0.05 * robot.span_m * np.array([1.0, 0.3, 0.5])
+    return [a, a, b, b, a, a]
+
+
+@pytest.mark.parametrize("name", ["hangprinter-4", "cogiro-desk"])
+def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
+    robot = schema.read(name)
+    payload = 0.1 * robot.mass_kg * np.array([0, 0, 0, 1, 1, 0.0])
+    history = _told(robot, TIMES, _places(robot), HOLDS, payload)
+    known = unknowns(robot, _line(2), Uncertain(2e-3, 0.05), np.random.default_rng(1))
+    wires, error = known.columns(known.draws)
+    starts = clock_starts(history, np.ones((6, robot.legs)))
+    track = follow(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), starts, error)
+    assert track.hold.tolist() == [0, 0, 1, 1, 2, 2]
+    for j in range(2):
+        x, R, tau = _simulated(robot, _theta(wires, j), history, error[j])
+        drifted = np.linalg.norm(x[-1] - robot.home_m)
+        np.testing.assert_allclose(track.position_m[j], x, atol=3e-4 * drifted)
+        np.testing.assert_allclose(track.rotation[j], R, atol=1e-6)
+        np.testing.assert_allclose(track.tension_N[j], tau, atol=5e-4 * tau.max())
+
+
+def test_bands_cover_the_truth_and_readings_narrow_them():
+    robot = schema.read("cogiro-desk")
+    history = _told(robot, TIMES, _places(robot), HOLDS)
+    errors, start = Uncertain(1e-3, 0.05, 0.02, 5e-4), (robot.home_m, np.eye(3))
+    line = _line(80)
+    blind = estimate(robot, line, history, start, errors, np.random.default_rng(2))
+    truths = unknowns(robot, _line(2, seed=9), errors, np.random.default_rng(3))
+    wires, error = truths.columns(truths.draws)
+    rng = np.random.default_rng(4)
+    deviations, blinds, narrower = [], [], []
+    for j in range(2):
+        x, R, tau = _simulated(robot, _theta(wires, j), history, error[j])
+        read = replace(
+            history, tension_N=tau + 0.02 * rng.standard_normal(tau.shape),
+            tilt_rad=roll_and_pitch(R) + 5e-4 * rng.standard_normal((len(x), 2)),
+        )  # fmt: skip
+        found = estimate(robot, line, read, start, errors, np.random.default_rng(5))
+        assert found.converged
+        assert found.misfit < 2
+        for kept, track in ((deviations, found.track), (blinds, blind.track)):
+            kept.append((x - track.position_m.mean(0)) / track.position_m.std(0))
+        narrower.append(found.track.position_m.std(0) / blind.track.position_m.std(0))
+    for z in (deviations, blinds):
+        assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.5
+        assert (np.abs(z) < 1.7).mean() > 0.75
+    assert np.mean(narrower) < 0.75
+
+
+def test_corrected_joint_values_bring_the_platform_back():
+    robot = schema.read("linear-7")
+    history = _told(robot, TIMES, _places(robot))
+    found = estimate(robot, _line(40), history, (robot.home_m, np.eye(3)), Uncertain(1e-3), np.random.default_rng(0))
+    to = corrections.target(robot, history, found)
+    np.testing.assert_allclose(to.position_m, _places(robot), atol=2e-4)  # nothing creeps there: about what was told
+    joint = corrections.wanted(robot, found, to)
+    rows = np.arange(len(TIMES))
+    away = np.linalg.norm(found.track.position_m - to.position_m, axis=-1)
+    assert away[:, -1].min() > 5e-4
+    assert corrections.left(robot, history, found, to, joint, rows).max() < 1e-7
+    mean = corrections.left(robot, history, found, to, joint.mean(0), rows)
+    assert np.median(mean[:, -1]) < 0.4 * np.median(away[:, -1])
+
+
+def test_clocks_start_with_a_change_of_load_and_not_with_small_corrections():
+    robot = schema.read("hangprinter-4")
+    up = robot.home_m + np.array([0, 0, 1e-4])
+    lift = robot.home_m + np.array([0.3, 0.2, 0.0])
+    places = [robot.home_m, up, robot.home_m, lift, lift, lift]
+    history = _told(robot, TIMES, places, payload=[0, 0, 0, 0, 0, 1.0])
+    plain = uncreeping(draws.for_robot(robot, _line(1)))
+    track = follow(robot, plain, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
+    starts = clock_starts(history, track.tension_N[0])
+    assert starts[0] == 0
+    assert starts[-1] == TIMES[-1]  # with the payload
+    assert len(starts) > 2
+    assert ((starts[1:-1] > 70) & (starts[1:-1] < 400)).all()
+    assert clock_starts(history, track.tension_N[0], np.inf).tolist() == [0.0]
+    assert clock_starts(replace(history, hold=np.array(HOLDS)), track.tension_N[0]).tolist() == [0.0, 70.0, 420.0]
+
+
+def test_when_clocks_start_does_not_depend_on_the_sampling():
+    few = replace(_told(schema.read("hangprinter-4"), [0, 100], np.tile([0, 0, 1.0], (2, 1))))
+    tension = np.array([[2.0, 3.0, 1.0], [4.0, 2.5, 1.5]])
+    starts = clock_starts(few, tension)
+    times = np.linspace(0, 100, 7)
+    many = replace(few, times_s=times, payload_kg=np.zeros(7), payload_m=np.zeros((7, 3)))
+    np.testing.assert_allclose(
+        clock_starts(many, np.stack([np.interp(times, [0, 100], c) for c in tension.T], 1)), starts
+    )
+    assert starts[1] == pytest.approx(10.0)  # 0.2 N of a mean of 2 N, at 0.02 N/s
+    assert 6 < len(starts) < 12
+
+
+def test_commanded_poses_need_no_rows_between():
+    robot = schema.read("cogiro-desk")
+    ends = np.array([[0.0, *robot.home_m], [300.0, *(robot.home_m + [0.1, 0.05, 0.1])], [600.0, *robot.home_m]])
+    times = np.arange(0, 601, 10.0)
+    tables = {n: [np.interp(t, ends[:, 0], c) for c in ends.T] for n, t in (("few", ends[:, 0]), ("many", times))}
+    drifts = {}
+    for name, columns in tables.items():
+        history = _told(robot, columns[0], np.stack(columns[1:], 1))
+        history = replace(history, joint_m=None, position_m=np.stack(columns[1:], 1),
+                          rotation=np.tile(np.eye(3), (len(columns[0]), 1, 1)))  # fmt: skip
+        found, joint = commanded.drift(robot, _line(3), history, 0.05, np.random.default_rng(0))
+        assert joint.shape == (3, len(columns[0]), 8)
+        drifts[name] = found.track.position_m[:, -1] - robot.home_m
+        assert np.abs(found.track.position_m[:, 0] - robot.home_m).max() < 1e-9
+    assert np.linalg.norm(drifts["few"], axis=1).min() > 2e-4
+    np.testing.assert_allclose(drifts["few"], drifts["many"], atol=0.02 * np.abs(drifts["few"]).max())
+
+
+def test_readings_move_draws_to_the_posterior_of_a_linear_problem():
+    rng = np.random.default_rng(0)
+    d, m, t, n = 3, 2, 5, 20000
+    of = Sensors(np.array([0.3, 0.2]), np.array([0.0, 0.1]))
+    slope, true = rng.standard_normal((t, d, m)), rng.standard_normal(d)
+    y = np.einsum("tdm,d->tm", slope, true) + 0.2 * rng.standard_normal((t, m))
+    z = rng.standard_normal((n, d + m))
+    found = Information.none(d, m, n)
+    for k in range(t):
+        found.add(of, slope[k], y[k] - z[:, :d] @ slope[k] - of.offset * z[:, d:], 1.0)
+    after = z + found.moves(np.zeros((n, d + m)), rng.standard_normal((n, d + m)))
+    H = np.concatenate([np.concatenate([slope[k].T, np.diag(of.offset)], 1) for k in range(t)])
+    inside = np.linalg.inv(np.eye(d + m) + H.T @ np.diag(np.tile(of.noise**-2, t)) @ H)
+    mean = inside @ H.T @ (np.tile(of.noise**-2, t) * y.ravel())
+    np.testing.assert_allclose(after.mean(0), mean, atol=0.03)
+    np.testing.assert_allclose(np.cov(after.T), inside, atol=0.03)
+    np.testing.assert_allclose(found.sd, np.sqrt(np.diag(inside)))
+    # what stays of a sensor's error is never averaged away
+    assert np.isclose(of.noise**2 + of.offset**2, of.sd**2).all()
+    assert found.sd[d + 1] > 0.1
+
+
+def test_an_inclinometer_reads_what_turned_the_platform():
+    roll, pitch, yaw = 0.1, -0.2, 1.3
+    turn = rotation.matrix(np.array([0, 0, yaw])) @ rotation.matrix(np.array([0, pitch, 0]))
+    turn = turn @ rotation.matrix(np.array([roll, 0, 0]))
+    np.testing.assert_allclose(roll_and_pitch(turn), [roll, pitch], atol=1e-12)
+
+
+def test_a_payload_moves_mass_and_centre():
+    robot = schema.read("linear-7")
+    loaded = with_payload(robot, 0.9, np.array([0.1, 0.0, -0.2]))
+    assert loaded.mass_kg == pytest.approx(1.8)
+    np.testing.assert_allclose(loaded.centre_of_mass_m, [0.05, 0.0, -0.1])
+    assert with_payload(robot, 0.0, np.ones(3)) is robot
+
+
+HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1: found nothing; expected the header time_s,joint_1_m"),
+        (HEAD.replace("joint_4", "joint_5") + "\n", "line 1: found the column 'joint_5_m'"),
+        ("time_s,joint_1_m,joint_2_m,joint_3_m\n", "line 1: found no column joint_4_m; expected time_s"),
+        (HEAD + ",x_m\n", "line 1: found no column y_m"),
+        (HEAD + ",time_s\n", "line 1: found the column time_s twice"),
+        (HEAD + "\n0,1,1,1,1\n", "found 1 rows of values; expected two or more"),
+        (HEAD + "\n0,1,1,1,1\n\n0,1,1,1,1\n", "line 4, column time_s: found 0; expected a time after 0 s"),
+        (HEAD + "\n0,1,1,1,1\n9,1,1,1\n", "line 3: found 4 cells; expected 5"),
+        (HEAD + "\n0,1,1,,1\n9,1,1,1,1\n", "line 2, column joint_3_m: found ''; expected a finite number"),
+        (HEAD + "\n0,1,inf,1,1\n9,1,1,1,1\n", "line 2, column joint_2_m: found 'inf'"),
+        (HEAD + ",payload_kg\n0,1,1,1,1,-1\n9,1,1,1,1,1\n", "line 2, column payload_kg: found '-1'; expected a finite"),
+        (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5'; expected a whole number"),
+    ],
+)
+def test_a_mistake_in_a_history_is_named_by_line_and_column(text, said):
+    robot = schema.read("hangprinter-4")
+    with pytest.raises(InputError) as caught:
+        table.parse("log.csv", text, robot, table.measured)
+    assert str(caught.value).startswith(f"log.csv: {said}")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  # noqa: F811
+    robot = schema.read("hangprinter-4")
+    history = _told(robot, TIMES, _places(robot))
+    with open(tmp_path / "log.csv", "w") as file:
+        writer = csv.writer(file)
+        legs = range(1, 5)
+        writer.writerow(["time_s", *(f"joint_{i}_m" for i in legs), *(f"tension_{i}_N" for i in legs)])
+        for k, time in enumerate(TIMES):
+            writer.writerow([time, *history.joint_m[k], *(["", "", "", ""] if k else [1.14, 1.07, "", 5.28])])
+    (tmp_path / "way.csv").write_text("time_s,x_m,y_m,z_m,payload_kg\n0,0,0,.5,0\n60,0.1,0,.5,.1\n600,0.1,0,.5,.1\n")
+    both = ["pose", "hangprinter-4", "--wires", str(fitted), "--draws", "12"]
+    for option, file in (("--joints", "log.csv"), ("--trajectory", "way.csv")):
+        outs = [tmp_path / f"{file}-{i}" for i in range(2)]
+        for out in outs:
+            assert main([*both, option, str(tmp_path / file), "--output", str(out)]) == 0
+        shown = capsys.readouterr()
+        assert "after" in shown.out
+        for name in ("pose.json", "poses.csv", "corrections.csv", "motion.svg"):
+            assert (outs[0] / name).read_bytes() == (outs[1] / name).read_bytes()
+        said = json.loads((outs[0] / "pose.json").read_text())
+        rows = list(csv.DictReader((outs[0] / "poses.csv").read_text().splitlines()))
+        assert len(rows) == said["history"]["rows"]
+        assert float(rows[-1]["distance_q05_mm"]) < float(rows[-1]["distance_q95_mm"])
+        assert said["drift"][0]["distance_mm"]["q50"][-1] == pytest.approx(float(rows[-1]["distance_q50_mm"]))
+        page = (outs[0] / "report.html").read_text()
+        assert "data:image/svg+xml" in page
+        assert "<td>" in page
+    refused = [
+        (["--joints", str(tmp_path / "log.csv"), "--trajectory", str(tmp_path / "way.csv")], "found both"),
+        (["--trajectory", str(tmp_path / "log.csv")], "line 1: found the column 'joint_1_m'"),
+        (["--joints", str(tmp_path / "none.csv")], "found no such file"),
+        (["--joints", str(tmp_path / "log.csv"), "--times", "0,9"], "--times"),
+        (["--payload", "-1"], "--payload: found -1; expected kilograms, 0 or more"),
+    ]
+    for options, said in refused:
+        assert main([*both, *options, "--output", str(tmp_path / "no")]) == 2
+        line = capsys.readouterr().err.strip()
+        assert said in line
+        assert "\n" not in line
+        assert not (tmp_path / "no").exists()
+
+
+def test_a_trajectory_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):  # noqa: F811
+    (tmp_path / "way.csv").write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,9,0,.6\n")
+    arguments = ["pose", "linear-7", "--wires", str(fitted), "--trajectory", str(tmp_path / "way.csv")]
+    assert main([*arguments, "--output", str(tmp_path / "out"), "--draws", "5"]) == 0
+    assert "No tensions within the bounds hold the platform" in capsys.readouterr().err
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_readings_are_predicted_in_the_order_of_the_sensors():
+    robot = schema.read("linear-7")
+    history = _told(robot, TIMES[:2], _places(robot)[:2])
+    wires = draws.for_robot(robot, _line(2))
+    track = follow(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
+    h = predicted(track)
+    assert h.shape == (2, 2, 9)
+    np.testing.assert_array_equal(h[..., :7], track.tension_N)

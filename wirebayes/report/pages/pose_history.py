@@ -1,0 +1,152 @@
+"""The page of ``wirebayes pose --joints`` and ``--trajectory``: a robot over time."""
+
+from pathlib import Path
+from typing import Any
+
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Picture,
+    Pictures,
+    Points,
+    Section,
+    Table,
+    Text,
+    embedded,
+    files_beside,
+    number,
+    span,
+)
+
+_CAPTIONS = {
+    "motion.svg": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
+    "poses.png": "The robot at a few times: where the platform is meant to be (blue) and, enlarged, where it is (red).",
+    "drift.png": "How far the platform is from where it is meant to be. Line: median, band: 90 % of the draws.",
+    "rotation.png": "How far it has turned from there.",
+    "corrections.png": "Change of each joint value that brings it back. Every row: corrections.csv.",
+}
+_FILES = (
+    ("pose.json", "every number of this page as JSON"),
+    ("poses.csv", "the pose at every row, with bands"),
+    ("corrections.csv", "the joint values that bring the platform back, at every row"),
+)
+_WIDE = ("poses.png",)
+_ROWS = 12  # of the tables on the page
+
+
+def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> Page:
+    """The content of ``pose.json`` and the pictures beside it."""
+    measured = pose["history"]["kind"] == "measured"
+    lead = "Where the platform was, from measured joint values." if measured else "Where commanded poses lead."
+    lead += " The wires' creep is carried through the whole history of their tensions."
+    if not pose["feasible"]:
+        return Page(f"Robot {pose['robot']}", lead, [Section("Summary", [Text(pose["sentence"], strong=True)])])
+    first: list[Block] = [Columns([Points("What was computed", _asked(pose)), *_answers(pose)])]
+    first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in pose["warnings"] if _loss(w)]
+    files = [(folder / name, caption) for name, caption in _CAPTIONS.items()]
+    pictures = {path.name: Picture(embedded(path), caption, caption) for path, caption in files if path.is_file()}
+    wide = [Pictures([pictures.pop(name)]) for name in _WIDE if name in pictures]
+    sections = [Section("Summary", first), Section("Pictures", [*wide, Pictures(list(pictures.values()))])]
+    sections += [Section("Poses", _poses(pose)), Section("Corrections", _corrections(pose))]
+    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    seed = f"Seed {configuration.get('seed')}."
+    return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed)
+
+
+def _loss(warning: str) -> bool:
+    """Whether a warning must be read first."""
+    return "falls" in warning or "slack" in warning
+
+
+def _asked(pose: dict[str, Any]) -> list[str]:
+    history, wires = pose["history"], pose["wires"]
+    effects = ", ".join(wires["effects"]).replace("_", " ")
+    model = f"the plain model with {effects}" if effects else "the plain model"
+    kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
+    out = [
+        f"{history['rows']} rows of {kind} over {number(float(history['duration_s']))} s; platform of "
+        f"{pose['mass_kg']:g} kg"
+        + (f", payload up to {history['highest_payload_kg']:g} kg." if history["highest_payload_kg"] else "."),
+        f"Wires known from {wires['draws']} posterior draws of a sample of {wires['tested_length_mm']:g} mm: {model}. "
+        f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. They were new at the first row.",
+    ]
+    if history["restart_share"] is None:
+        out.append(f"The wires' clocks started {history['holds']} times, as the column hold says.")
+    else:
+        out.append(
+            f"The wires' clocks started {history['holds']} times: when a command or a load had changed a tension by "
+            f"more than {100 * history['restart_share']:g} % of the mean tension."
+        )
+    readings = pose.get("readings")
+    if readings:
+        out.append(
+            f"{readings['tensions']} tensions (standard error {readings['tension_sd_N']:g} N) and {readings['tilts']} "
+            f"inclinations ({readings['tilt_sd_rad']:g} rad) were read; mean squared residual "
+            f"{number(readings['misfit'])}."
+        )
+    return out
+
+
+def _answers(pose: dict[str, Any]) -> list[Points]:
+    (drift,) = pose["drift"]
+    time = number(float(drift["times_s"][-1]))
+    meant = "from the commanded pose" if pose["history"].get("target") != "without creep" else "from where it would be"
+    meant += "" if "commanded" in meant else " without creep"
+    known = [f"After {time} s the platform is {_last(drift['distance_mm'])} mm {meant}."]
+    if pose.get("rotation_vector_rad"):
+        known.append(f"It has turned by {_last(drift['rotation_deg'])} degrees.")
+    left = pose["corrections"]["left_mm"]
+    if left["q50"]:
+        known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {_last(left)} mm.")
+    loose = [w[:1].upper() + w[1:] + "." for w in pose["warnings"] if not _loss(w)]
+    clock = pose["clock"]
+    loose.append(
+        "A test cannot tell when a moving wire's clock starts anew. If it started once and ran on, the pose would "
+        f"differ by {number(clock['largest_mm'])} mm at most, {number(clock['at_the_end_mm'])} mm at the end."
+    )
+    if not pose["history"].get("reference_sd_mm") and pose["history"]["kind"] == "measured":
+        loose.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")
+    return [Points("What is known", known), Points("What is not known", loose)]
+
+
+def _last(band: dict[str, Any]) -> str:
+    low, middle, high = (band[q][-1] for q in ("q05", "q50", "q95"))
+    return f"{number(middle)} ({span(low, high)})"
+
+
+def _shown(times: list[float]) -> list[int]:
+    step = max(1, -(-len(times) // _ROWS))
+    return sorted({*range(0, len(times), step), len(times) - 1})
+
+
+def _poses(pose: dict[str, Any]) -> list[Block]:
+    (drift,) = pose["drift"]
+    place = pose["position_m"]
+    lines = []
+    for i in _shown(drift["times_s"]):
+        cells = []
+        for axis in range(3):
+            middle, sd = (None if place[q] is None else place[q][i][axis] for q in ("q50", "sd"))
+            cells += [number(middle, 6), number(None if sd is None else 1e3 * sd)]
+        far = drift["distance_mm"]
+        lines.append([number(float(drift["times_s"][i]), 6), *cells, number(far["q50"][i]),
+                      span(far["q05"][i], far["q95"][i])])  # fmt: skip
+    header = ["time, s", "x, m", "sd, mm", "y, m", "sd, mm", "z, m", "sd, mm", "distance, mm", "90 %"]
+    return [Table(header, lines, "Some of the rows; all of them, with bands and rotations: poses.csv.")]
+
+
+def _corrections(pose: dict[str, Any]) -> list[Block]:
+    change = pose["corrections"]["change_mm"]
+    if not change["mean"]:
+        return []
+    times, joints = pose["corrections"]["times_s"], range(len(change["mean"][0]))
+    lines = [
+        [
+            number(float(times[i]), 6),
+            *(f"{number(change['mean'][i][j])} ± {number(change['sd'][i][j])}" for j in joints),
+        ]
+        for i in _shown(times)
+    ]
+    header = ["time, s", *(f"joint {j + 1}, mm" for j in joints)]
+    return [Table(header, lines, "Change of each joint value, mean and standard deviation: corrections.csv.")]

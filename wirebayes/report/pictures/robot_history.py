@@ -1,0 +1,173 @@
+"""Pictures of a robot's history: drift and corrections over time, a strip of poses, and the same moving."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
+
+from wirebayes.io.run_folder import write_text
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
+from wirebayes.report.pictures.robot import platform_edges, round_factor
+from wirebayes.robot.history.answer import HistoryAnswer
+from wirebayes.robot.history.history import History
+from wirebayes.robot.mechanics.description import Robot
+
+Floats = NDArray[np.float64]
+_COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#8a6d5c", "#b0708e", "#6b7780")
+_PANELS, _FRAMES, _SECONDS = 5, 60, 12
+_OBLIQUE = np.array([[1.0, 0.45, 0.0], [0.0, 0.3, 1.0]])  # depth runs up to the right
+
+
+def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> None:
+    """Write the pictures that go with ``pose.json``; none when the platform cannot be held."""
+    if found.found is None or found.to is None:
+        return
+    content = found.content
+    (drift,) = content["drift"]
+    figures = {
+        "drift": banded(drift, "distance_mm", "distance from the pose, mm", "Drift", history),
+        "corrections": corrected(content["corrections"], history),
+        "poses": strip(robot, history, found),
+    }
+    if robot.degrees == 6:
+        figures["rotation"] = banded(drift, "rotation_deg", "rotation, degrees", "Drift of the orientation", history)
+    for name, figure in figures.items():
+        figure.savefig(folder / f"{name}.png", dpi=160)
+    write_text(folder / "motion.svg", moving(robot, history, found))
+
+
+def banded(drift: dict[str, Any], key: str, label: str, title: str, history: History) -> Figure:
+    """One quantity over time with its 90 % band; what the platform carries below it, where that changes."""
+    figure, axes = panel("time, s", label, title)
+    _band(axes, drift["times_s"], drift[key], CHAIN, "median and 90 % of the draws")
+    axes.set_ylim(bottom=0)
+    _in_time(figure, axes, history)
+    return figure
+
+
+def corrected(corrections: dict[str, Any], history: History) -> Figure:
+    """The change of every joint value that brings the platform back, over time."""
+    figure, axes = panel("time, s", "change of the joint value, mm", "Corrections")
+    change = {key: np.asarray(value) for key, value in corrections["change_mm"].items() if value is not None}
+    for i in range(change["q50"].shape[1] if change else 0):
+        own = {key: value[:, i] for key, value in change.items()}
+        _band(axes, corrections["times_s"], own, _COLOURS[i % len(_COLOURS)], f"joint {i + 1}", 0.14)
+    axes.axhline(0, color=QUIET, lw=0.8, zorder=0)
+    _in_time(figure, axes, history, 4)
+    return figure
+
+
+def _band(axes: Any, times: Floats, band: dict[str, Any], colour: str, label: str, alpha: float = 0.22) -> None:
+    axes.plot(times, band["q50"], color=colour, label=label)
+    axes.fill_between(times, band["q05"], band["q95"], color=colour, alpha=alpha, lw=0)
+
+
+def _in_time(figure: Figure, axes: Any, history: History, columns: int = 2) -> None:
+    axes.set_xlim(history.times_s[0], history.times_s[-1])
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    if np.ptp(history.payload_kg) > 0:
+        load = axes.twinx()
+        load.step(history.times_s, history.payload_kg, where="post", color=INK, lw=0.8, ls="--", alpha=0.6)
+        load.set_ylim(0, 2.5 * history.payload_kg.max())
+        load.set_ylabel("payload, kg", fontsize=9)
+        load.tick_params(labelsize=8)
+        load.spines["top"].set_visible(False)
+        axes.plot([], [], color=INK, lw=0.8, ls="--", label="payload")
+    legend_below(figure, axes, columns)
+
+
+def _shapes(robot: Robot, found: HistoryAnswer, rows: NDArray[np.intp]) -> tuple[Floats, Floats, float]:
+    """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
+    assert found.found is not None and found.to is not None
+    track, to = found.found.track, found.to
+    held = track.held[:, rows]
+    count = np.maximum(held.sum(0), 1)[:, None]
+    x = np.where(held[..., None], track.position_m[:, rows], 0.0).sum(0) / count
+    R = np.where(held[..., None, None], track.rotation[:, rows], 0.0).sum(0) / count[..., None]
+    gone = ~held.any(0)
+    x[gone], R[gone] = np.nan, np.nan
+    size = float(np.ptp(robot.exit_m, axis=0).max())
+    shift = x - to.position_m[rows]
+    factor = round_factor(0.07 * size / max(float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0)), 1e-12))
+    meant = to.position_m[rows][:, None] + robot.platform_m @ np.swapaxes(to.rotation[rows], 1, 2)
+    turned = to.rotation[rows] + factor * (R - to.rotation[rows])
+    moved = (to.position_m[rows] + factor * shift)[:, None] + robot.platform_m @ np.swapaxes(turned, 1, 2)
+    return meant, moved, factor
+
+
+def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
+    """The robot at a few times side by side: where it is meant to be, and where creep has taken it, enlarged."""
+    rows = np.unique(np.linspace(0, len(history.times_s) - 1, _PANELS).round().astype(int))
+    meant, moved, factor = _shapes(robot, found, rows)
+    figure = Figure(figsize=(2.1 * len(rows), 2.75), layout="constrained")
+    figure.suptitle(f"{robot.name}: mean drift enlarged {factor:g} times", fontsize=10.5, color=INK, x=0.01, ha="left")
+    exits = robot.exit_m @ _OBLIQUE.T
+    for axes, here, there, k in zip(np.atleast_1d(figure.subplots(1, len(rows))), meant, moved, rows, strict=True):
+        for a, p, q in zip(exits, here @ _OBLIQUE.T, there @ _OBLIQUE.T, strict=True):
+            axes.plot(*np.stack([a, p], 1), color=QUIET, lw=0.8)
+            axes.plot(*np.stack([a, q], 1), color=HOLD, lw=0.6, ls=":")
+        for points, colour in ((here @ _OBLIQUE.T, CHAIN), (there @ _OBLIQUE.T, HOLD)):
+            for i, j in platform_edges(robot.platform_m):
+                axes.plot(*points[[i, j]].T, color=colour, lw=1.4)
+            axes.plot(*points.T, color=colour, lw=0, marker="o", ms=2.5)
+        axes.scatter(*exits.T, color=INK, s=7)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        carried = f", {history.payload_kg[k]:g} kg" if history.payload_kg.max() > 0 else ""
+        axes.set_title(f"{history.times_s[k]:g} s{carried}", fontsize=9, color=INK)
+    return figure
+
+
+def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
+    """The same as one moving picture (SVG): the whole history in twelve seconds."""
+    whole = np.linspace(history.times_s[0], history.times_s[-1], _FRAMES)
+    rows = np.clip(np.searchsorted(history.times_s, whole), 0, len(history.times_s) - 1)
+    meant, moved, factor = _shapes(robot, found, rows)
+    drawn = [points @ _OBLIQUE.T for points in (meant, moved)]
+    drawn[1] = np.where(np.isfinite(drawn[1]), drawn[1], drawn[0])
+    exits = robot.exit_m @ _OBLIQUE.T
+    every = np.concatenate([exits, *(points.reshape(-1, 2) for points in drawn)])
+    low, high = every.min(0), every.max(0)
+    scale = 420.0 / max(float((high - low).max()), 1e-9)
+    width, height = (high - low) * scale + 40
+
+    def at(points: Floats) -> Floats:
+        flat = (points - low) * scale + 20
+        return np.asarray(np.stack([flat[..., 0], height - flat[..., 1]], -1))
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height + 34:.0f}" '
+        f'font-family="sans-serif" font-size="12" role="img">',
+        f'<rect width="100%" height="100%" fill="white"/>'
+        f'<text x="10" y="16" fill="{INK}">drift enlarged {factor:g} times; {history.times_s[-1]:g} s in {_SECONDS} s'
+        "</text>",
+    ]
+    fixed = at(exits)
+    for points, colour, line, dash in ((drawn[0], CHAIN, QUIET, ""), (drawn[1], HOLD, HOLD, ' stroke-dasharray="2 3"')):
+        seen = at(points)
+        for i in range(robot.legs):
+            frames = [np.stack([fixed[i], p[i]]) for p in seen]
+            parts.append(_moving_line(frames, f'stroke="{line}" stroke-width="0.9"{dash}'))
+        for i, j in platform_edges(robot.platform_m):
+            parts.append(_moving_line([p[[i, j]] for p in seen], f'stroke="{colour}" stroke-width="2"'))
+        if not list(platform_edges(robot.platform_m)):
+            tick = np.array([[-4.0, 0.0], [4.0, 0.0]])
+            parts.append(_moving_line([p[0] + tick for p in seen], f'stroke="{colour}" stroke-width="8"'))
+    parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{INK}"/>' for x, y in fixed]
+    parts.append(
+        f'<rect x="10" y="{height + 18:.0f}" height="4" width="{width - 20:.0f}" fill="{QUIET}"/>'
+        f'<rect x="10" y="{height + 18:.0f}" height="4" width="0" fill="{CHAIN}"><animate attributeName="width" '
+        f'values="0;{width - 20:.0f}" dur="{_SECONDS}s" repeatCount="indefinite"/></rect>'
+    )
+    return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def _moving_line(frames: list[Floats], style: str) -> str:
+    values = [" ".join(f"{x:.1f},{y:.1f}" for x, y in points) for points in frames]
+    return (
+        f'<polyline points="{values[0]}" fill="none" {style}><animate attributeName="points" '
+        f'values="{";".join(values)}" dur="{_SECONDS}s" repeatCount="indefinite"/></polyline>'
+    )

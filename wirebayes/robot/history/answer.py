@@ -1,0 +1,302 @@
+"""What `pose` answers about a history: where the platform was, its drift, and the joint values that bring it back."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.history import commanded, corrections
+from wirebayes.robot.history.corrections import Target
+from wirebayes.robot.history.estimate import Estimate, Progress, estimate
+from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.mechanics import draws
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.drums import motor_angle
+from wirebayes.robot.motion import drift as drifting
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion.creep import fresh
+from wirebayes.robot.motion.drift import Course
+from wirebayes.robot.pose.request import band
+
+Floats = NDArray[np.float64]
+_SHOWN = 200  # times in pose.json and in pictures; the tables have every row
+_CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
+_MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
+
+
+@dataclass(frozen=True)
+class HistoryAnswer:
+    """What was found.
+
+    Attributes
+    ----------
+    content : dict
+        The content of ``pose.json`` (arrays not yet lists).
+    tables : dict of file name to (header, rows)
+        ``poses.csv`` and ``corrections.csv``.
+    rows : (r,) array
+        Rows of the history that ``pose.json`` and pictures show.
+    found : Estimate or None
+        None where no tensions hold the platform.
+    to : Target or None
+    """
+
+    content: dict[str, Any]
+    tables: dict[str, tuple[list[str], list[list[Any]]]]
+    rows: NDArray[np.intp]
+    found: Estimate | None = None
+    to: Target | None = None
+
+
+def answer(
+    robot: Robot,
+    line: WireDraws,
+    history: History,
+    errors: Uncertain,
+    start: tuple[Floats, Floats],
+    seed: int,
+    progress: Progress = lambda name, done, total: None,
+) -> HistoryAnswer:
+    """Poses over time from measured joint values, or the drift from commanded poses where there are none.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    history : History
+    errors : Uncertain
+    start : (3,), (3, 3) arrays
+        About where the platform is at the first row, where no pose was commanded.
+    seed : int
+    progress : function of name, done and total
+    """
+    rng = np.random.default_rng(seed)
+    rows = np.unique(np.linspace(0, len(history.times_s) - 1, _SHOWN).round().astype(int))
+    content = _asked(robot, line, history, errors)
+    if history.position_m is not None and history.rotation is not None:
+        start = history.position_m[0], history.rotation[0]
+    if history.joint_m is not None:
+        found = estimate(robot, line, history, start, errors, rng, progress)
+        joint = history.joint_m
+
+        def again(few: WireDraws, restart: float) -> Track:
+            known = unknowns(robot, few, Uncertain(0.0, 0.0), rng)
+            starts = clock_starts(history, found.plain.tension_N[0], restart)
+            return follow(robot, known.columns(known.draws)[0], history, joint, start, starts)
+    else:
+        try:
+            found, joint = commanded.drift(robot, line, history, errors.spread, rng, progress)
+        except commanded.Unheld as unheld:
+            said = f"No{str(unheld)[2:]}."
+            return HistoryAnswer(content | {"feasible": False, "sentence": said}, {}, rows)
+
+        def again(few: WireDraws, restart: float) -> Track:
+            return commanded.drift(robot, few, history, 0.0, rng, restart=restart)[0].track
+
+    if not found.track.held[:, 0].any():
+        said = "No draw of the wires holds the platform at the first row; see --position for where it starts."
+        return HistoryAnswer(content | {"feasible": False, "sentence": said}, {}, rows)
+    to = corrections.target(robot, history, found)
+    change = corrections.wanted(robot, found, to) - joint
+    best = _mean(joint + change) if joint.ndim == 2 else joint + _mean(change)
+    course = _course(history, found, rows)
+    content |= {
+        "history": content["history"] | {"holds": int(found.track.hold[-1]) + 1},
+        "drift": [_drift(course, to, rows, errors.spread)],
+        "position_m": band(course.position_m),
+        "rotation_vector_rad": band(turning.vector(course.rotation)) if robot.degrees == 6 else None,
+        "corrections": {
+            "times_s": course.times_s,
+            "change_mm": band(1e3 * change[:, rows]),
+            "left_mm": band(1e3 * corrections.left(robot, history, found, to, best, rows)),
+        },
+        "clock": _clock(line, again),
+    }
+    if history.read:
+        content["readings"] |= {"misfit": found.misfit, "converged": found.converged}
+    content["warnings"] = _warnings(robot, line, history, found, joint, content)
+    tables = {
+        "poses.csv": _pose_table(robot, history, found, to),
+        "corrections.csv": _correction_table(robot, history, _mean(joint) if joint.ndim == 3 else joint, change),
+    }
+    return HistoryAnswer(content, tables, rows, found, to)
+
+
+def _asked(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -> dict[str, Any]:
+    material = line.material()
+    kind = "measured" if history.joint_m is not None else "commanded"
+    out: dict[str, Any] = {
+        "version": 1,
+        "robot": robot.name,
+        "mass_kg": robot.mass_kg,
+        "wires": {
+            "draws": line.count,
+            "tested_length_mm": line.length_mm,
+            "elastic_law": line.law,
+            "history": line.history,
+            "effects": [e.key for e in material],
+            "left_out": [e.key for e in line.effects if e not in material],
+            "legs": list(robot.wire),
+        },
+        "feasible": True,
+        "history": {
+            "kind": kind,
+            "rows": len(history.times_s),
+            "duration_s": history.times_s[-1] - history.times_s[0],
+            "highest_payload_kg": history.payload_kg.max(),
+            "restart_share": RESTART if history.hold is None else None,
+            "specimen_spread": errors.spread,
+        },
+    }
+    if kind == "measured":
+        out["history"]["reference_sd_mm"] = 1e3 * errors.reference_m
+        out["history"]["target"] = "commanded" if history.position_m is not None else "without creep"
+    if history.read:
+        counts = [0 if v is None else int(np.isfinite(v).sum()) for v in (history.tension_N, history.tilt_rad)]
+        out["readings"] = {
+            "tensions": counts[0], "tilts": counts[1], "tension_sd_N": errors.tension_N, "tilt_sd_rad": errors.tilt_rad
+        }  # fmt: skip
+    return out
+
+
+def _course(history: History, found: Estimate, rows: NDArray[np.intp]) -> Course:
+    """The rows that are shown, as drift from one command is."""
+    track = found.track
+    status = np.where(track.held[:, rows], 0, 4)
+    return Course(history.times_s[rows], track.position_m[:, rows], track.rotation[:, rows], track.tension_N[:, rows],
+                  status, fresh(track.tension_N.shape[-1], 1))  # fmt: skip
+
+
+def _moved(course: Course, to: Target, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    """Displacement ``(n, r, 3)`` m, rotation and tilt ``(n, r)`` rad, each row from its own target."""
+    shift = course.position_m - to.position_m[rows]
+    angle, tilt = np.empty(shift.shape[:2]), np.empty(shift.shape[:2])
+    for i, k in enumerate(rows):
+        one = replace(course, position_m=course.position_m[:, [i]], rotation=course.rotation[:, [i]])
+        angle[:, i] = drifting.moved(one, to.position_m[k], to.rotation[k])[1][:, 0]
+        tilt[:, i] = turning.tilt(course.rotation[:, i], to.rotation[k])
+    return shift, angle, tilt
+
+
+def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) -> dict[str, Any]:
+    shift, angle, tilt = _moved(course, to, rows)
+    return {
+        "specimen_spread": spread,
+        "times_s": course.times_s,
+        "solved": float((course.status == 0).all(1).mean()),
+        "held": (course.status == 0).mean(0),
+        "displacement_mm": _bands(1e3 * shift),
+        "distance_mm": _bands(1e3 * np.linalg.norm(shift, axis=-1)),
+        "tilt_deg": _bands(np.degrees(tilt)),
+        "from_vertical_deg": _bands(np.degrees(turning.tilt(course.rotation))),
+        "rotation_deg": _bands(np.degrees(angle)),
+        "tension_N": _bands(course.tension_N),
+    }
+
+
+def _bands(values: Floats) -> dict[str, Any]:
+    """Bands at each time of ``(n, r, ...)`` over the draws whose platform still hangs then."""
+    each = [band(values[:, i]) for i in range(values.shape[1])]
+    empty = np.full(values.shape[2:], np.nan)
+    return {key: np.array([empty if one[key] is None else one[key] for one in each]) for key in each[0]}
+
+
+def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> dict[str, Any]:
+    """How far poses move if the wires' clocks start once and run on: no test of holds tells which they do."""
+    few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
+    anew, once = run(few, RESTART), run(few, np.inf)
+    apart = np.linalg.norm(anew.position_m - once.position_m, axis=-1)
+    middle = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in apart.T])
+    return {"largest_mm": 1e3 * float(np.nanmax(middle)), "at_the_end_mm": 1e3 * float(middle[-1])}
+
+
+def _warnings(
+    robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: dict[str, Any]
+) -> list[str]:
+    out, held = [], found.track.held
+    lost = 1.0 - held[:, -1].mean()
+    if lost > 0:
+        first = history.times_s[np.argmin(held.all(0))]
+        out.append(f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s")
+    slack = ((found.track.tension_N <= 0) & held[..., None]).any(1).mean(0)
+    for i in np.flatnonzero(slack > 0.05):
+        out.append(f"wire {i + 1} goes slack in {100 * slack[i]:.0f} % of the draws")
+    if history.read and not found.converged:
+        out.append("the readings could not be brought together with the joint values: no mode was reached")
+    elif found.misfit is not None and found.misfit > _MISFIT:
+        out.append(
+            f"the readings contradict joint values and wires: mean squared residual {found.misfit:.3g}, expected about "
+            "1; check signs, units, payload and the standard errors"
+        )
+    clock = content["clock"]
+    width = content["drift"][0]["distance_mm"]
+    if clock["largest_mm"] > 0.5 * np.nanmax(np.asarray(width["q95"]) - np.asarray(width["q05"])):
+        out.append(
+            f"when the wires' clocks start anew matters here: by up to {clock['largest_mm']:.3g} mm, more than half of "
+            "the band; give a column hold to say it"
+        )
+    holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
+    longest = float(np.diff(history.times_s[holds]).max())
+    lengths = inverse.lengths(robot, joint_m)[0]
+    return out + draws.warnings(line, found.track.tension_N[held], longest, lengths)
+
+
+def _pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> tuple[list[str], list[list[Any]]]:
+    """Mean, sd and quantiles of every coordinate, of the distance from the target, and the tensions."""
+    track = found.track
+    parts = {f"{axis}_m": track.position_m[..., i] for i, axis in enumerate("xyz")}
+    if robot.degrees == 6:
+        turn = turning.vector(np.where(track.held[..., None, None], track.rotation, np.eye(3)))
+        turn = np.where(track.held[..., None], turn, np.nan)
+        parts |= {f"r{axis}_rad": turn[..., i] for i, axis in enumerate("xyz")}
+    parts["distance_mm"] = 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1)
+    columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
+    for name, values in parts.items():
+        quantity, unit = name.rsplit("_", 1)
+        mean, sd, low, middle, high = _described(values)
+        columns[f"{quantity}_mean_{unit}"], columns[f"{quantity}_sd_{unit}"] = mean, sd
+        for label, value in (("q05", low), ("q50", middle), ("q95", high)):
+            columns[f"{quantity}_{label}_{unit}"] = value
+    columns |= {f"tension_{i + 1}_N": _mean(track.tension_N[..., i]) for i in range(robot.legs)}
+    columns["held"] = track.held.mean(0)
+    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
+
+
+def _correction_table(
+    robot: Robot, history: History, joint_m: Floats, change_m: Floats
+) -> tuple[list[str], list[list[Any]]]:
+    """Corrected joint values (motor angles too), and what they change, with its standard deviation."""
+    columns: dict[str, Any] = {"time_s": history.times_s}
+    mean, sd, *_ = _described(change_m)
+    for i in range(joint_m.shape[-1]):
+        columns[f"joint_{i + 1}_m"] = joint_m[:, i] + mean[:, i]
+    if robot.drums is not None:
+        angle = motor_angle(robot.drums, joint_m + mean)
+        columns |= {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(robot.drums.radius_m > 0)}
+    for i in range(joint_m.shape[-1]):
+        columns[f"change_{i + 1}_mm"], columns[f"change_{i + 1}_sd_mm"] = 1e3 * mean[:, i], 1e3 * sd[:, i]
+    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
+
+
+def _described(values: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Mean, sd, 5, 50 and 95 % over the draws that have a value."""
+    mean = _mean(values)
+    sd = np.sqrt(_mean((values - mean) ** 2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a row where no draw hangs has no quantiles
+        quantile = np.nanquantile if np.isnan(values).any() else np.quantile
+        low, middle, high = quantile(values, [0.05, 0.5, 0.95], axis=0)
+    return mean, sd, low, middle, high
+
+
+def _mean(values: Floats) -> Floats:
+    """Mean over the draws that have a value."""
+    good = np.isfinite(values)
+    return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))

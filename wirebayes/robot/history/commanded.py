@@ -1,0 +1,121 @@
+"""Commanded poses and loads to where the platform really goes while its wires creep."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from wirebayes.robot.history.estimate import Estimate, Progress
+from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.motion import inverse
+
+Floats = NDArray[np.float64]
+_STRAIGHT = 0.02  # of the robot's span: over so short a way, even joint values make an even motion
+
+
+def drift(
+    robot: Robot,
+    line: WireDraws,
+    history: History,
+    spread: float,
+    rng: np.random.Generator,
+    progress: Progress = lambda name, done, total: None,
+    restart: float = RESTART,
+) -> tuple[Estimate, Floats]:
+    """Follow commanded poses: every draw's joint values would give them exactly if its wires did not creep.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    history : History
+        With poses.
+    spread : float
+        Relative, from wire to wire.
+    rng : numpy Generator
+    progress : function of name, done and total
+    restart : float
+        As in `follow.clock_starts`.
+
+    Returns
+    -------
+    Estimate
+        At the rows of the history.
+    joint_m : (n, t, w) array
+        What each draw's actuators were told.
+
+    Raises
+    ------
+    Unheld
+        No tensions within the bounds hold the platform at some row.
+    """
+    fine, kept = refined(robot, history)
+    known = unknowns(robot, line, Uncertain(0.0, spread), rng)
+    wires, _ = known.columns(known.draws)
+    tau = wanted_tensions(robot, fine)
+    assert fine.position_m is not None and fine.rotation is not None
+    bad = np.flatnonzero(~np.isfinite(tau).all(1))
+    if bad.size:
+        raise Unheld(float(fine.times_s[bad[0]]))
+    joint = np.stack([
+        inverse.commands(fine.robot_at(robot, k), wires, x[None], R[None], t[None]).joint_m
+        for k, (x, R, t) in enumerate(zip(fine.position_m, fine.rotation, tau, strict=True))
+    ])  # fmt: skip
+    rows, starts = len(fine.times_s), clock_starts(fine, tau, restart)
+    start = fine.position_m[0], fine.rotation[0]
+    track = follow(robot, wires, fine, joint, start, starts, progress=lambda k: progress("poses", k + 1, rows))
+    plain = Track(fine.position_m[None], fine.rotation[None], tau[None], np.zeros((1, *tau.shape)), track.hold)
+    errors = np.zeros((line.count, robot.legs))
+    return Estimate(_at(track, kept), _at(plain, kept), wires, errors), np.swapaxes(joint[kept], 0, 1)
+
+
+class Unheld(Exception):
+    """No tensions within the bounds hold the platform at a time of a history."""
+
+    def __init__(self, time_s: float) -> None:
+        super().__init__(f"no tensions within the bounds hold the platform {time_s:g} s after the start")
+        self.time_s = time_s
+
+
+def wanted_tensions(robot: Robot, history: History) -> Floats:
+    """Tensions ``(t, w)`` that hold the platform and its payload at commanded poses; NaN where none do."""
+    assert history.position_m is not None and history.rotation is not None
+    out = np.empty((len(history.times_s), robot.legs))
+    loads = np.column_stack([history.payload_kg, history.payload_m])
+    for load in np.unique(loads, axis=0):
+        rows = np.flatnonzero((loads == load).all(1))
+        out[rows] = inverse.tensions(history.robot_at(robot, int(rows[0])), history.position_m[rows],
+                                     history.rotation[rows])  # fmt: skip
+    return out
+
+
+def refined(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
+    """The history with rows between distant poses, and where its own rows are among them."""
+    x, R, times = history.position_m, history.rotation, history.times_s
+    assert x is not None and R is not None
+    turned = Rotation.from_matrix(R)
+    angle = (turned[:-1].inv() * turned[1:]).magnitude()
+    far = np.maximum(np.linalg.norm(np.diff(x, axis=0), axis=1), robot.size_m * angle)
+    pieces = np.maximum(np.ceil(far / (_STRAIGHT * robot.span_m)).astype(int), 1)
+    kept = np.concatenate([[0], np.cumsum(pieces)])
+    at = np.interp(np.arange(kept[-1] + 1), kept, np.arange(len(times)))
+    index = np.arange(len(times), dtype=float)
+    before = np.floor(at).astype(int)  # what stays until the next row
+    between = np.stack([np.interp(at, index, column) for column in x.T], 1)
+    fine = replace(
+        history, times_s=np.interp(at, index, times), position_m=between,
+        rotation=Slerp(index, turned)(at).as_matrix(), payload_kg=history.payload_kg[before],
+        payload_m=history.payload_m[before], hold=None if history.hold is None else history.hold[before],
+    )  # fmt: skip
+    return fine, kept
+
+
+def _at(track: Track, rows: NDArray[np.intp]) -> Track:
+    arrays = (track.position_m, track.rotation, track.tension_N, track.strain)
+    position, rotation, tension, strain = (v[:, rows] for v in arrays)
+    return Track(position, rotation, tension, strain, track.hold[rows])

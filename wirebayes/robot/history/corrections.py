@@ -1,0 +1,64 @@
+"""Joint values that bring a drifted platform back, how sure they are, and what error they leave."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.history.estimate import Estimate
+from wirebayes.robot.history.history import History
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.tensions import nearest
+from wirebayes.robot.motion import forward, inverse
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where the platform is meant to be at each row, ``(t, 3)`` and ``(t, 3, 3)``, and its tensions, ``(t, w)``."""
+
+    position_m: Floats
+    rotation: Floats
+    tension_N: Floats
+
+
+def target(robot: Robot, history: History, found: Estimate) -> Target:
+    """The commanded poses; where none are given, what the joint values would give if no wire crept.
+
+    Tensions are those without creep, or the nearest to them that hold the commanded pose.
+    """
+    plain = found.plain
+    if history.position_m is None or history.rotation is None:
+        return Target(plain.position_m[0], plain.rotation[0], plain.tension_N[0])
+    tension = np.empty_like(plain.tension_N[0])
+    for k, before in enumerate(plain.tension_N[0]):
+        choice = partial(nearest, np.where(np.isfinite(before), before, 0.0))
+        x, R = history.position_m[k][None], history.rotation[k][None]
+        tension[k] = inverse.tensions(history.robot_at(robot, k), x, R, choice)[0]
+    return Target(history.position_m, history.rotation, tension)
+
+
+def wanted(robot: Robot, found: Estimate, to: Target) -> Floats:
+    """Joint values ``(n, t, w)`` that bring every draw to its target, creep so far included; NaN where none do."""
+    out = np.empty_like(found.track.tension_N)
+    for k in range(out.shape[1]):
+        strain = found.track.strain[:, k].T
+        x, R, tau = to.position_m[k][None], to.rotation[k][None], to.tension_N[k][None]
+        out[:, k] = inverse.commands(robot, found.wires, x, R, tau, strain, found.error_m.T).joint_m
+    return out
+
+
+def left(robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: Floats) -> Floats:
+    """Distance from the target, ``(n, rows)`` m, that corrected joint values ``(t, w)`` or ``(n, t, w)`` leave."""
+    n, legs = len(found.track.position_m), robot.legs
+    out = np.full((n, len(rows)), np.nan)
+    for i, k in enumerate(rows):
+        bare, offset = inverse.lengths(robot, np.broadcast_to(joint_m[..., k, :], (n, legs)))
+        zero = (bare + found.error_m) * (1.0 + found.track.strain[:, k])
+        loaded = history.robot_at(robot, int(k))
+        there = forward.solve(loaded, found.wires, zero, offset, to.position_m[k], to.rotation[k])
+        distance = np.linalg.norm(there.position_m - to.position_m[k], axis=1)
+        out[:, i] = np.where(there.found & found.track.held[:, k], distance, np.nan)
+    return out

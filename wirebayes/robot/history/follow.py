@@ -1,0 +1,195 @@
+"""Carrying wires through a history: every draw's creep under its own tensions, every draw's pose at each row."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.history.history import History
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion.creep import CreepState, fresh
+from wirebayes.robot.motion.drift import Walk
+
+Floats = NDArray[np.float64]
+# Share of the mean tension by which a command must change a wire's tension to start the clocks anew. On the paper's
+# bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.
+RESTART = 0.1
+
+
+@dataclass(frozen=True)
+class Track:
+    """Poses of ``n`` columns at the ``t`` rows of a history.
+
+    Attributes
+    ----------
+    position_m, rotation : (n, t, 3), (n, t, 3, 3) arrays
+        NaN from a fall on.
+    tension_N : (n, t, w) array
+    strain : (n, t, w) array
+        Creep of every wire.
+    hold : (t,) int array
+        How often the wires' clocks had been started anew.
+    """
+
+    position_m: Floats
+    rotation: Floats
+    tension_N: Floats
+    strain: Floats
+    hold: NDArray[np.int64]
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """(n, t) True where the platform hangs in an equilibrium."""
+        return np.asarray(np.isfinite(self.position_m).all(-1))
+
+
+def follow(
+    robot: Robot,
+    wires: Wires,
+    history: History,
+    joint_m: Floats,
+    start: tuple[Floats, Floats],
+    starts_s: Floats,
+    error_m: Floats | float = 0.0,
+    progress: Callable[[int], None] = lambda row: None,
+) -> Track:
+    """Follow every column's equilibrium through a history, its creep under its own tensions.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` columns.
+    history : History
+    joint_m : (t, w) or (t, n, w) array
+        Joint values at the rows.
+    start : (3,) or (n, 3), (3, 3) or (n, 3, 3) arrays
+        Where the first forward solution starts from.
+    starts_s : array
+        Rising times at which the wires' clocks start anew (`clock_starts`).
+    error_m : (n, w) array or float
+        What the zero-tension lengths before creep are beyond what the joint values say.
+    progress : function of a row
+
+    Returns
+    -------
+    Track
+    """
+    n = max(v.shape[-1] for v in wires.theta.values())
+    times, legs = history.times_s, robot.legs
+    shapes = ((3,), (3, 3), (legs,), (legs,))
+    position, rotation, tension, strain = (np.full((n, len(times), *shape), np.nan) for shape in shapes)
+    schedule, since = _schedule(times, joint_m), float(times[0])
+    walk = _begin(history.robot_at(robot, 0), wires, schedule, since, start, fresh(legs, n), error_m)
+    ahead = [float(time) for time in starts_s if time > since]
+    for k, time in enumerate(times):
+        while ahead and ahead[0] < time:
+            walk.to(ahead[0] - since)
+            since = ahead.pop(0)
+            walk = _begin(walk.robot, wires, schedule, since, _pose(walk), _carried(walk, wires), error_m)
+        walk.to(float(time) - since)
+        if k and _loaded(history, k):
+            walk.load(history.robot_at(robot, k))
+        if ahead and ahead[0] == time:
+            since = ahead.pop(0)
+            walk = _begin(walk.robot, wires, schedule, since, _pose(walk), _carried(walk, wires), error_m)
+        live = walk.live
+        position[live, k], rotation[live, k] = walk.here.position_m[live], walk.here.rotation[live]
+        tension[live, k] = walk.here.tension_N[live]
+        strain[:, k] = np.broadcast_to(walk.creep.state().strain(wires).T, (n, legs))
+        progress(k)
+    hold = np.searchsorted(starts_s, times, "right") - 1
+    return Track(position, rotation, tension, strain, np.maximum(hold, 0))
+
+
+def clock_starts(history: History, tension_N: Floats, share: float = RESTART) -> Floats:
+    """Times at which the wires' clocks start: the history's own holds, or where a command or a load changes tensions.
+
+    A hold begins when a wire's tension has changed by a share of the mean tension since the one before. Between rows
+    tensions change evenly, so the answer does not depend on how finely a motion was sampled.
+
+    Parameters
+    ----------
+    history : History
+    tension_N : (t, w) array
+        At the rows, of wires that do not creep: changed by what is commanded or carried only.
+    share : float
+        Infinite: the clocks start once.
+
+    Returns
+    -------
+    (s,) array
+        Rising, the first row's time first.
+    """
+    times = history.times_s
+    if history.hold is not None and np.isfinite(share):
+        return np.asarray(times[np.concatenate([[True], np.diff(history.hold) != 0])])
+    out, reference = [float(times[0])], tension_N[0]
+    for k in range(1, len(times)):
+        jump = _loaded(history, k)
+        before, after = tension_N[k if jump else k - 1], tension_N[k]
+        while np.abs(after - reference).max() > (limit := share * float(reference.mean())) > 0:
+            if jump:
+                out.append(float(times[k]))
+                reference = after
+                continue
+            beyond = np.abs(after - reference) > limit
+            edge = reference + limit * np.sign(after - reference)
+            reached = float(((edge - before)[beyond] / (after - before)[beyond]).min())
+            out.append(float(times[k - 1] + reached * (times[k] - times[k - 1])))
+            reference = before + reached * (after - before)
+    return np.array(out)
+
+
+def _begin(
+    robot: Robot, wires: Wires, schedule: Callable[[float], Floats], since_s: float, start: tuple[Floats, Floats],
+    carried: CreepState, error_m: Floats | float,
+) -> Walk:  # fmt: skip
+    """A hold that begins at a time of the history."""
+    return Walk(robot, wires, lambda time_s: schedule(since_s + time_s), start, carried, error_m=error_m)
+
+
+def _loaded(history: History, row: int) -> bool:
+    """Whether what the platform carries changes at a row."""
+    now, before = history.payload_kg[row], history.payload_kg[row - 1]
+    return bool(now != before or (now > 0 and np.any(history.payload_m[row] != history.payload_m[row - 1])))
+
+
+def _schedule(times_s: Floats, joint_m: Floats) -> Callable[[float], Floats]:
+    """Joint values by time, even between the rows."""
+
+    def joint(time_s: float) -> Floats:
+        k = int(np.clip(np.searchsorted(times_s, time_s, "right") - 1, 0, len(times_s) - 2))
+        share = min(max((time_s - times_s[k]) / (times_s[k + 1] - times_s[k]), 0.0), 1.0)
+        return np.asarray(joint_m[k] + share * (joint_m[k + 1] - joint_m[k]))
+
+    return joint
+
+
+def _carried(walk: Walk, wires: Wires) -> CreepState:
+    """What goes into the next hold; the clocks of earlier ones only where an effect may remember them."""
+    state = walk.creep.state()
+    return state if wires.effects else replace(state, past=())
+
+
+def _pose(walk: Walk) -> tuple[Floats, Floats]:
+    """Where the next hold starts from; NaN where the platform has fallen, so that nothing more is solved there."""
+    lost = ~walk.live[:, None]
+    return np.where(lost, np.nan, walk.here.position_m), walk.here.rotation
+
+
+def uncreeping(wires: Wires) -> Wires:
+    """One column: the mean wire, which never creeps."""
+    keep = {column for effect in wires.at("strain") for column in effect.columns()}
+    theta = {}
+    neutral = {c: a.neutral for e in wires.effects for a, c in zip(e.amplitudes, e.columns(), strict=True)}
+    for name, value in wires.theta.items():
+        mean = value.mean(-1, keepdims=True)
+        if name == "B":
+            mean = np.zeros_like(mean)
+        elif name in neutral and name not in keep:
+            mean = np.full_like(mean, neutral[name])
+        theta[name] = mean
+    return replace(wires, theta=theta)

@@ -1,0 +1,81 @@
+"""What a robot did over time: joint values or poses, loads, and what its sensors said."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics.description import Robot
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class History:
+    """Rows in time; between two of them joint values and poses change evenly.
+
+    Attributes
+    ----------
+    times_s : (t,) array
+        Rising; at the first the wires are new.
+    joint_m : (t, w) array or None
+        Joint values that were measured.
+    position_m, rotation : (t, 3), (t, 3, 3) arrays or None
+        Poses that were commanded.
+    payload_kg : (t,) array
+        What the platform carries beside its own mass, from the row on.
+    payload_m : (t, 3) array
+        The payload's centre of mass in the platform's frame.
+    hold : (t,) int array or None
+        A new number starts the wires' clocks anew; None: a change of load does (`follow.RESTART`).
+    tension_N : (t, w) array or None
+        Measured; NaN where a sensor was not read.
+    tilt_rad : (t, 2) array or None
+        Roll and pitch of an inclinometer on the platform; NaN where it was not read.
+    """
+
+    times_s: Floats
+    joint_m: Floats | None
+    position_m: Floats | None
+    rotation: Floats | None
+    payload_kg: Floats
+    payload_m: Floats
+    hold: NDArray[np.int64] | None = None
+    tension_N: Floats | None = None
+    tilt_rad: Floats | None = None
+
+    @property
+    def read(self) -> bool:
+        """Whether any sensor beside the joints' was read."""
+        return any(v is not None and bool(np.isfinite(v).any()) for v in (self.tension_N, self.tilt_rad))
+
+    def robot_at(self, robot: Robot, row: int) -> Robot:
+        """The robot with what it carries from a row on."""
+        return with_payload(robot, float(self.payload_kg[row]), self.payload_m[row])
+
+
+def with_payload(robot: Robot, mass_kg: float, centre_m: Floats) -> Robot:
+    """The robot with a payload on its platform: the mass grows, its centre moves.
+
+    Parameters
+    ----------
+    robot : Robot
+    mass_kg : float
+        Of the payload.
+    centre_m : (3,) array
+        Its centre of mass in the platform's frame.
+    """
+    if mass_kg == 0:
+        return robot
+    whole = robot.mass_kg + mass_kg
+    centre = (robot.mass_kg * robot.centre_of_mass_m + mass_kg * np.asarray(centre_m)) / whole
+    return replace(robot, mass_kg=whole, centre_of_mass_m=centre)
+
+
+def roll_and_pitch(rotation: Floats) -> Floats:
+    """What an inclinometer on the platform reads, ``(..., 2)`` rad, of rotations ``(..., 3, 3)``.
+
+    Roll about the platform's x axis, then pitch about its y axis, as gravity shows them; the heading leaves no trace.
+    """
+    pitch = -np.arcsin(np.clip(rotation[..., 2, 0], -1.0, 1.0))
+    return np.stack([np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2]), pitch], -1)

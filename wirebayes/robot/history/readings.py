@@ -1,0 +1,127 @@
+"""What tensions and tilts say about the unknowns: linear in them, gathered reading by reading.
+
+Readings ``y = h(u) + offset + noise`` about a point where ``h`` is known with its derivatives. What they say is their
+information matrix and, for each draw, a vector; both are sums over readings, so that they can be gathered while a robot
+runs. A draw of the prior becomes one of the posterior by moving as far as its own readings, with noise of their own,
+would move it (Matheron's rule), which is exact where ``h`` is linear and keeps the prior where nothing was read.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from wirebayes.robot.history.unknowns import Uncertain
+from wirebayes.robot.mechanics.description import Robot
+
+Floats = NDArray[np.float64]
+TOGETHER_S = 1.0  # readings nearer in time count as one: a sensor's noise at a controller's rate is not independent
+_OFFSET = 0.5  # share of a reading's variance that the sensor keeps as an offset
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The sensors of a robot: a tension for each of ``w`` wires, then roll and pitch.
+
+    Attributes
+    ----------
+    error : (m,) array
+        Standard errors of a reading.
+    bias : (m,) array
+        Standard deviations of what a sensor is off by all the time, beside that.
+    """
+
+    error: Floats
+    bias: Floats
+
+    @property
+    def sd(self) -> Floats:
+        """(m,) standard deviations of all that a reading is off by."""
+        return np.asarray(np.hypot(self.error, self.bias))
+
+    @property
+    def noise(self) -> Floats:
+        """(m,) standard deviations of what differs from reading to reading."""
+        return np.asarray(self.error * np.sqrt(1.0 - _OFFSET))
+
+    @property
+    def offset(self) -> Floats:
+        """(m,) standard deviations of what stays."""
+        return np.asarray(np.hypot(self.error * np.sqrt(_OFFSET), self.bias))
+
+
+def sensors(robot: Robot, errors: Uncertain) -> Sensors:
+    """Tension sensors of all wires and an inclinometer."""
+    legs = robot.legs
+    error = np.array([errors.tension_N] * legs + [errors.tilt_rad] * 2)
+    return Sensors(error, np.array([robot.tension_bias_N] * legs + [0.0] * 2))
+
+
+def weight(since_s: float | None) -> float:
+    """How many readings one counts as, `since_s` after the one before (None: there is none)."""
+    return 1.0 if since_s is None else min(1.0, since_s / TOGETHER_S)
+
+
+@dataclass
+class Information:
+    """What was read so far; unknowns ``d`` and the sensors' offsets ``m`` are one white vector ``e = d + m``.
+
+    Attributes
+    ----------
+    matrix : (e, e) array
+    vector : (n, e) array
+        For every draw, from what it predicted.
+    """
+
+    matrix: Floats
+    vector: Floats
+
+    @classmethod
+    def none(cls, unknowns: int, sensors: int, draws: int) -> "Information":
+        """Nothing was read yet."""
+        e = unknowns + sensors
+        return cls(np.zeros((e, e)), np.zeros((draws, e)))
+
+    def add(self, of: Sensors, slope: Floats, residual: Floats, counts: float) -> None:
+        """Add one row of readings.
+
+        Parameters
+        ----------
+        of : Sensors
+        slope : (d, m) array
+            Of what the sensors should read, by the unknowns.
+        residual : (n, m) array
+            What each draw left of the readings; NaN where nothing was read.
+        counts : float
+            From `weight`.
+        """
+        there = np.isfinite(residual).any(0) & np.isfinite(slope).all(0)
+        if not there.any():
+            return
+        H = np.concatenate([slope, np.diag(of.offset)])[:, there]
+        scaled = H * (counts / of.noise[there] ** 2)
+        left = residual[:, there]
+        left = np.where(np.isfinite(left), left, np.nanmean(left, 0))  # a fallen draw has no say
+        self.matrix += scaled @ H.T
+        self.vector += left @ scaled.T
+
+    def moves(self, before: Floats, noise: Floats) -> Floats:
+        """How far white unknowns with offsets ``(n, e)`` move.
+
+        Parameters
+        ----------
+        before : (n, e) array
+            From where the draws are to where the prior has them; zero when they are the prior's own.
+        noise : (n, e) array
+            Standard normal, one row a draw: the noise of its own readings.
+        """
+        values, vectors = np.linalg.eigh(self.matrix)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        right = before + self.vector + noise @ root.T
+        return np.asarray(cho_solve(cho_factor(self.matrix + np.eye(len(self.matrix))), right.T).T)
+
+    @property
+    def sd(self) -> Floats:
+        """(e,) posterior standard deviations in units of the prior's."""
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(self.matrix + np.eye(len(self.matrix))))))

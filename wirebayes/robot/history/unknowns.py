@@ -1,0 +1,105 @@
+"""What is not known of a robot's wires, as columns to be followed: draws, and differences that give derivatives."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from wirebayes.robot.history.follow import uncreeping
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import CORE, WireDraws
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.self_calibration.session import OWN, Prior
+
+Floats = NDArray[np.float64]
+_STEP = 0.05  # of a prior sd: far above the solver's error, and poses are straight over it
+_EXACT_M = 1e-6  # a length that is said to be exact is known to a micrometre
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """The errors that measured values may have.
+
+    Attributes
+    ----------
+    reference_m : float
+        Standard error of the lengths that the joint values stand for, constant for each wire.
+    spread : float
+        Relative, of stiffness, creep amount and rate from wire to wire of one line.
+    tension_N, tilt_rad : float
+        Standard error of a reading. Half its variance is an offset that the sensor keeps, so that no number of
+        readings tells more than that.
+    """
+
+    reference_m: float = 0.0
+    spread: float = 0.05
+    tension_N: float = 0.02
+    tilt_rad: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Unknowns in units of their prior ("white"): reference lengths, the line's parameters, each specimen's own.
+
+    Attributes
+    ----------
+    robot : Robot
+    prior : Prior
+    mean : (d,) array
+    root : (d, d) array
+        Cholesky factor of the prior covariance.
+    draws : (n, d) array
+        White draws of the prior, the line's as the posterior of its fit has them.
+    """
+
+    robot: Robot
+    prior: Prior
+    mean: Floats
+    root: Floats
+    draws: Floats
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns."""
+        return len(self.mean)
+
+    def columns(self, white: Floats) -> tuple[Wires, Floats]:
+        """Wires of white unknowns ``(n, d)``, and reference errors ``(n, w)``, m."""
+        return self.prior.wires(self.robot, self.mean + white @ self.root.T)
+
+    @property
+    def plain(self) -> Wires:
+        """The mean wire without creep: what a controller knows."""
+        return uncreeping(self.prior.wires(self.robot, self.mean[None])[0])
+
+    def differences(self, about: Floats) -> Floats:
+        """White unknowns ``(1 + d, d)`` whose predictions give the derivatives at a point ``(d,)``; see `slopes`."""
+        return np.asarray(np.concatenate([about[None], about + _STEP * np.eye(self.count)]))
+
+
+def slopes(values: Floats) -> Floats:
+    """Derivatives ``(d, ...)`` by the white unknowns of values ``(1 + d, ...)`` at `Unknowns.differences`."""
+    return np.asarray((values[1:] - values[0]) / _STEP)
+
+
+def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Generator) -> Unknowns:
+    """The unknowns of a robot whose wires are cut from one line.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    errors : Uncertain
+    rng : numpy Generator
+        For reference lengths and specimens of the draws.
+    """
+    prior = Prior(line, max(errors.reference_m, _EXACT_M), errors.spread)
+    mean, cov = prior.moments(robot.legs)
+    root = np.asarray(np.linalg.cholesky(cov), np.float64)
+    legs, n = robot.legs, line.count
+    fitted = np.stack([np.log(line.parameters[k]) if k in CORE else line.parameters[k] for k in prior.names], 1)
+    own = rng.standard_normal((n, len(OWN) * legs)) * max(errors.spread, 1e-6)
+    values = np.concatenate([rng.standard_normal((n, legs)) * prior.reference_sd_m, fitted, own], 1)
+    white = solve_triangular(root, (values - mean).T, lower=True).T
+    return Unknowns(robot, prior, mean, root, np.asarray(white))

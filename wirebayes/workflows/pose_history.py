@@ -1,0 +1,78 @@
+"""A robot's measured or commanded history: what `pose` does where it is given one."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.robot.history import table
+from wirebayes.robot.history.answer import answer
+from wirebayes.robot.history.unknowns import Uncertain
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.workflows.options import Progress, above_zero
+from wirebayes.workflows.results import Place, Pose
+from wirebayes.workflows.tables import as_csv, row_place
+from wirebayes.workflows.wires import content, hash_of
+
+Floats = NDArray[np.float64]
+
+
+def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:
+    """Standard errors in the robot's units, mm and N and rad in."""
+    reference_sd, tension_sd, tilt_sd = float(reference_sd), float(tension_sd), float(tilt_sd)
+    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
+    if not 0 <= reference_sd < np.inf:
+        raise InputError(f"--reference-sd: found {reference_sd:g}; expected millimetres, 0 or more")
+    return Uncertain(1e-3 * reference_sd, float(specimen_spread), tension_sd, tilt_sd)
+
+
+def pose_history(
+    robot: Robot,
+    line: WireDraws,
+    joints: Any,
+    trajectory: Any,
+    errors: Uncertain,
+    start: tuple[Floats, Floats],
+    seed: int,
+    decides: dict[str, Any],
+    place: Place,
+    own_effects: Path | None,
+    progress: Progress,
+) -> Pose:
+    """Poses over time from `joints` or for `trajectory`; ``pose.json``, two tables and pictures.
+
+    Raises
+    ------
+    InputError
+        Both were given, or a table is wrong (line and column).
+    """
+    if joints is not None and trajectory is not None:
+        raise InputError("--joints and --trajectory: found both; expected one (a file of --joints may hold poses too)")
+    option, given = ("--joints", joints) if joints is not None else ("--trajectory", trajectory)
+    columns = table.measured if joints is not None else table.commanded
+    if isinstance(given, str | os.PathLike):
+        history = table.read(Path(given), robot, columns)
+        read = content(Path(given))
+    else:
+        text = as_csv(option[2:], given)
+        history = table.parse(option[2:], text, robot, columns, row_place)
+        read = hash_of({option: text})
+    spread = [errors.reference_m, errors.spread, errors.tension_N, errors.tilt_rad]
+    run = open_run(place.path, decides | {"history": [option[2:], read, *spread]})
+    if run.state == "done":
+        return Pose(place, own_effects, computed=False)
+    with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
+        found = answer(robot, line, history, errors, start, seed, progress)
+    write_json(run.directory / "pose.json", found.content)
+    for name, (header, rows) in found.tables.items():
+        write_csv(run.directory / name, header, rows)
+    from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
+
+    pictures.save(run.directory, robot, history, found)
+    run.finish()
+    return Pose(place, own_effects)
