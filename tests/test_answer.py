@@ -30,7 +30,7 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
     assert answer.answer(found) == [
         "a: ambiguous: grip_slip, toe (p = 0.001)",
         "  grip_slip at hold 4 0.31 [0.25, 0.38] mm",
-        "  hardly to be told apart on this protocol: ageing",
+        "  hard to distinguish on this protocol: ageing",
         "  held-out holds: rmse 0.25 -> 0.05 N",
         "b: nothing is missing (p = 0.4)",
     ]
@@ -40,7 +40,7 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
 def test_a_part_that_has_a_name_is_said_with_the_rest_that_has_none(tmp_path: Path) -> None:
     part = SLIP | {"verdict": "partial", "effects": ["grip_slip"]}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": part}})
-    assert answer.answer(found)[0] == "a: grip_slip is missing, and something that has no name here (p = 0.001)"
+    assert answer.answer(found)[0] == "a: grip_slip is missing, and something that is not in the catalogue (p = 0.001)"
 
 
 def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:

@@ -265,7 +265,7 @@ DISCOVERY = {
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({}, "strain stiffening; on this protocol hardly to be told apart from sensor nonlinearity."),
+        ({}, "strain stiffening; on this protocol hard to distinguish from sensor nonlinearity."),
         ({"group": ["strain_stiffening"]}, "What is missing: strain stiffening."),
         ({}, "The wire becomes stiffer (or softer) the more it is strained. τ = k1 s (1 + c s)."),
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "Nothing is missing"),
@@ -302,7 +302,8 @@ def test_the_page_of_a_check_says_what_is_odd_and_what_the_test_cannot_tell(tmp_
     page = read(write(folder_of(tmp_path / "out", "check", check=content)))
     assert "Hold 2 repeats hold 1." in page.words and "0.00123" in page.words
     assert (
-        "Effects it cannot show: guide friction." in page.words and "Parameters it says nothing of: k1." in page.words
+        "Effects it cannot show: guide friction." in page.words
+        and "Parameters it does not determine: k1." in page.words
     )
 
 

@@ -1,4 +1,4 @@
-"""Specimens that lie apart: found where they do, hardly ever where they do not."""
+"""Outlying specimens: found where they do, hardly ever where they do not."""
 
 import numpy as np
 import pytest

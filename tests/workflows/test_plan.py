@@ -82,7 +82,7 @@ def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):
     assert found["guess"]["parameters"]["B"]["q50"] == pytest.approx(0.3, rel=0.2)
     printed = capsys.readouterr().out
     assert printed.startswith("1. short: 3.33 min, ")
-    assert "2. long: 33.3 min, longer than there is time" in printed
+    assert "2. long: 33.3 min, longer than the available time" in printed
     page = (out / "report.html").read_text()
     assert "What a test would teach" in page
     assert "steady creep" in page

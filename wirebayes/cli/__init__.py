@@ -35,7 +35,7 @@ COMMANDS = {
     "import": Command(
         "wirebayes.cli.import_bench",
         "import_bench",
-        "Turn what benches write (CSV, xlsx) into experiment files.",
+        "Turn files of test benches (CSV, xlsx) into experiment files.",
         'wirebayes import raw.csv --output wire --length-mm 1200 --map "Kraft [N]=tension"',
     ),
     "init": Command(
@@ -47,13 +47,13 @@ COMMANDS = {
     "check": Command(
         "wirebayes.cli.check",
         "check",
-        "Say what was understood of an experiment file and what such a test can tell.",
+        "Report what was understood of an experiment file and what such a test can determine.",
         "wirebayes check data/paper/experiments.toml --experiment nylon-1.5m",
     ),
     "fit": Command(
         "wirebayes.cli.fit",
         "fit",
-        "Posterior of a wire's parameters.",
+        "Estimate the posterior of a wire's parameters.",
         "wirebayes fit data/paper/experiments.toml --experiment roc-line-1m --output out/fit",
     ),
     "compare": Command(
@@ -71,13 +71,13 @@ COMMANDS = {
     "batch": Command(
         "wirebayes.cli.batch",
         "batch",
-        "Fit and discover many experiments, each on its own, in one table.",
+        "Fit many experiments and find what each model is missing, in one table.",
         "wirebayes batch lot-1.toml lot-2.toml --output out/batch",
     ),
     "plan": Command(
         "wirebayes.cli.plan",
         "plan",
-        "What a test would teach before it is done.",
+        "Predict what a test would teach before it is done.",
         "wirebayes plan plan.toml --budget-min 60 --output out/plan",
     ),
     "predict": Command(
@@ -101,7 +101,7 @@ COMMANDS = {
     "pose": Command(
         "wirebayes.cli.robot",
         "pose",
-        "Pose of a robot on creeping wires: kinematics, drift and their uncertainty.",
+        "Predict the pose of a robot on creeping wires: kinematics, drift and their uncertainty.",
         "wirebayes pose linear-7 --wires out/fit/roc-line-1m --output out/pose",
     ),
     "calibrate": Command(

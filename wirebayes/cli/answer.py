@@ -22,7 +22,7 @@ from wirebayes.workflows.results import (
 from wirebayes.workflows.write_report import write_report
 
 PAGE = "report.html"
-_NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that has no name here"}
+_NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
 
 
 def conclude(result: Result, *, as_json: bool = False, quiet: bool = False) -> None:
@@ -135,7 +135,7 @@ def _finding(name: str, report: dict[str, Any]) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
     said = _NAMED.get(verdict, f"{verdict}: {effects}")
     if verdict == "partial":
-        said = f"{effects} is missing, and something that has no name here"
+        said = f"{effects} is missing, and something that is not in the catalogue"
     lines = [f"{name}: {said} (p = {report['p_global']:.2g})"]
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
@@ -143,7 +143,7 @@ def _finding(name: str, report: dict[str, Any]) -> list[str]:
         lines.append(f"  {effect}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
     like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
     if like and verdict in ("named", "ambiguous"):
-        lines.append(f"  hardly to be told apart on this protocol: {', '.join(like)}")
+        lines.append(f"  hard to distinguish on this protocol: {', '.join(like)}")
     gain = report["held_out"]
     if report["effects"] and gain["plain"]["rmse_N"] is not None and gain["final"]["rmse_N"] is not None:
         lines.append(f"  held-out holds: rmse {gain['plain']['rmse_N']:.3g} -> {gain['final']['rmse_N']:.3g} N")
@@ -171,7 +171,7 @@ def _batch(found: dict[str, Any]) -> list[str]:
 
 
 def _planned(row: dict[str, Any]) -> list[str]:
-    budget = "" if row["within_budget"] else ", longer than there is time"
+    budget = "" if row["within_budget"] else ", longer than the available time"
     lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
     known = [f"{name} {row['parameters'][name]['sd_median']:.2g}" for name in _SHOWN if name in row["parameters"]]
     creep = row["creep"]
@@ -214,8 +214,8 @@ def _checked(name: str, test: dict[str, Any]) -> list[str]:
 
 
 _SHOWS = {
-    "yes": "effects that would be found, from this size on",
-    "if unusually large": "effects that would be found if unusually large",
+    "yes": "effects that would be detected, from this size on",
+    "if unusually large": "effects that would be detected if unusually large",
     "no": "effects that it cannot show",
 }
 

@@ -48,7 +48,7 @@ def batch(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fit and discover many experiments, each on its own: DIR/summary.csv and a folder DIR/NAME for each."""
+    """Fit many experiments and find what each model is missing: DIR/summary.csv and a folder DIR/NAME for each."""
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.batch import batch as run

@@ -21,9 +21,9 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what was understood of an experiment file, what is suspicious, and what such a test can tell.
+    """Report what was understood of an experiment file, what is suspicious, and what such a test can determine.
 
-    Exit code 0 means that the file can be used, 2 that it is bad. With --output: DIR/check.json and DIR/NAME.svg.
+    Exit code 0 means that the file can be used, 2 that it cannot. With --output: DIR/check.json and DIR/NAME.svg.
     """
     from wirebayes.cli.answer import print_answer
     from wirebayes.cli.progress import progress

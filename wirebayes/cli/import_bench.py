@@ -35,7 +35,7 @@ def import_bench(
             "--map",
             metavar="HEADER=COLUMN",
             help="COLUMN is hold, displacement, time, tension, temperature or ignore; the unit is read from HEADER, or "
-            "given: 'Kraft=tension [N]' (a minus turns the sign: [-N]). May be repeated.",
+            "given: 'Kraft=tension [N]' (a minus changes the sign: [-N]). May be repeated.",
         ),
     ] = None,
     decimal: Annotated[
@@ -56,11 +56,11 @@ def import_bench(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Turn what benches write into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.svg to look at.
+    """Turn files of test benches into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.svg to look at.
 
     Each file is one experiment, named N after it; several also stand together in DIR/experiments.toml. Delimiter,
     decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and continuous
-    recordings are cut into holds. What can be read in two ways is asked on a terminal and refused elsewhere.
+    recordings are divided into holds. Ambiguous input leads to a question on a terminal and to an error elsewhere.
     """
     from wirebayes.cli.answer import print_answer
     from wirebayes.workflows.import_bench import import_bench as run

@@ -9,7 +9,7 @@ from wirebayes.cli.options import Quiet
 
 
 def new_experiment(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the files; made where it is absent.")],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the files; created if absent.")],
     quiet: Quiet = False,
 ) -> None:
     """Write a commented experiment file and a small CSV to replace: DIR/my-wire.toml and DIR/my-wire.csv."""

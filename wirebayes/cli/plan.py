@@ -28,7 +28,7 @@ def plan(
     seed: Seed = 0,
     experiment: ExperimentName = None,
     budget_min: Annotated[
-        float | None, typer.Option("--budget-min", metavar="MIN", help="Time there is; longer tests come last.")
+        float | None, typer.Option("--budget-min", metavar="MIN", help="Available time; longer tests come last.")
     ] = None,
     robot: Annotated[
         str | None, typer.Option("--robot", metavar="ROBOT", help="A robot whose drift within an hour is to be known.")
@@ -43,7 +43,7 @@ def plan(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find what tests would teach before they are done, and rank them: DIR/plan.json."""
+    """Predict what tests would teach before they are done, and rank them: DIR/plan.json."""
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.plan import plan as run

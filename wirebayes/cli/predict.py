@@ -36,7 +36,7 @@ def predict(
 ) -> None:
     """Predict the readings of holds not measured yet.
 
-    Holds of the training are answered as replicates. Holds with later numbers continue the tested sample: they begin
+    Holds of the training are predicted as replicates. Holds with later numbers continue the tested sample: they begin
     when the last trained hold ended and are predicted given all training readings, whether or not PROTOCOL repeats
     training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
     fit's. A first reading in tension_N conditions its hold and those after it.

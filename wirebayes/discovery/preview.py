@@ -39,7 +39,7 @@ class Preview:
         Of each: ``amplitude_80``, the smallest that would be detected in four tests of five, its ``unit``, and
         whether the test ``shows`` it: yes (at usual sizes), if unusually large, or no, and the ``reason``.
     warnings : list of str
-        What is odd about what was fitted.
+        What is suspicious about what was fitted.
     """
 
     parameters: dict[str, dict[str, Any]]

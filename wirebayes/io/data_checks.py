@@ -74,7 +74,7 @@ class Readings:
 
 
 def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list[str]:
-    """What is odd about the readings of one test.
+    """What is suspicious about the readings of one test.
 
     Parameters
     ----------

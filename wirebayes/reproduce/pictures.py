@@ -84,7 +84,7 @@ class Gallery:
         title = f"{e.name}: last hold, {hold.displacement_mm:g} mm"
         figure = paper_figures.last_hold(times, drawn, curve, (hold.time_s, hold.tension_N), title)
         missed = np.interp(hold.time_s[1:], times, curve) - hold.tension_N[1:]
-        alt = f"The last hold of {e.name}: measured tension, the paper's curve and the forecast band."
+        alt = f"The last hold of {e.name}: measured tension, the paper's curve and the predicted band."
         caption = f"The paper's curve misses these readings by {number(float(np.sqrt(np.mean(missed**2))), 2)} N (rms)."
         self.add("figures-1-to-4", e.name, figure, alt, caption)
 

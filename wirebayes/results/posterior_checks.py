@@ -22,7 +22,7 @@ TAUGHT = 0.1  # share by which the widest-moved parameter's interval shrank; bel
 
 
 def warnings(fit: Fit, sample: Sample) -> list[str]:
-    """What is odd about the readings of one sample and about what was fitted to them.
+    """What is suspicious about the readings of one sample and about what was fitted to them.
 
     Parameters
     ----------

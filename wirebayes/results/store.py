@@ -474,7 +474,7 @@ def statistics(values: Array) -> dict[str, float]:
 
 
 def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
-    """What is odd about the readings, with the experiment's name where there are several."""
+    """What is suspicious about the readings, with the experiment's name where there are several."""
     if sample is not None:
         return posterior_checks.warnings(fit, sample)
     return [f"{s.name}: {said}" for s in fit.problem.samples for said in posterior_checks.warnings(fit, s)]

@@ -119,7 +119,7 @@ class Plan:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is odd about the readings, worth knowing before the work begins."""
+        """What is suspicious about the readings, worth knowing before the work begins."""
         return tuple(f"warning: {said}" for said in of_experiments(self.experiments))
 
 

@@ -92,9 +92,9 @@ def plan(
     robot : Robot, name or path, optional
         Whose drift within an hour is to be known.
     aim : "parameters", "creep", or two effects, optional
-        What the tests are ranked by: what they tell of the material, how well the creep after an hour is known, or how
-        far apart two effects would lie. Left out, it is the plan file's; for a ``discover`` that could not decide, the
-        two effects it ranks first; else the parameters.
+        What the tests are ranked by: how much they say about the material, how well the creep after an hour is known,
+        or how well two effects would be distinguished. Left out, it is the plan file's; for a ``discover`` that could
+        not decide, the two effects it ranks first; else the parameters.
     tests : int
         Simulated tests of each protocol.
     elastic_law, history

@@ -34,7 +34,7 @@ def predict(
 ) -> "xr.Dataset":
     """Predict the readings of holds not measured yet.
 
-    Holds of the training are answered as replicates. Holds with later numbers continue the tested sample: they begin
+    Holds of the training are predicted as replicates. Holds with later numbers continue the tested sample: they begin
     when the last trained hold ended and are predicted given all training readings.
 
     Parameters

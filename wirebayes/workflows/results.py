@@ -211,7 +211,7 @@ class Posterior(Result):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """What is odd about the readings, and why the posterior should not be believed, if so."""
+        """What is suspicious about the readings, and why the posterior should not be believed, if so."""
         path, name = self.folder / SUMMARY, self.within if self.within != "." else self.name
         with stored_results(path):
             summary = read_json(path)
@@ -317,7 +317,7 @@ class Findings(Result):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """What is odd about the readings, and which posteriors should not be believed."""
+        """What is suspicious about the readings, and which posteriors should not be believed."""
         plain = [said for p in self.plain.values() for said in p.messages]
         # the readings are the same, so they are warned of once
         odd = tuple(f"{p.within}: warning: " for p in self.final.values())
@@ -463,7 +463,7 @@ class Comparison(Result):
     Attributes
     ----------
     warnings : tuple of str
-        What is odd about the readings; not known any more of results that were loaded.
+        What is suspicious about the readings; not known any more of results that were loaded.
 
     Examples
     --------
@@ -663,7 +663,7 @@ class ImportedTests(Result):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """What is odd about the readings."""
+        """What is suspicious about the readings."""
         return tuple(
             f"warning: {said}" for found in self.summary()["experiments"].values() for said in found["warnings"]
         )
@@ -705,7 +705,7 @@ class Check(Result):
             for name, test in self.summary()["experiments"].items()
             for parameter, p in test["parameters"].items()
         ]
-        header = ["experiment", "parameter", "median", "90 % interval", "told by"]
+        header = ["experiment", "parameter", "median", "90 % interval", "determined by"]
         return html_table(repr(self), header, rows, self.messages)
 
 

@@ -1,4 +1,4 @@
-"""The page of ``wirebayes batch``: how many experiments say what, which specimens lie apart, and the table."""
+"""The page of ``wirebayes batch``: how many experiments have which verdict, outlying specimens, and the table."""
 
 from collections import Counter
 from pathlib import Path
@@ -34,7 +34,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
     first: list[Block] = [Columns([_done(rows), _known(fitted), _unknown(rows, configuration)])]
-    sections = [Section("Summary", first), Section("Specimens that lie apart", _outliers(fitted, far))]
+    sections = [Section("Summary", first), Section("Outlying specimens", _outliers(fitted, far))]
     if fitted:
         alt = "Parameters of all specimens by material."
         picture = Picture(drawn(specimens_of_materials(fitted, far)), alt, _PICTURE, wide=True)
@@ -43,18 +43,18 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     effects = [effect for row in fitted for effect in (*row["effects"], row["best_effect"] or "")]
     sections.append(meaning(("90 % interval", "p", "robust z"), effects))
-    lead = "Each experiment was judged on its own; the table is summary.csv, the folders hold what each fit left."
+    lead = "Each experiment was analysed by itself; the table is summary.csv, each folder holds the results of one fit."
     return Page("Many experiments", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
-_PICTURE = "A dot a specimen, at its posterior median, with its 90 % interval; red ones lie apart from their material."
+_PICTURE = "A dot a specimen, at its posterior median, with its 90 % interval; red ones are outliers of their material."
 _FILES = (
     ("summary.csv", "a row an experiment, with intervals"),
     ("batch.json", "the same as JSON, with outliers"),
     ("*/discovery.json", "what one experiment's model is missing"),
     ("*/summary.json", "one experiment's parameters"),
     ("*/*.svg", "one experiment's readings against its models"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 
 
@@ -76,7 +76,7 @@ def _known(fitted: list[dict[str, Any]]) -> Points:
     ]
     checks = Counter(row["check"] for row in fitted if row["check"])
     said += [f"Model check: {checks['passed']} passed, {checks['failed']} failed."] if checks else []
-    return Points("What is known", said or ["The parameters; nothing was looked for."])
+    return Points("What is known", said or ["The parameters; missing effects were not searched for."])
 
 
 def _unknown(rows: list[dict[str, Any]], configuration: dict[str, Any]) -> Points:
@@ -85,24 +85,24 @@ def _unknown(rows: list[dict[str, Any]], configuration: dict[str, Any]) -> Point
     checked = sum(row["p_global"] is not None for row in rows)
     if checked:
         said.append(
-            f"Were nothing missing anywhere, about {number(ALPHA * checked, 2)} of {checked} checks would fail by "
+            f"If nothing were missing anywhere, about {number(ALPHA * checked, 2)} of {checked} checks would fail by "
             f"chance, each at its level of {ALPHA:g}."
         )
     odd = [row["name"] for row in rows if row["warnings"]]
-    said += [f"Odd readings or fits: {_some(odd)}; the column warnings says how."] if odd else []
+    said += [f"Suspicious readings or fits: {_some(odd)}; the column warnings says how."] if odd else []
     return Points("How far it can be trusted", said or ["All fits converged."])
 
 
 def _outliers(fitted: list[dict[str, Any]], far: list[dict[str, Any]]) -> list[Block]:
     small = sorted(m for m, n in Counter(row["material"] for row in fitted).items() if n < LEAST_SPECIMENS)
     rule = (
-        "A specimen lies apart when a parameter's median is farther from the median of its material than the scatter "
-        f"of the others and its own uncertainty explain. Among alike specimens {100 * FALSE_ALARMS:g} % of materials "
-        "have any such specimen by chance."
+        "A specimen is an outlier when a parameter's median is farther from the median of its material than the "
+        f"scatter of the others and its own uncertainty explain. If all specimens are "
+        f"alike, {100 * FALSE_ALARMS:g} % of materials have an outlier by chance."
     )
     said = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
     if not far:
-        return [Text("No specimen lies apart from its material's others.", strong=True), Text(rule + said)]
+        return [Text("No specimen is an outlier of its material.", strong=True), Text(rule + said)]
     lines = [
         [o["experiment"], o["material"], o["parameter"], number(o["value"]), number(o["median"]), number(o["z"], 2)]
         for o in far[:_MOST_ROWS]

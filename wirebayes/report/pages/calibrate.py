@@ -28,7 +28,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 _FILES = (
     ("calibrate.json", "every number of this page as JSON"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 
 
@@ -97,7 +97,11 @@ def _biases(creep: dict[str, Any]) -> list[Block]:
     pairs = zip(creep["tension_bias_N"]["mean"], creep["tension_bias_N"]["sd"], strict=True)
     rows = [[str(i + 1), *("–" if v is None else f"{v:.3f}" for v in (mean, sd))] for i, (mean, sd) in enumerate(pairs)]
     return [
-        Table(["wire", "bias of its sensor, N", "standard error, N"], rows, "What each tension sensor reads too much.")
+        Table(
+            ["wire", "bias of its sensor, N", "standard error, N"],
+            rows,
+            "By how much each tension sensor reads too high.",
+        )
     ]
 
 

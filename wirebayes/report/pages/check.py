@@ -1,4 +1,4 @@
-"""The pages of ``wirebayes import`` and ``wirebayes check``: what was understood of a test, and what it can tell."""
+"""The pages of ``wirebayes import`` and ``wirebayes check``: what was understood, what a test can determine."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ _FILES = (
     ("*.toml", "the experiment, for every other command"),
     ("*.csv", "its readings"),
     ("check.json", "every number of this page as JSON"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 _TOLD = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
 
@@ -45,8 +45,8 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(
         meaning(("hold", "90 % interval", "prior"), [e for found_in in found.values() for e in found_in["effects"]])
     )
-    lead = "What was understood of the readings, what is odd about them, and what such a test can and cannot tell."
-    return Page("What this test can tell", lead, sections, f"Seed {configuration.get('seed')}.")
+    lead = "What was understood of the readings, what is suspicious, and what such a test can and cannot determine."
+    return Page("What this test can determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
 def _imported(e: dict[str, Any], picture: list[Block]) -> list[Block]:
@@ -57,7 +57,7 @@ def _imported(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     ]
     notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
     odd = e["warnings"] or ["Nothing."]
-    columns = [Points("What it is", about), Points("What was done", notes), Points("What is odd", odd)]
+    columns = [Points("What it is", about), Points("What was done", notes), Points("What is suspicious", odd)]
     return [Columns(columns), *picture]
 
 
@@ -70,10 +70,10 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]
     blind = [f"Effects it cannot show: {', '.join(_words(name) for name in hidden)}."] if hidden else []
     prior = [name for name, p in e["parameters"].items() if p["told_by"] == "prior"]
-    blind += [f"Parameters it says nothing of: {', '.join(prior)}."] if prior else []
-    columns = [Points("What it is", about), Points("What is odd", e["warnings"] or ["Nothing."])]
+    blind += [f"Parameters it does not determine: {', '.join(prior)}."] if prior else []
+    columns = [Points("What it is", about), Points("What is suspicious", e["warnings"] or ["Nothing."])]
     blocks: list[Block] = [
-        Columns([*columns, Points("What it cannot tell", blind or ["Nothing to report."])]),
+        Columns([*columns, Points("What it cannot determine", blind or ["Nothing to report."])]),
         *picture,
     ]
     rows = [
@@ -83,7 +83,7 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     ]  # fmt: skip
     caption = "A first estimate by a short run of the sampler; fit gives the posterior."
     blocks.append(
-        Table(["parameter", "median", "90 % interval", "prior's 90 %", "told by", "what it is"], rows, caption)
+        Table(["parameter", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"], rows, caption)
     )
     seen = [
         [_words(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]

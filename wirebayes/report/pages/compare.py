@@ -21,7 +21,7 @@ _CAPTIONS = {
 }
 _FILES = (
     ("comparison.json", "every number of this page, and every held-out reading with its predicted quantiles"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 
 
@@ -51,7 +51,7 @@ def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
         scores = (number(difference.get(key), 2) for key in ("elpd", "se"))
         lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _brief(r.get("meaning") or "")])
     blocks.append(
-        Table(header, lines, "Best first. The weight is the model's share in the mixture that predicts best.")
+        Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")
     )
     failed = [[r["name"], str(r["failed"])] for r in rows if r.get("failed") is not None]
     if failed:

@@ -49,7 +49,7 @@ _FILES = (
     ("discovery.json", "every number of this page as JSON"),
     ("*/*/summary.json", "parameters of a model"),
     ("*/*/posterior.nc", "all draws of a model, opens with ArviZ"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 
@@ -134,7 +134,7 @@ _words = spoken
 def _patterns(v: dict[str, Any]) -> dict[str, str]:
     """What the picture of each pattern shows."""
     return {
-        f"where-{w['covariate'].replace(' ', '-')}": f"What the plain model leaves over: {w['sentence']}"
+        f"where-{w['covariate'].replace(' ', '-')}": f"Residuals of the plain model: {w['sentence']}"
         for w in v.get("where", [])
     }
 
@@ -142,7 +142,7 @@ def _patterns(v: dict[str, Any]) -> dict[str, str]:
 def _alike(v: dict[str, Any]) -> str:
     """The near-equivalents of what is named: a headline that hides them would promise too much."""
     like = [_words(e) for e in v.get("group", []) if e not in (*v["effects"], *v["set"], "unknown")]
-    return f"; on this protocol hardly to be told apart from {listed(like)}" if like else ""
+    return f"; on this protocol hard to distinguish from {listed(like)}" if like else ""
 
 
 def _share(v: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ _FILES = (
     ("reprapfirmware.g", "lines for config.g of RepRapFirmware"),
     ("klipper.cfg", "sections for printer.cfg of Klipper"),
     ("robot.xml", "the robot for MuJoCo"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 
 

@@ -36,7 +36,7 @@ _DRAWS = 1000  # for bands in pictures: a 5 % quantile is then one between 3.6 %
 _FILES = (
     ("*/summary.json", "intervals, convergence and the model check as JSON"),
     ("*/posterior.nc", "all draws, opens with ArviZ"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 _SPOKEN = {"creep_2min_mm": "2 min", "creep_1h_mm": "1 h", "creep_1day_mm": "1 day"}
 
@@ -62,7 +62,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 
 def _told(summary: dict[str, Any]) -> Section:
-    """A fit with effects of the user's own, from its summary alone: a page runs nobody's code."""
+    """A fit with effects of the user's own, from its summary alone: a page never executes a user's code."""
     lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
     words = Text("Fitted with effects from a file of the user's own, so this section shows summary.json alone.")
     table = Table(["parameter", "median", "90 % interval"], lines)
@@ -201,7 +201,7 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tupl
         unit = unit_text(unit_of(name, effects)) or "–"
         lines.append([name, unit, number(middle), span(low, high), share, _means(name, effects)])
     caption = (
-        "In the interval lies the parameter with a probability of 90 %, if the model is right. "
+        "The interval contains the parameter with a probability of 90 %, if the model is right. "
         "The interval before the test is the prior's; a parameter is well known if it shrank by at least "
         f"{100 * LEAST_CONTRACTION:.0f} %."
     )

@@ -24,7 +24,7 @@ def measured(rows: Rows) -> Table:
 
 
 def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -> Table:
-    """Published and refitted parameters in one reading of the model.
+    """Published and refitted parameters in one interpretation of the model.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def posterior(rows: Rows, caption: str) -> Table:
 
 def held_out(rows: Rows, caption: str) -> Table:
     """How the forecasts of the unused holds did."""
-    header = ["sample", "reading of the model", "unused readings", "rms, N", "median width of band, N"]
+    header = ["sample", "interpretation of the model", "unused readings", "rms, N", "median width of band, N"]
     lines = []
     for r in rows:
         kept = "yes" if r["coverage_90"] >= LEAST_COVERAGE else "no"
@@ -149,7 +149,7 @@ def robot_mass(rows: Rows) -> Table:
 
 def sampling(rows: Rows) -> Table:
     """How the sampler did."""
-    header = ["sample", "reading of the model", "trained on", "converged", "autocorrelation time, steps"]
+    header = ["sample", "interpretation of the model", "trained on", "converged", "autocorrelation time, steps"]
     header += ["smallest ESS", "nested R-hat", "likelihood evaluations"]
     header += ["draws per evaluation", "per kept evaluation", "modes"]
     lines = []

@@ -23,7 +23,10 @@ from wirebayes.report.blocks import (
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
 
-_AIMS = {"parameters": "what they tell of the material", "creep": "how well the creep after an hour would be known"}
+_AIMS = {
+    "parameters": "how much they say about the material",
+    "creep": "how well the creep after an hour would be known",
+}
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -50,17 +53,17 @@ _PICTURE = (
 )
 _FILES = (
     ("plan.json", "every number of this page as JSON"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 
 
 def _asked(found: dict[str, Any]) -> Points:
     aim = found["aim"]
-    by = _AIMS[aim[0]] if len(aim) == 1 else f"how far {_words(aim[0])} and {_words(aim[1])} would lie apart"
+    by = _AIMS[aim[0]] if len(aim) == 1 else f"how well {_words(aim[0])} and {_words(aim[1])} would be distinguished"
     said = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
     if found["budget_min"] is not None:
-        said.append(f"There are {number(found['budget_min'])} min.")
-    return Points("What was asked", said)
+        said.append(f"Available time: {number(found['budget_min'])} min.")
+    return Points("What was requested", said)
 
 
 def _answered(found: dict[str, Any]) -> Points:
@@ -72,7 +75,7 @@ def _answered(found: dict[str, Any]) -> Points:
         f"{number(creep['sd_median'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
     )
     if not best["within_budget"]:
-        said.insert(0, "No test is done within the time there is.")
+        said.insert(0, "No test fits into the available time.")
     return Points("What to do", said)
 
 
@@ -100,7 +103,9 @@ def _ranking(found: dict[str, Any]) -> Table:
     ]  # fmt: skip
     header = ["rank", "test", "minutes", "bits", *(f"sd of {n}" for n in names), "sd of creep in 1 h, mm"]
     header += ["sd of the robot's drift in 1 h, mm"] if robot else []
-    return Table([*header, "in time"], lines, "Standard deviations of the posterior, median over the simulated tests.")
+    return Table(
+        [*header, "within budget"], lines, "Standard deviations of the posterior, median over the simulated tests."
+    )
 
 
 def _protocol(row: dict[str, Any]) -> list[Block]:
@@ -131,7 +136,7 @@ def _protocol(row: dict[str, Any]) -> list[Block]:
             for n, e in row["effects"].items()
         ]  # fmt: skip
         caption = "Smallest amplitude seen in 80 % of tests, its size δ in standard deviations, and what it looks like."
-        blocks.append(Table(["effect", "amplitude", "unit", "δ", "hardly told apart from"], shown, caption))
+        blocks.append(Table(["effect", "amplitude", "unit", "δ", "hard to distinguish from"], shown, caption))
     if row["not_identifiable"]:
         parts = [sentence.partition(": ")[::2] for sentence in row["not_identifiable"]]
         blocks.append(Table(["what", "why not"], [[_words(a), b] for a, b in parts], "What it would not show."))

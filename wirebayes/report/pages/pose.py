@@ -1,4 +1,4 @@
-"""The page of ``wirebayes pose``: where the platform goes, how sure that is, and where the doubt comes from."""
+"""The page of ``wirebayes pose``: where the platform goes, how sure that is, and where the uncertainty comes from."""
 
 import math
 from pathlib import Path
@@ -66,7 +66,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 _FILES = (
     ("pose.json", "every number of this page as JSON"),
     ("scene.json", "points and tensions of the view that can be turned"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 _TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "exit point")
 

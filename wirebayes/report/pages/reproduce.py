@@ -1,4 +1,4 @@
-"""The page of ``wirebayes reproduce``: the paper, with what is known and what is not."""
+"""The page of ``wirebayes reproduce``: the paper's results with their uncertainty."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -79,7 +79,11 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
             "fitted for it."
         ),
         paper_tables.table_4(
-            rows, "hold", "", "hooke", "Hold by hold, law (1): the reading under which Table 4 reproduces the tables."
+            rows,
+            "hold",
+            "",
+            "hooke",
+            "Hold by hold, law (1): the interpretation under which Table 4 reproduces the tables.",
         ),
     ]
     loose = [unbroken(r) for r in of_table_4(rows, "refitted") if r["not_held_back"]]
@@ -113,7 +117,7 @@ def _table_4_otherwise(tables: Tables, gallery: Gallery) -> Section:
         ("chain", "additive", "modified", "One history, additive, modified law (3)."),
     )
     blocks = [paper_tables.table_4(tables["least_squares"], *reading) for reading in readings]
-    return Section("Table 4 in the other readings of the model", blocks, folded=True)
+    return Section("Table 4 in the other interpretations of the model", blocks, folded=True)
 
 
 def _known(tables: Tables, gallery: Gallery) -> Section:
@@ -126,14 +130,14 @@ def _known(tables: Tables, gallery: Gallery) -> Section:
         "scale the interval has not shrunk to a third of its width before the test."
     )
     table = paper_tables.posterior(tables["posterior"], caption)
-    return Section("What the readings say of each published value", [words, *gallery("known"), table])
+    return Section("What the readings say about each published value", [words, *gallery("known"), table])
 
 
 def _figures(tables: Tables, gallery: Gallery) -> Section:
     words = Text(
         "The paper shows one unused hold for each wire, its curve starting from the first reading. Its figures 1 "
         "and 2 carry one caption (“last experiment for the Roc Line, L0=1m”); one of them is likely the 1.71 m "
-        "sample, so both are drawn. The bands are forecasts: they know the first five holds and this hold's first "
+        "sample, so both are drawn. The bands are predictions: they use the first five holds and this hold's first "
         "reading, nothing else."
     )
     rest = Text("All unused holds in the same way: what is left when the prediction is taken from the measurement.")
@@ -151,7 +155,7 @@ def _cannot_know(tables: Tables, gallery: Gallery) -> Section:
         "the same, most of all on nylon and the kite line: hold by hold, amount and rate are nearly inseparable, "
         "and the prior decides."
     )
-    return Section("What Table 4 cannot know", [ridge, *gallery("ridge"), rate, *gallery("amount-and-rate")])
+    return Section("What Table 4 does not determine", [ridge, *gallery("ridge"), rate, *gallery("amount-and-rate")])
 
 
 def _held_out(tables: Tables, gallery: Gallery) -> Section:
@@ -174,7 +178,7 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
         )
         blocks.append(Text(words))
     caption = (
-        "Forecasts of the unused holds from the first five. A band counts as reliable when at least "
+        "Predictions of the unused holds from the first five. A band counts as reliable when at least "
         f"{100 * LEAST_COVERAGE:.0f} % of the readings lie in it; 90 % should."
     )
     return Section("Where the model fails", [*blocks, *gallery("unused-chain"), paper_tables.held_out(rows, caption)])

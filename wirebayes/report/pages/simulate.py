@@ -28,7 +28,7 @@ _FILES = (
     ("experiments.toml", "the tests, for every other command"),
     ("*.csv", "readings of one test"),
     ("truth.json", "the true parameters and effects"),
-    ("configuration.json", "what was asked, with version and seed"),
+    ("configuration.json", "the options of this run, with version and seed"),
 )
 
 

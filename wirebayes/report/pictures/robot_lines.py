@@ -1,4 +1,4 @@
-"""Pictures that put several lines on one robot: drift against time, and where its doubt comes from."""
+"""Pictures that put several lines on one robot: drift against time, and where its uncertainty comes from."""
 
 from collections.abc import Mapping
 from typing import Any
