@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.discovery import gap
+from wirebayes.discovery import held_out
 from wirebayes.discovery.search import final_models, investigate
 from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE
@@ -29,13 +29,14 @@ def unseen(experiment, seed=0):
     rng = np.random.default_rng(seed)
     block = fitted([trained], (), "hooke", "saturating", rng)
     plain, final = (
-        gap.held_out([experiment], [TRAIN[experiment.name]], chosen, block, rng)[0] for chosen in ((), effects)
+        held_out.predicted([experiment], [TRAIN[experiment.name]], chosen, block, rng)[0] for chosen in ((), effects)
     )
     return {
         "verdict": verdict["verdict"], "set": verdict["set"], "accepted": verdict["accepted"], "p": verdict["p_global"],
         "plain_rmse_N": plain.rmse_N, "final_rmse_N": final.rmse_N, "reduction": 1 - final.rmse_N / plain.rmse_N,
         "plain_elpd": float(plain.elpd.sum()), "final_elpd": float(final.elpd.sum()),
-        "plain_inside_90": plain.inside, "final_inside_90": final.inside, "gap_closed": gap.gap_closed(plain, final),
+        "plain_inside_90": plain.inside, "final_inside_90": final.inside,
+        "gap_closed": held_out.gap_closed(plain, final),
     }  # fmt: skip
 
 

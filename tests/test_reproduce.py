@@ -16,20 +16,11 @@ from wirebayes.reproduce import verdicts
 from wirebayes.reproduce.held_out import HeldOut, published_course
 from wirebayes.reproduce.pictures import stiffest_step
 from wirebayes.results import jobs
-from wirebayes.results.contraction import contraction
 
 WIRES = {experiment.name: experiment for experiment in paper.experiments()}
 TABLE_4 = paper.published()["table_4"]
 NAMES = ("least_squares", "posterior", "creep", "held_out", "sampling", "measured", "robot", "robot_mass",
          "robot_claim")  # fmt: skip
-
-
-def test_contraction_is_the_ratio_of_widths_on_a_logarithmic_scale():
-    rng = np.random.default_rng(0)
-    prior, posterior = np.exp(1.5 * rng.normal(size=200_000)), np.exp(3.0 + 0.3 * rng.normal(size=200_000))
-    assert contraction(posterior, prior) == pytest.approx(1 - 0.3 / 1.5, abs=0.005)
-    assert contraction(prior, prior) == 0.0
-    assert contraction(prior**2, prior) == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize(

@@ -55,17 +55,17 @@ def test_more_holds_show_smaller_effects(loading, unloading):
 def test_parameters_lie_where_the_truth_is_and_the_prior_is_named_where_it_answers(loading):
     parameters = loading[1].parameters
     for name, value in WIRE.items():
-        told_by, low, high = (parameters[name][key] for key in ("told_by", "q05", "q95"))
+        determined_by, low, high = (parameters[name][key] for key in ("determined_by", "q05", "q95"))
         width = np.log(high / low) if name != "preload" else high - low
         away = (
             abs(np.log(parameters[name]["q50"] / value)) if name != "preload" else abs(parameters[name]["q50"] - value)
         )
         assert away < 1.5 * width, name
-        assert told_by in ("data", "data and prior", "prior")
-    assert parameters["k1"]["told_by"] == "data"
+        assert determined_by in ("data", "data and prior", "prior")
+    assert parameters["k1"]["determined_by"] == "data"
     short = told(Bench(displacements_mm=(1, 2), times_s=(0.0, 1.0, 2.0)))[1]
-    assert short.parameters["U"]["told_by"] == "prior"
-    assert short.parameters["N"]["told_by"] != "data"
+    assert short.parameters["U"]["determined_by"] == "prior"
+    assert short.parameters["N"]["determined_by"] != "data"
     assert {found["reason"] for found in short.effects.values()} == {"fewer readings than parameters"}
 
 

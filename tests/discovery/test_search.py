@@ -8,7 +8,7 @@ import pytest
 
 from analyses.hidden_effects.cases import SIZES, seal, specs
 from wirebayes import cli, workers
-from wirebayes.discovery import gap, linear_scan, power, screening
+from wirebayes.discovery import held_out, linear_scan, power, screening
 from wirebayes.discovery.search import discover, final_models, investigate
 from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE, named
@@ -255,9 +255,9 @@ def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp
 
 
 def test_the_gap_is_measured_against_the_noise_floor() -> None:
-    def held(rmse: float) -> gap.HeldOut:
-        return gap.HeldOut([9], rmse**2, 5, 0.01**2, np.zeros(1), 0.9)
+    def held(rmse: float) -> held_out.HeldOut:
+        return held_out.HeldOut([9], rmse**2, 5, 0.01**2, np.zeros(1), 0.9)
 
-    assert gap.gap_closed(held(0.10), held(0.01)) == pytest.approx(1.0)
-    assert gap.gap_closed(held(0.10), held(0.10)) == pytest.approx(0.0)
-    assert gap.gap_closed(held(0.005), held(0.004)) is None
+    assert held_out.gap_closed(held(0.10), held(0.01)) == pytest.approx(1.0)
+    assert held_out.gap_closed(held(0.10), held(0.10)) == pytest.approx(0.0)
+    assert held_out.gap_closed(held(0.005), held(0.004)) is None

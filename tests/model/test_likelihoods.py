@@ -100,6 +100,7 @@ def test_dropping_the_carried_creep_is_noticed():
 @settings(max_examples=40, deadline=None)
 def test_leaving_a_hold_out_is_dense_conditioning(p, theta, errors, seed):
     theta = theta | errors
+    assume(theta["preload"] == 0 or abs(theta["preload"]) > 1e-3)  # on the brink of slackness, as above
     y = measured(p, theta, seed=seed)
     r, covariance, hold = normal(p, theta, Model(), y, 0.01)
     line = linearise(p, columns(theta))

@@ -203,7 +203,7 @@ def _checked(name: str, test: dict[str, Any]) -> list[str]:
         number = "-" if hold["number"] is None else hold["number"]
         lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
     for teller in ("data", "data and prior", "prior"):
-        told = [f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["told_by"] == teller]
+        told = [f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == teller]
         lines += _wrapped(f"parameters from the {teller}", told)
     for shows, words in _SHOWS.items():
         effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]

@@ -16,6 +16,7 @@ from wirebayes.discovery.linear_scan import expand
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
+from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, taught
 from wirebayes.wire.effect import Effect
 
@@ -23,7 +24,6 @@ Array = NDArray[Any]
 
 SIMULATIONS = 199  # the level that one in twenty-five passes by chance is then the eighth largest
 UNUSUAL = 2.0  # standard deviations of an effect's prior: few wires show it as large
-UNTOLD, TOLD = 0.3, 0.9  # contraction below which the prior answers, and from which on the data do
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Preview:
     Attributes
     ----------
     parameters : dict
-        Of each: ``q05``, ``q50``, ``q95``, ``prior_q05``, ``prior_q95``, and ``told_by``: data, data and prior, or
-        prior.
+        Of each: ``q05``, ``q50``, ``q95``, ``prior_q05``, ``prior_q95``, and ``determined_by``:
+        data, data and prior, or prior.
     effects : dict
         Of each: ``amplitude_80``, the smallest that would be detected in four tests of five, its ``unit``, and
         whether the test ``shows`` it: yes (at usual sizes), if unusually large, or no, and the ``reason``.
@@ -63,23 +63,17 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     sample = problem.samples[0]
     own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
     said = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), taught(own, prior)]
-    parameters = {
-        name: _told(theta[:, i], before[:, i], name in problem.prior.logarithmic)
-        for i, name in enumerate(problem.names)
-    }
+    parameters = {name: _range(theta[:, i], before[:, i]) for i, name in enumerate(problem.names)}
     return Preview(parameters, _effects(block, kinds, rng), [sentence for sentence in said if sentence])
 
 
-def _told(draws: Array, before: Array, positive: bool) -> dict[str, Any]:
-    """One parameter: its range now and before, and who tells it."""
+def _range(draws: Array, before: Array) -> dict[str, Any]:
+    """One parameter: its range after and before the test, and what determines it."""
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
     prior_low, prior_high = np.quantile(before, [0.05, 0.95])
-    spread = [float(np.var(np.log(x) if positive else x)) for x in (draws, before)]
-    contraction = 1.0 - spread[0] / spread[1]
-    told_by = "prior" if contraction < UNTOLD else "data" if contraction >= TOLD else "data and prior"
     return {
         "q05": float(low), "q50": float(middle), "q95": float(high), "prior_q05": float(prior_low),
-        "prior_q95": float(prior_high), "told_by": told_by,
+        "prior_q95": float(prior_high), "determined_by": source(contraction(draws, before)),
     }  # fmt: skip
 
 

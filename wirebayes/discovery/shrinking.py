@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery import gap
+from wirebayes.discovery import held_out
 from wirebayes.discovery.settings import KEEP_ELPD
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
@@ -16,6 +16,10 @@ from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
 _NOTHING: dict[str, Any] = {"rmse_N": None, "elpd": None, "coverage_90": None}
+_NOT_HELD_OUT: dict[str, Any] = {
+    "holds": [], "plain": _NOTHING, "final": _NOTHING | {"elpd_difference_se": None}, "gap_closed": None,
+    "shrinks": False,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -64,66 +68,114 @@ def shrinking(
     list of Shrinking
         One for each experiment of the block.
     """
-    members, train = plain.experiments, [gap.last_third(e) for e in plain.experiments]
+    train = [held_out.last_third(e) for e in plain.experiments]
     models = ["plain", *names]
     if not all(train):
-        no_score = _NOTHING | {"elpd_difference_se": None}
-        nothing: dict[str, Any] = {
-            "holds": [],
-            "plain": _NOTHING,
-            "final": no_score,
-            "gap_closed": None,
-            "shrinks": False,
-        }
-        return [Shrinking(nothing, [{"model": m} | _NOTHING for m in models]) for _ in members]
-    # whole blocks first, then each experiment alone with a discrepancy beside the plain model, and beside the effects
-    asked: list[tuple[Any, ...]] = [(members, train, b.effects, b) for b in (plain, *stages)]
-    whole = [plain, *stages[-1:]]
-    beside = [plain] * (remains or bool(stages)) + [*stages[-1:]] * remains
-    for base in beside:
-        first = [e.train(k) for e, k in zip(members, train, strict=True)]
-        blocks = repeat(base)
-        added = list(parallel_map(with_discrepancy, blocks, [*members, *first], rng.spawn(2 * len(members))))
-        n = len(members)
-        alone = [(e,) for e in members]
-        laws = repeat(base.law), repeat(base.history)
-        whole += parallel_map(fitted, alone, added[:n], *laws, rng.spawn(n))
-        asked += zip(alone, [(k,) for k in train], added[n:], repeat(base), strict=False)
-    predicted: list[list[gap.HeldOut]] = list(
-        parallel_map(gap.held_out, *zip(*asked, strict=True), rng.spawn(len(asked)))
-    )
-    left_out = list(parallel_map(gap.leave_one_hold_out, whole, rng.spawn(len(whole)))) if len(whole) > 1 else []
-    by_step, alone_ = predicted[: 1 + len(stages)], [part[0] for part in predicted[1 + len(stages) :]]
-    n = len(members)
-    flexible = alone_[:n]
+        steps = [{"model": m} | _NOTHING for m in models]
+        return [Shrinking(dict(_NOT_HELD_OUT), [dict(step) for step in steps]) for _ in train]
+    smooth = [_beside_discrepancy(plain, train, rng, parallel_map)] if remains or stages else []
+    if remains and stages:
+        smooth.append(_beside_discrepancy(stages[-1], train, rng, parallel_map))
+    trained = [_Trained(plain.experiments, train, b.effects, b) for b in (plain, *stages)]
+    trained += [t for beside in smooth for t in beside.trained]
+    found = list(parallel_map(_predicted, trained, rng.spawn(len(trained))))
+    by_step, alone_ = found[: len(models)], [part[0] for part in found[len(models) :]]
+    n = len(train)
+    flexible = alone_[:n] if smooth else [None] * n
     final = alone_[-n:] if remains else by_step[-1]
-    summary: dict[str, float] | None = None
-    shrinks = False
-    if left_out:
-        bare, loose = left_out[0], np.concatenate(left_out[1 + bool(stages) : 1 + bool(stages) + n])
-        last = np.concatenate(left_out[-n:]) if remains else left_out[1]
-        difference = last - bare
-        gain, se = float(difference.sum()), float(difference.std(ddof=1) * np.sqrt(len(difference)))
-        smooth = float((loose - bare).sum())
-        summary = {"elpd_difference": gain, "elpd_difference_se": se, "flexible_elpd_difference": smooth}
-        shrinks = gain > max(KEEP_ELPD, 2.0 * se) and gain >= smooth
+    fits = [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
+    gain = _gain(fits, len(stages[-1:]), n, remains, rng, parallel_map) if smooth else None
     out = []
-    for i, (a, b) in enumerate(zip(by_step[0], final, strict=True)):
-        d = b.elpd - a.elpd
-        spread = float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None
-        held = {
-            "holds": a.holds,
-            "plain": _score(a),
-            "final": _score(b) | {"elpd_difference_se": spread},
-            "flexible": _score(flexible[i]) if flexible else None,
-            "floor_N": float(np.sqrt(b.floor)),
-            "gap_closed": gap.gap_closed(a, b) if left_out else None,
-            "leave_one_hold_out": summary,
-            "shrinks": shrinks,
-        }
+    for i, before in enumerate(by_step[0]):
+        report = _compared(before, final[i], flexible[i], gain)
         steps = [{"model": m} | _score(part[i]) for m, part in zip(models, by_step, strict=True)]
-        out.append(Shrinking(held, steps))
+        out.append(Shrinking(report, steps))
     return out
+
+
+@dataclass(frozen=True)
+class _Trained:
+    """What `wirebayes.discovery.held_out.predicted` needs: experiments, holds to train on, effects, and a fit."""
+
+    experiments: tuple[Experiment, ...]
+    train: Sequence[int]
+    effects: tuple[Effect, ...]
+    block: LaplaceFit
+
+
+def _predicted(trained: _Trained, rng: np.random.Generator) -> list[held_out.HeldOut]:
+    return held_out.predicted(trained.experiments, trained.train, trained.effects, trained.block, rng)
+
+
+@dataclass(frozen=True)
+class _Smooth:
+    """Each experiment of a block alone with a smooth discrepancy: fits of the whole, and trained to predict."""
+
+    fits: list[LaplaceFit]
+    trained: list[_Trained]
+
+
+def _beside_discrepancy(
+    base: LaplaceFit, train: Sequence[int], rng: np.random.Generator, parallel_map: ParallelMap
+) -> _Smooth:
+    """A smooth discrepancy beside the effects of `base`, its size what they leave over in the holds trained on."""
+    members, n = base.experiments, len(base.experiments)
+    first = [e.train(k) for e, k in zip(members, train, strict=True)]
+    added = list(parallel_map(with_discrepancy, repeat(base), [*members, *first], rng.spawn(2 * n)))
+    alone = [(e,) for e in members]
+    fits = parallel_map(fitted, alone, added[:n], repeat(base.law), repeat(base.history), rng.spawn(n))
+    trained = [_Trained(e, (k,), extra, base) for e, k, extra in zip(alone, train, added[n:], strict=True)]
+    return _Smooth(list(fits), trained)
+
+
+@dataclass(frozen=True)
+class _Gain:
+    """By how much the final model, and the plain one with a smooth discrepancy, predict left-out holds better."""
+
+    final: float
+    standard_error: float
+    flexible: float
+
+    @property
+    def shrinks(self) -> bool:
+        """Clearly better than plain, and no worse than the smooth discrepancy."""
+        return self.final > max(KEEP_ELPD, 2.0 * self.standard_error) and self.final >= self.flexible
+
+    def to_dict(self) -> dict[str, float]:
+        return {
+            "elpd_difference": self.final,
+            "elpd_difference_se": self.standard_error,
+            "flexible_elpd_difference": self.flexible,
+        }
+
+
+def _gain(
+    fits: Sequence[LaplaceFit], named: int, n: int, remains: bool, rng: np.random.Generator, parallel_map: ParallelMap
+) -> _Gain:
+    """Leave out each hold of the fits: plain, with the effects (`named` is 1 or 0), then n of each smooth lot."""
+    elpd = list(parallel_map(held_out.leave_one_hold_out, fits, rng.spawn(len(fits))))
+    plain, smooth = elpd[0], np.concatenate(elpd[1 + named : 1 + named + n])
+    difference = (np.concatenate(elpd[-n:]) if remains else elpd[1]) - plain
+    spread = float(difference.std(ddof=1) * np.sqrt(len(difference)))
+    return _Gain(float(difference.sum()), spread, float((smooth - plain).sum()))
+
+
+def _compared(
+    plain: held_out.HeldOut, final: held_out.HeldOut, flexible: held_out.HeldOut | None, gain: _Gain | None
+) -> dict[str, Any]:
+    """What the report says of the held-out holds of one experiment."""
+    d = final.elpd - plain.elpd
+    spread = float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None
+    return {
+        "holds": plain.holds,
+        "plain": _score(plain),
+        "final": _score(final) | {"elpd_difference_se": spread},
+        "flexible": _score(flexible) if flexible else None,
+        "floor_N": float(np.sqrt(final.floor)),
+        "gap_closed": held_out.gap_closed(plain, final) if gain else None,
+        "leave_one_hold_out": gain.to_dict() if gain else None,
+        "shrinks": gain is not None and gain.shrinks,
+    }
 
 
 def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.Generator) -> tuple[Effect, ...]:
@@ -163,5 +215,5 @@ def left_over(block: LaplaceFit, name: str) -> float:
     return float(np.sqrt((((sample.readings - line.tension)[sample.protocol.mask]) ** 2).mean()))
 
 
-def _score(held: gap.HeldOut) -> dict[str, Any]:
+def _score(held: held_out.HeldOut) -> dict[str, Any]:
     return {"rmse_N": held.rmse_N, "elpd": float(held.elpd.sum()), "coverage_90": held.inside}

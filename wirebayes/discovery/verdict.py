@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.discovery import gap, model_space, residual_patterns, screening
+from wirebayes.discovery import held_out, model_space, residual_patterns, screening
 from wirebayes.discovery.global_test import simulated_with_patterns
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior, smallest_set
@@ -197,7 +197,7 @@ def _gain(
     before = plain if earlier is None else earlier.blocks
     on = list(best.accepted[-1].blocks)
     fits = [version[b] for version in (best.blocks, before) for b in on]
-    elpd = [float(v.sum()) for v in parallel_map(gap.leave_one_hold_out, fits, rng.spawn(len(fits)))]
+    elpd = [float(v.sum()) for v in parallel_map(held_out.leave_one_hold_out, fits, rng.spawn(len(fits)))]
     out = np.zeros(len(plain))
     out[on] = np.subtract(elpd[: len(on)], elpd[len(on) :])
     return out

@@ -60,31 +60,85 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     holds, _, n = line.tension.shape
     out = np.zeros((holds, n))
     mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
-    setting_var = setting_sd * setting_sd
-    weight = 1.0 / variance
-    log_variance = np.log(variance) + _LOG_2PI
+    noise = _Noise.of(variance, setting_sd)
     for j in range(holds):
-        m, p = mean[j], var[j]
-        a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-        if not mask[j].any():
-            mean[j + 1], var[j + 1] = a * m, a * a * p + c * c * setting_var
-            continue
-        keep = slice(None) if mask[j].all() else mask[j]
-        by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
-        r = readings[j][keep] - line.tension[j][keep] - by_c * m
-        cc, cs, ss, det, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, p, setting_var)
-        cr = np.einsum("rn,rn->n", by_c, r) * weight
-        sr = np.einsum("rn,rn->n", by_s, r) * weight
-        post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
-        pull_c = ((1.0 + setting_var * ss) * cr - setting_var * cs * sr) / det
-        pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
-        # a sum of squares: the shorter difference of products can turn negative at absurd parameters
-        left = r - by_c * post_c - by_s * post_s
-        square = np.einsum("rn,rn->n", left, left) * weight + p * pull_c**2 + setting_var * pull_s**2
-        out[j] = -0.5 * (square + r.shape[0] * log_variance + np.log(det))
-        mean[j + 1] = a * (m + post_c) + c * post_s
-        var[j + 1] = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
+        if mask[j].any():
+            out[j], mean[j + 1], var[j + 1] = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise)
+        else:
+            a, c = line.carry_by_creep[j], line.carry_by_setting[j]
+            mean[j + 1], var[j + 1] = a * mean[j], a * a * var[j] + c * c * noise.setting_var
     return Filtered(out, mean, var)
+
+
+def held_out(
+    line: Linearised,
+    readings: Array,
+    mask: Array,
+    asked: NDArray[np.bool_],
+    variance: Array,
+    setting_sd: Array,
+    first_only: bool = False,
+) -> Array:
+    """Log probability of each held-out hold given the holds before it that are not held out.
+
+    Parameters
+    ----------
+    line, readings, mask, variance, setting_sd
+        As for `chain`; the mask covers all readings.
+    asked : (H,) bool array
+        Which holds are held out.
+    first_only : bool
+        Of each held-out hold only the first reading.
+
+    Returns
+    -------
+    (holds asked, n) array
+    """
+    before = chain(line, readings, mask & ~asked[:, None], variance, setting_sd)
+    noise = _Noise.of(variance, setting_sd)
+    rows = mask & (np.arange(mask.shape[1]) == 0) if first_only else mask
+    mean, var = before.carried_mean, before.carried_var
+    holds = np.flatnonzero(asked).tolist()
+    return np.array([_hold(line, j, readings[j], rows[j], mean[j], var[j], noise)[0] for j in holds])
+
+
+@dataclass(frozen=True, slots=True)
+class _Noise:
+    """Of each of n parameter sets: 1 / variance of a reading, its log normal density's constant, setting variance."""
+
+    weight: Array
+    log_variance: Array
+    setting_var: Array
+
+    @classmethod
+    def of(cls, variance: Array, setting_sd: Array) -> "_Noise":
+        return cls(1.0 / variance, np.log(variance) + _LOG_2PI, setting_sd * setting_sd)
+
+
+def _hold(
+    line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise
+) -> tuple[Array, Array, Array]:
+    """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`.
+
+    Returns the log density of the readings, and the mean and the variance of the creep that it carries on.
+    """
+    weight, setting_var = noise.weight, noise.setting_var
+    keep = slice(None) if mask.all() else mask
+    by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
+    r = readings[keep] - line.tension[j][keep] - by_c * m
+    cc, cs, ss, det, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, p, setting_var)
+    cr = np.einsum("rn,rn->n", by_c, r) * weight
+    sr = np.einsum("rn,rn->n", by_s, r) * weight
+    post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
+    pull_c = ((1.0 + setting_var * ss) * cr - setting_var * cs * sr) / det
+    pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
+    # a sum of squares: the shorter difference of products can turn negative at absurd parameters
+    left = r - by_c * post_c - by_s * post_s
+    square = np.einsum("rn,rn->n", left, left) * weight + p * pull_c**2 + setting_var * pull_s**2
+    log_density = -0.5 * (square + r.shape[0] * noise.log_variance + np.log(det))
+    a, c = line.carry_by_creep[j], line.carry_by_setting[j]
+    mean = a * (m + post_c) + c * post_s
+    return log_density, mean, a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
 
 
 def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> tuple[Array, ...]:

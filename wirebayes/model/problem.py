@@ -178,30 +178,13 @@ def build(
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
         materials.setdefault(experiment.material, []).append(experiment)
-    several_materials, several = len(materials) > 1, len(experiments) > 1
+    several = len(experiments) > 1
     distributions: dict[str, Any] = {}
-    samples = []
+    samples: list[Sample] = []
     for material, members in materials.items():
-        lengths = {e.length_mm for e in members}
-        # one length is its own mean to the last bit, which exp(log) is not
-        reference = float(np.exp(np.mean(np.log([e.length_mm for e in members])))) if len(lengths) > 1 else max(lengths)
-        defaults = wire_defaults(reference)
-        mark = f"[{material}]" if several_materials else ""
-        distributions |= {f"{name}{mark}": defaults[name] for name in MATERIAL}
-        tension = tension_reference(np.concatenate([h.tension_N for e in members for h in e.holds]))
-        if len(lengths) > 1:
-            distributions[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
-        for effect in effects:
-            suffix = mark if effect.scope == "material" else ""
-            distributions |= {f"{c}{suffix}": a.prior for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
-        for experiment in members:
-            largest = max((float(np.abs(h.tension_N).max()) for h in experiment.recorded_holds), default=0.0)
-            acting = tuple(e for e in effects if not isinstance(e, EventEffect) or e.test in ("", experiment.name))
-            model = Model(law, history, acting, tension, reference if len(members) > 1 else 0.0)
-            samples.append(
-                Sample(experiment.name, material, experiment.protocol(), experiment.tension()[..., None],
-                       max(experiment.resolution_N, FINEST * largest), model)
-            )  # fmt: skip
+        mark = f"[{material}]" if len(materials) > 1 else ""
+        distributions |= _material_priors(members, effects, mark, length_exponent)
+        samples += _samples(members, effects, law, history)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
         defaults = wire_defaults(experiment.length_mm)
@@ -213,6 +196,43 @@ def build(
     free = {name: d for name, d in distributions.items() if name not in fixed}
     logarithmic = frozenset(n for n, d in free.items() if n.split("[")[0] in _POSITIVE | shapes and d.support()[0] >= 0)
     return Problem(tuple(samples), Prior(free, fixed, logarithmic), likelihood)
+
+
+def _reference_length(members: Sequence[Experiment]) -> float:
+    """Geometric mean of the lengths, mm: B belongs to it."""
+    lengths = {e.length_mm for e in members}
+    # one length is its own mean to the last bit, which exp(log) is not
+    return float(np.exp(np.mean(np.log([e.length_mm for e in members])))) if len(lengths) > 1 else max(lengths)
+
+
+def _material_priors(
+    members: Sequence[Experiment], effects: Sequence[Effect], mark: str, length_exponent: Any
+) -> dict[str, Any]:
+    """Default priors of what the samples of one material share; `mark` tells materials apart in the names."""
+    defaults = wire_defaults(_reference_length(members))
+    out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in MATERIAL}
+    if len({e.length_mm for e in members}) > 1:
+        out[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
+    for effect in effects:
+        suffix = mark if effect.scope == "material" else ""
+        out |= {f"{c}{suffix}": a.prior for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
+    return out
+
+
+def _samples(
+    members: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History
+) -> list[Sample]:
+    """The experiments of one material as the likelihood sees them."""
+    tension = tension_reference(np.concatenate([h.tension_N for e in members for h in e.holds]))
+    length = _reference_length(members) if len(members) > 1 else 0.0
+    out = []
+    for e in members:
+        largest = max((float(np.abs(h.tension_N).max()) for h in e.recorded_holds), default=0.0)
+        present = tuple(x for x in effects if not isinstance(x, EventEffect) or x.test in ("", e.name))
+        model = Model(law, history, present, tension, length)
+        finest = max(e.resolution_N, FINEST * largest)
+        out.append(Sample(e.name, e.material, e.protocol(), e.tension()[..., None], finest, model))
+    return out
 
 
 def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> None:

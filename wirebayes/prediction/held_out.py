@@ -207,25 +207,21 @@ def _chain_scores(
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
     problem, here = fitted.problem, fitted.problem.samples[sample]
     whole, tension = experiment.protocol(), experiment.tension()[..., None]
-    parts: dict[tuple[int, str], list[Array]] = {}
+    parts: list[tuple[Array, Array, Array]] = []
     theta = thinned(fitted.flat)
     for start in range(0, len(theta), _CHUNK):
         own = problem.parameters(theta[start : start + _CHUNK], here)
         line = linearise(whole, own, here.model)
-        variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N)
+        noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N), own["setting_sd"]
         with np.errstate(all="ignore"):
-            for j in np.flatnonzero(asked):
-                for what in ("whole", "first"):
-                    mask = whole.mask & ~asked[:, None]
-                    mask[j] = whole.mask[j] if what == "whole" else np.arange(mask.shape[1]) == 0
-                    log_p = likelihoods.chain(line, tension, mask, variance, own["setting_sd"]).log_likelihood[j]
-                    parts.setdefault((int(j), what), []).append(log_p)
-            every = likelihoods.chain(line, tension, whole.mask, variance, own["setting_sd"]).log_likelihood
-            parts.setdefault((-1, "whole"), []).append(every[asked].sum(axis=0))
-    mean = {key: _log_mean(np.concatenate(values)) for key, values in parts.items()}
-    each = np.array([mean[int(j), "whole"] for j in np.flatnonzero(asked)])
-    first = np.array([mean[int(j), "first"] for j in np.flatnonzero(asked)])
-    return each, each - first, mean[-1, "whole"]
+            holds, first = (
+                likelihoods.held_out(line, tension, whole.mask, asked, *noise, first_only=only)
+                for only in (False, True)
+            )
+            together = likelihoods.chain(line, tension, whole.mask, *noise).log_likelihood[asked].sum(axis=0)
+        parts.append((holds, first, together))
+    whole_hold, first_reading, every = (_log_mean(np.concatenate(v, axis=-1)) for v in zip(*parts, strict=True))
+    return whole_hold, whole_hold - first_reading, float(every)
 
 
 def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, asked: NDArray[np.bool_]) -> Array:
@@ -234,12 +230,13 @@ def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, asked: NDArra
     own = own | {"preload": 0.0 * own["k1"]}
     variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N)
     log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
-    return np.array([_log_mean(log_p[j]) for j in np.flatnonzero(asked)])
+    return _log_mean(log_p[asked])
 
 
-def _log_mean(log_p: Array) -> float:
+def _log_mean(log_p: Array) -> Array:
+    """(...) logarithm of the mean density over draws (..., n)."""
     finite = np.where(np.isfinite(log_p), log_p, -np.inf)
-    return float(logsumexp(finite) - np.log(len(finite)))
+    return np.asarray(logsumexp(finite, axis=-1) - np.log(finite.shape[-1]))
 
 
 def train_counts(recorded: int) -> list[int]:

@@ -1,7 +1,7 @@
 """What the readings say about each published value: inside the posterior's interval, outside, or not determined.
 
-A parameter counts as determined by the readings when its 90 % interval, on a logarithmic scale, has less than a third
-of the width it had before the test. The share by which it shrank is its *contraction*.
+A parameter counts as determined by the readings when they took away nine tenths of its prior variance, on a
+logarithmic scale: its interval has then less than a third of the width it had before the test.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.model.problem import MATERIAL
-from wirebayes.results.contraction import LEAST_CONTRACTION, contraction, interval
+from wirebayes.results.contraction import MOST, contraction, interval
 from wirebayes.results.store import CREEP_TIMES_S, unit_of
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model
@@ -30,13 +30,13 @@ def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict
     low, high : float
         Ends of the posterior's 90 % interval.
     shrunk : float
-        The contraction: share by which the prior's interval shrank.
+        The contraction (`wirebayes.results.contraction.contraction`).
 
     Returns
     -------
     {"inside", "outside", "not determined"}
     """
-    if shrunk < LEAST_CONTRACTION:
+    if shrunk < MOST:
         return "not determined"
     return "inside" if low <= published <= high else "outside"
 

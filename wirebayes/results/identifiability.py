@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference.fit import Fit
 from wirebayes.model.prior import fast_logpdf
+from wirebayes.results.contraction import contraction, source
 from wirebayes.wire.fresh import FreshSample
 
 Array = NDArray[Any]
@@ -59,9 +60,10 @@ class Taught:
         """The same in words."""
         sign = "×" if self.is_factor else ""
         ranges = f"its 90 % range is {sign}{self.posterior_range:.3g}, the prior's {sign}{self.prior_range:.3g}"
-        if self.contraction < 0.3:
+        determined_by = source(self.contraction)
+        if determined_by == "prior":
             verdict = "the data say next to nothing about it, the interval is the prior's"
-        elif self.prior_sensitivity > SENSITIVE or self.contraction < 0.9:
+        elif self.prior_sensitivity > SENSITIVE or determined_by != "data":
             verdict = f"data and prior both determine it (sensitivity to the prior {self.prior_sensitivity:.2f})"
         else:
             verdict = "the data determine it"
@@ -96,13 +98,12 @@ def identifiability(fitted: Fit) -> list[Taught]:
         distribution = prior.distributions[name]
         before = distribution.ppf([0.05, 0.95])
         sample = distribution.rvs(size=20000, random_state=np.random.default_rng(0))
-        spread = np.std(np.log(sample) if positive[i] else sample)
         after = np.quantile(theta[:, i], [0.05, 0.95])
         along = [j for j in range(len(names)) if j != i and abs(correlation[i, j]) > RIDGE]
         out.append(
             Taught(
                 name=name,
-                contraction=float(1.0 - z[:, i].var(ddof=1) / spread**2),
+                contraction=contraction(theta[:, i], sample),
                 prior_range=float(before[1] / before[0] if positive[i] else before[1] - before[0]),
                 posterior_range=float(after[1] / after[0] if positive[i] else after[1] - after[0]),
                 is_factor=bool(positive[i]),

@@ -246,33 +246,16 @@ def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]
 
 
 def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator) -> Any:
+    """The content of ``posterior.nc``: of one sample as if it stood alone, or of all samples."""
     problem, (m, draws, _) = fit.problem, fit.theta.shape
     members = list(problem.samples) if sample is None else [sample]
-    variables, few = _variables(problem, fit.theta, sample), np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS))
-    few = np.unique(few.astype(int))
+    few = np.unique(np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int))
     chosen = fit.theta[:, few].reshape(-1, fit.theta.shape[-1])
-    prior = problem.prior.rvs(2000, rng)
-    tree = arviz_base.from_dict(
-        {
-            "posterior": variables,
-            "sample_stats": {"lp": fit.log_density},
-            "prior": _variables(problem, prior[None], sample),
-        },
-        dims={name: ["experiment"] for name, v in variables.items() if v.ndim > 2},
-        coords={} if sample else {"experiment": [s.name for s in members]},
-    )
-    left_out = _left_out(problem, fit.flat)
+    tree = _parameters_tree(fit, sample, members, rng)
     replicated = {s.name: np.moveaxis(replicate(problem, chosen, s, rng), -1, 0) for s in members}
     groups = {
         "posterior_predictive": _readings(members, replicated, (m, len(few))),
-        "log_likelihood": {
-            "tension_N": (
-                ("chain", "draw", "hold"),
-                np.concatenate(
-                    [left_out[i][s.protocol.recorded] for i, s in enumerate(problem.samples) if s in members]
-                ).T.reshape(m, draws, -1),
-            )
-        },
+        "log_likelihood": _log_likelihood(fit, members),
         "observed_data": _readings(members, {s.name: np.moveaxis(s.readings, -1, 0) for s in members}, ()),
         "constant_data": _protocols(members),
     }
@@ -282,28 +265,36 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
         if group in sampled:
             coords |= {"chain": np.arange(m), "draw": sampled[group]}
         tree[group] = xr.DataTree(xr.Dataset(data, coords=coords))
-    about = {
-        "wirebayes_version": __version__,
-        "inference_library": "emcee",
-        "experiment": members[0].name,
-        "experiments": json.dumps([s.name for s in members]),
-        "material": members[0].material,
-        "length_mm": members[0].protocol.length_mm,
-        "lengths_mm": json.dumps([s.protocol.length_mm for s in members]),
-        "resolutions_N": json.dumps([s.resolution_N for s in members]),
-        "elastic_law": members[0].model.law,
-        "history": members[0].model.history,
-        "likelihood": problem.likelihood,
-        "effects": json.dumps([e.key for e in members[0].model.effects]),
-        "tension_ref_N": members[0].model.tension_ref_N,
-        "tension_range_N": [float(np.min([s.readings[..., 0][s.protocol.mask].min() for s in members])),
-                            float(np.max([s.readings[..., 0][s.protocol.mask].max() for s in members]))],
-        "time_range_s": [0.0, float(max(s.protocol.duration_s.max() for s in members))],
-        "walkers": fit.chains.z.shape[2],
-        "thin": fit.thin,
-        "converged": int(fit.chains.converged),
-        "provenance": json.dumps(dict(provenance)),
-    }  # fmt: skip
+    _label(tree, fit, members, provenance)
+    return tree
+
+
+def _parameters_tree(fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: np.random.Generator) -> Any:
+    """Posterior and prior draws of the parameters, and the log density."""
+    problem = fit.problem
+    variables = _variables(problem, fit.theta, sample)
+    prior = problem.prior.rvs(2000, rng)
+    return arviz_base.from_dict(
+        {
+            "posterior": variables,
+            "sample_stats": {"lp": fit.log_density},
+            "prior": _variables(problem, prior[None], sample),
+        },
+        dims={name: ["experiment"] for name, v in variables.items() if v.ndim > 2},
+        coords={} if sample else {"experiment": [s.name for s in members]},
+    )
+
+
+def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Any]:
+    """Log density of each recorded hold given all others, at every draw."""
+    m, draws, _ = fit.theta.shape
+    samples = zip(_left_out(fit.problem, fit.flat), fit.problem.samples, strict=True)
+    holds = np.concatenate([values[s.protocol.recorded] for values, s in samples if s in members])
+    return {"tension_N": (("chain", "draw", "hold"), holds.T.reshape(m, draws, -1))}
+
+
+def _label(tree: Any, fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> None:
+    """Units of all variables, and what is needed to use the posterior without its experiment file."""
     for group, node in tree.children.items():
         node.attrs.clear()
         for name, variable in node.data_vars.items():
@@ -313,10 +304,37 @@ def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: n
                 variable.attrs["units"] = "1"
             else:
                 variable.attrs["units"] = _UNIT_IN_NAME.get(str(name).rsplit("_", 1)[-1], "1")
+    about = _about(fit, members, provenance)
     tree["constant_data"].attrs["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
     tree["posterior"].attrs.update(about)
     tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
-    return tree
+
+
+def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes of the posterior: experiments, model, range of the readings, sampler."""
+    first = members[0]
+    read = [s.readings[..., 0][s.protocol.mask] for s in members]
+    return {
+        "wirebayes_version": __version__,
+        "inference_library": "emcee",
+        "experiment": first.name,
+        "experiments": json.dumps([s.name for s in members]),
+        "material": first.material,
+        "length_mm": first.protocol.length_mm,
+        "lengths_mm": json.dumps([s.protocol.length_mm for s in members]),
+        "resolutions_N": json.dumps([s.resolution_N for s in members]),
+        "elastic_law": first.model.law,
+        "history": first.model.history,
+        "likelihood": fit.problem.likelihood,
+        "effects": json.dumps([e.key for e in first.model.effects]),
+        "tension_ref_N": first.model.tension_ref_N,
+        "tension_range_N": [float(min(r.min() for r in read)), float(max(r.max() for r in read))],
+        "time_range_s": [0.0, float(max(s.protocol.duration_s.max() for s in members))],
+        "walkers": fit.chains.z.shape[2],
+        "thin": fit.thin,
+        "converged": int(fit.chains.converged),
+        "provenance": json.dumps(dict(provenance)),
+    }
 
 
 def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Any]:

@@ -59,7 +59,7 @@ def check(
     >>> found = checked.summary()["experiments"]["kite-1.5m"]
     >>> found["holds"][0]["displacement_mm"], found["unrecorded_holds"], found["duration_s"]
     (1.0, 1, 1080.0)
-    >>> found["parameters"]["k1"]["told_by"]
+    >>> found["parameters"]["k1"]["determined_by"]
     'data'
     >>> found["effects"]["guide_friction"]["shows"]  # needs unloading
     'no'

@@ -701,7 +701,7 @@ class Check(Result):
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, parameter, _figure(p["q50"]), f"{_figure(p['q05'])} to {_figure(p['q95'])}", p["told_by"]]
+            [name, parameter, _figure(p["q50"]), f"{_figure(p['q05'])} to {_figure(p['q95'])}", p["determined_by"]]
             for name, test in self.summary()["experiments"].items()
             for parameter, p in test["parameters"].items()
         ]

@@ -69,7 +69,7 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     ]
     hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]
     blind = [f"Effects it cannot show: {', '.join(_words(name) for name in hidden)}."] if hidden else []
-    prior = [name for name, p in e["parameters"].items() if p["told_by"] == "prior"]
+    prior = [name for name, p in e["parameters"].items() if p["determined_by"] == "prior"]
     blind += [f"Parameters it does not determine: {', '.join(prior)}."] if prior else []
     columns = [Points("What it is", about), Points("What is suspicious", e["warnings"] or ["Nothing."])]
     blocks: list[Block] = [
@@ -77,7 +77,7 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
         *picture,
     ]
     rows = [
-        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]), _TOLD[p["told_by"]],
+        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]), _TOLD[p["determined_by"]],
          SYMBOLS.get(name, "–")]
         for name, p in e["parameters"].items()
     ]  # fmt: skip

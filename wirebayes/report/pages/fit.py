@@ -27,7 +27,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pages.paper_summary import listed
-from wirebayes.results.contraction import LEAST_CONTRACTION, contraction
+from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.store import Stored, experiments_in, load, prior_draws, unit_of
 from wirebayes.wire.effect import Effect
 
@@ -183,7 +183,7 @@ def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any
     for name, share in shrunk.items():
         unit = unit_text(unit_of(name, effects))
         told = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
-        (known if share >= LEAST_CONTRACTION else loose).append(told)
+        (known if share >= MOST else loose).append(told)
     if not trusted:
         return [Points("90 % intervals, if the model were right", known + loose)]
     nothing = ["No parameter."]
@@ -202,10 +202,10 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tupl
         lines.append([name, unit, number(middle), span(low, high), share, _means(name, effects)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
-        "The interval before the test is the prior's; a parameter is well known if it shrank by at least "
-        f"{100 * LEAST_CONTRACTION:.0f} %."
+        "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "
+        f"quantity is positive; from {100 * MOST:.0f} % on the readings determine a parameter."
     )
-    return Table(["parameter", "unit", "median", "90 % interval", "shrunk by", "what it is"], lines, caption)
+    return Table(["parameter", "unit", "median", "90 % interval", "contraction", "what it is"], lines, caption)
 
 
 def _means(name: str, effects: tuple[Effect, ...]) -> str:

@@ -11,7 +11,6 @@ from scipy.special import logsumexp
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
-from wirebayes.linear_algebra import log_determinant, solve
 from wirebayes.model import likelihoods
 from wirebayes.model.linear_amplitudes import completed
 from wirebayes.model.problem import Problem, build
@@ -58,7 +57,7 @@ def last_third(experiment: Experiment) -> int:
     return holds - max(1, round(holds / 3)) if holds >= 4 else 0
 
 
-def held_out(
+def predicted(
     experiments: Sequence[Experiment],
     train: Sequence[int],
     effects: Sequence[Effect],
@@ -93,8 +92,12 @@ def held_out(
         last = np.flatnonzero(sample.protocol.recorded)[k:]
         mask = sample.protocol.mask.copy()
         mask[last] = False
-        free = likelihoods.chain(line, sample.readings, mask, variance, own["setting_sd"])
-        error, floor, elpd, inside = [], [], [], []
+        noise = variance, own["setting_sd"]
+        free = likelihoods.chain(line, sample.readings, mask, *noise)
+        asked = np.isin(np.arange(len(mask)), last)
+        log_p = likelihoods.held_out(line, sample.readings, sample.protocol.mask, asked, *noise)
+        elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(len(theta))
+        error, floor, inside = [], [], []
         for j in last:
             keep = sample.protocol.mask[j]
             c, s = line.by_creep[j][keep], line.by_setting[j][keep]
@@ -103,23 +106,13 @@ def held_out(
             y = sample.readings[j][keep]
             error.append(mean.mean(axis=1) - y[:, 0])
             floor.append((variance + s**2 * q).mean(axis=1))
-            cov = (
-                np.einsum("rn,qn->nrq", c * p, c)
-                + np.einsum("rn,qn->nrq", s * q, s)
-                + variance[:, None, None] * np.eye(keep.sum())
-            )
-            r = (y - mean).T
-            logdet = log_determinant(cov)
-            square = np.einsum("nr,nr->n", r, solve(cov, r[..., None])[..., 0])
-            log_p = -0.5 * (square + logdet + len(y) * np.log(2 * np.pi))
-            elpd.append(logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf)) - np.log(len(theta)))
             drawn = mean + rng.normal(size=mean.shape) * np.sqrt(variance + c**2 * p + s**2 * q)
             low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
             inside.append((y[:, 0] >= low) & (y[:, 0] <= high))
         e = np.concatenate(error)
         out.append(
             HeldOut([int(n) for n in sample.protocol.number[last]], float((e**2).mean()), len(e),
-                    float(np.concatenate(floor).mean()), np.array(elpd), float(np.concatenate(inside).mean()))
+                    float(np.concatenate(floor).mean()), elpd, float(np.concatenate(inside).mean()))
         )  # fmt: skip
     return out
 

@@ -9,7 +9,7 @@ from scipy import stats
 
 from tests.model.dense import normal
 from tests.simulated import simulated_tests
-from wirebayes.discovery import gap
+from wirebayes.discovery import held_out
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth
@@ -38,13 +38,13 @@ def test_readings_are_inside_up_to_1_645_predictive_standard_deviations(
     experiment = simulated_tests([Bench()], Truth(WIRE), seed=2)[0]
     problem = build([experiment.train(TRAIN)])
     theta = np.tile([WIRE[name] for name in problem.names], (4000, 1))  # a posterior that is one point
-    monkeypatch.setattr(gap, "fitted", lambda *_: None)
-    monkeypatch.setattr(gap, "_draws", lambda *_: (problem, theta))
+    monkeypatch.setattr(held_out, "fitted", lambda *_: None)
+    monkeypatch.setattr(held_out, "_draws", lambda *_: (problem, theta))
     block = SimpleNamespace(effects=None, law="hooke", history="saturating")
     # a quantile of 4000 normal draws has a standard error of 0.033 standard deviations
     for deviations, share in ((1.5, 1.0), (1.8, 0.0)):
         measured = moved(experiment, side * deviations)
-        [found] = gap.held_out([measured], [TRAIN], (), block, np.random.default_rng(0))  # type: ignore[arg-type]
+        [found] = held_out.predicted([measured], [TRAIN], (), block, np.random.default_rng(0))  # type: ignore[arg-type]
         assert found.holds == [8, 9, 10, 11, 12] and found.readings == 5 * experiment.tension().shape[1]
         assert found.inside == share, deviations
 
@@ -60,8 +60,8 @@ def test_importance_weights_are_truncated(monkeypatch: pytest.MonkeyPatch) -> No
         leave_one_hold_out=lambda theta: [np.log(density)],
         samples=[SimpleNamespace(protocol=SimpleNamespace(recorded=recorded))],
     )
-    monkeypatch.setattr(gap, "_draws", lambda *_: (problem, np.zeros((1500, 1))))
-    found = gap.leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
+    monkeypatch.setattr(held_out, "_draws", lambda *_: (problem, np.zeros((1500, 1))))
+    found = held_out.leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
     expected = []
     for p in density[:3]:
         weight = np.minimum(1 / p, np.mean(1 / p) * np.sqrt(1500))

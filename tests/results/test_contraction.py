@@ -1,0 +1,23 @@
+"""Posterior contraction against its definition, and the words for it at their thresholds."""
+
+import numpy as np
+import pytest
+
+from wirebayes.results.contraction import contraction, source
+
+
+def test_contraction_is_the_share_of_variance_taken_away_of_the_logarithm_if_positive() -> None:
+    rng = np.random.default_rng(0)
+    before, after = 1.5 * rng.normal(size=200_000), 3.0 + 0.3 * rng.normal(size=200_000)
+    assert contraction(after, before) == pytest.approx(1 - 0.3**2 / 1.5**2, abs=0.001)
+    assert contraction(np.exp(after), np.exp(before)) == pytest.approx(1 - 0.3**2 / 1.5**2, abs=0.001)
+    assert contraction(before, before) == 0.0
+    assert contraction(np.exp(2.0 * before), np.exp(before)) == pytest.approx(-3.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "word"),
+    [(-1.0, "prior"), (0.29, "prior"), (0.3, "data and prior"), (0.89, "data and prior"), (0.9, "data")],
+)
+def test_who_determines_a_quantity(value: float, word: str) -> None:
+    assert source(value) == word
