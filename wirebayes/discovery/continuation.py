@@ -167,81 +167,141 @@ def climb(block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
-    main, places = (
-        ladder.effect.amplitudes[0],
-        [z, *(np.broadcast_to(s, z.shape) for s in block.modes_with_expected_setting_error)],
-    )
-    starts = len(ladder.probes) * len(places)
-    low, high = (float(v) for v in main.prior.support())
-    target, column, y = _with_effect(block, ladder, places)
-    moving = [i for i in moving_columns(target.problem) if i != column]
+    ascent, y = _begin(block, ladder, z, readings)
+    moving = [i for i in moving_columns(ascent.target.problem) if i != ascent.column]
     shapes = set(ladder.effect.columns()[1:])
-    rigid = [i for i in moving if target.problem.names[i].split("[")[0] not in shapes]
-    scale = target.coordinates.scale[column]
-    plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
-    degrees = plain.degrees
-    nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, degrees).height + plain.prior
-    # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
-    nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
-    nothing = np.tile(np.where(np.isfinite(nothing), nothing, np.inf), starts)
-    # From where to where a rung speaks: half way, by ratio, to its neighbours.
-    every = np.tile(ladder.amplitudes, len(places)).repeat(len(z), axis=1)
-    half = np.sqrt(every[1] / every[0])
-
-    def of_each(values: Array) -> Array:
-        """(n,) the largest of each data set."""
-        return np.asarray(values.reshape(starts, -1).max(axis=0))
-
-    def look(y: Array, amplitude: Array, alive: Array, free: list[int], steps: int) -> tuple[Array, ...]:
-        """Follow with the amplitudes (n,): the best place, the log Bayes factor there, amplitude and δ of one.
-
-        A data set goes on for as long as it gains something from any of its starts.
-        """
-        at, near, far = (np.clip(main.neutral + amplitude * f, low, high) for f in (1.0, 1.0 / half, half))
-        y = y.copy()
-        y[:, column] = at / scale
-        first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
-        best = [y.copy(), np.full(len(y), _NEVER), at - main.neutral, np.zeros(len(y))]
-        rows = np.flatnonzero(np.tile(alive, starts))
-        for step in range(steps + 1):
-            own = None if readings is None else [r[..., rows % len(z)] for r in readings]
-            with np.errstate(all="ignore"):
-                both = tangent(target, y[rows], own, [*free, column])
-            here = _weigh(_without_last(both), both.parameters[..., -1] / scale, first[rows], last[rows], degrees)
-            lr = np.nan_to_num(here.height + both.prior - nothing[rows], nan=_NEVER, neginf=_NEVER)
-            gain = np.full(len(y), -np.inf)
-            gain[rows] = lr - best[1][rows]
-            better = gain[rows] > 0
-            for kept, new in zip(best, (y[rows], lr, (at - main.neutral)[rows] + here.move, here.norm), strict=True):
-                kept[rows[better]] = new[better]
-            # A step that led down, where the wire went slack say, is the last one.
-            go = np.flatnonzero(better & (of_each(gain) >= _SETTLED)[rows % len(z)])
-            if step == steps or not len(go):
-                break
-            rows, own = rows[go], None if own is None else [r[..., go] for r in own]
-            y[rows] = _follow(target, y[rows], own, both.of(go), here.of(go), free, degrees)
-        return tuple(best)
-
-    unseen = np.full(len(y), _NEVER), np.zeros(len(y)), np.zeros(len(y))
-    found: list[Sequence[Array]] = []
-    best = [y.copy(), *(v.copy() for v in unseen)]
-    alive = np.ones(len(z), bool)
+    rigid = [i for i in moving if ascent.target.problem.names[i].split("[")[0] not in shapes]
+    every = np.tile(ladder.amplitudes, len(y) // (len(ladder.probes) * len(z))).repeat(len(z), axis=1)
+    unseen = _Places.unseen(y)
+    best, found, alive = _Places.unseen(y), list[_Places](), np.ones(len(z), bool)
     for amplitudes in every:
         # Shape constants mean nothing while the amplitude is small, and would wander.
         is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(every[-1]) * _FIRST / _LAST).all())
-        y, *rung = look(y, amplitudes, alive, rigid if is_low else moving, _FEW if is_low else _STEPS)
+        rung = ascent.look(y, amplitudes, alive, rigid if is_low else moving, _FEW if is_low else _STEPS)
+        y = rung.z
         found.append(rung)
-        better = rung[0] > best[1]
-        for kept, new in zip(best, (y, *rung), strict=True):
-            kept[better] = new[better]
+        best.improve(np.arange(len(y)), rung)
         if not is_low:
-            alive = alive & (of_each(rung[0]) >= _HOPELESS)
-        beyond = np.isin(np.clip(main.neutral + amplitudes, low, high), (low, high)).all()
-        if beyond or not alive.any():
+            alive = alive & (ascent.best_start(rung.log_bayes) >= _HOPELESS)
+        if ascent.is_beyond(amplitudes) or not alive.any():
             found += [unseen] * (len(ladder.amplitudes) - len(found))
             break
-    found.append(look(best[0], best[2], np.ones(len(z), bool), moving, _STEPS)[1:])
-    return Climbed(*(np.array(v).reshape(-1, len(z)) for v in zip(*found, strict=True)))
+    found.append(ascent.look(best.z, best.amplitude, np.ones(len(z), bool), moving, _STEPS))
+    rungs = ([getattr(rung, name) for rung in found] for name in ("log_bayes", "amplitude", "norm"))
+    return Climbed(*(np.array(values).reshape(-1, len(z)) for values in rungs))
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Places (m, d) of m climbs, and the log Bayes factor, the amplitude and δ per amplitude there, (m,) each."""
+
+    z: Array
+    log_bayes: Array
+    amplitude: Array
+    norm: Array
+
+    @classmethod
+    def unseen(cls, z: Array, amplitude: Array | None = None) -> "_Places":
+        """Places at which nothing has been evaluated yet."""
+        nothing = np.zeros(len(z)) if amplitude is None else amplitude
+        return cls(z.copy(), np.full(len(z), _NEVER), nothing.copy(), np.zeros(len(z)))
+
+    def improve(self, rows: Array, other: "_Places") -> NDArray[np.bool_]:
+        """Take over, in place, the others' places where they are better than these in some rows, and say where."""
+        better = other.log_bayes > self.log_bayes[rows]
+        for f in fields(self):
+            getattr(self, f.name)[rows[better]] = getattr(other, f.name)[better]
+        return np.asarray(better)
+
+
+@dataclass(frozen=True)
+class _Ascent:
+    """What does not change on the way up a ladder.
+
+    Attributes
+    ----------
+    target : LogPosterior
+        Of the block with the effect.
+    column : int
+        Of the amplitude.
+    neutral, low, high : float
+        Where the amplitude changes nothing, and its ends.
+    readings : sequence of (H, R, n) arrays or None
+    data_sets, degrees : int
+    nothing : (starts n,) array
+        Log marginal density without the effect.
+    half : (starts n,) array
+        Ratio of an amplitude to where the stretch of its rung ends.
+    """
+
+    target: LogPosterior
+    column: int
+    neutral: float
+    low: float
+    high: float
+    readings: Sequence[Array] | None
+    data_sets: int
+    degrees: int
+    nothing: Array
+    half: Array
+
+    def best_start(self, values: Array) -> Array:
+        """(n,) the largest value of each data set."""
+        return np.asarray(values.reshape(-1, self.data_sets).max(axis=0))
+
+    def is_beyond(self, amplitudes: Array) -> bool:
+        """Whether all amplitudes have reached their ends."""
+        return bool(np.isin(np.clip(self.neutral + amplitudes, self.low, self.high), (self.low, self.high)).all())
+
+    def look(self, z: Array, amplitude: Array, alive: NDArray[np.bool_], free: list[int], steps: int) -> _Places:
+        """Follow with the amplitudes (starts n,): the best places on the way.
+
+        A data set goes on for as long as it gains something from any of its starts.
+        """
+        n, scale = self.data_sets, self.target.coordinates.scale[self.column]
+        ends = (1.0, 1.0 / self.half, self.half)
+        at, near, far = (np.clip(self.neutral + amplitude * f, self.low, self.high) for f in ends)
+        z = z.copy()
+        z[:, self.column] = at / scale
+        first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
+        best = _Places.unseen(z, at - self.neutral)
+        rows = np.flatnonzero(np.tile(alive, len(z) // n))
+        for step in range(steps + 1):
+            own = None if self.readings is None else [r[..., rows % n] for r in self.readings]
+            with np.errstate(all="ignore"):
+                both = tangent(self.target, z[rows], own, [*free, self.column])
+            signature = both.parameters[..., -1] / scale
+            here = _weigh(_without_last(both), signature, first[rows], last[rows], self.degrees)
+            lr = np.nan_to_num(here.height + both.prior - self.nothing[rows], nan=_NEVER, neginf=_NEVER)
+            gain = np.full(len(z), -np.inf)
+            gain[rows] = lr - best.log_bayes[rows]
+            better = best.improve(rows, _Places(z[rows], lr, (at - self.neutral)[rows] + here.move, here.norm))
+            # A step that led down, where the wire went slack say, is the last one.
+            go = np.flatnonzero(better & (self.best_start(gain) >= _SETTLED)[rows % n])
+            if step == steps or not len(go):
+                break
+            rows, own = rows[go], None if own is None else [r[..., go] for r in own]
+            z[rows] = _follow(self.target, z[rows], own, both.of(go), here.of(go), free, self.degrees)
+        return best
+
+
+def _begin(
+    block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence[Array] | None
+) -> tuple[_Ascent, Array]:
+    """What a climb needs, and the points (starts n, d) at which it begins."""
+    places = [z, *(np.broadcast_to(s, z.shape) for s in block.modes_with_expected_setting_error)]
+    target, column, y = _with_effect(block, ladder, places)
+    plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
+    nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, plain.degrees).height + plain.prior
+    # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
+    nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
+    nothing = np.tile(np.where(np.isfinite(nothing), nothing, np.inf), len(y) // len(z))
+    # From where to where a rung speaks: half way, by ratio, to its neighbours.
+    apart = np.tile(ladder.amplitudes[1] / ladder.amplitudes[0], len(places)).repeat(len(z))
+    main = ladder.effect.amplitudes[0]
+    low, high = (float(v) for v in main.prior.support())
+    ascent = _Ascent(target, column, main.neutral, low, high, readings, len(z), plain.degrees, nothing, np.sqrt(apart))
+    return ascent, y
 
 
 def _with_effect(block: LaplaceFit, ladder: AmplitudePath, places: Sequence[Array]) -> tuple[LogPosterior, int, Array]:

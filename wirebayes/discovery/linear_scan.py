@@ -411,10 +411,33 @@ def scan(x: Expansion) -> Scan:
     return joined([_scan_few(_without_tangent(x.of(rows))) for rows in pieces])
 
 
-def _scan_few(x: Expansion) -> Scan:
-    """Arrays (n, k, ...): a parameter set, a ratio of the grid."""
+@dataclass(frozen=True)
+class _Projected:
+    """Inner products at n parameter sets and k ratios of the grid, free of what the parameters absorb.
+
+    Attributes
+    ----------
+    shared : (n, k)
+        Log volume of setting errors and parameters; -inf where the parameters cannot be told apart.
+    rss : (n, k)
+        Of the residual with itself, the prior's square included.
+    along, square : (n, k, m)
+        Of each signature with the residual and with itself; infinite where the parameters take all of a signature.
+    smooth_along, smooth_square : (n, k, q) and (n, k, q, q)
+        Of the smooth functions with the residual and with each other.
+    """
+
+    shared: Array
+    rss: Array
+    along: Array
+    square: Array
+    smooth_along: Array
+    smooth_square: Array
+
+
+def _project(x: Expansion) -> _Projected:
+    """Project residual, signatures and smooth functions on what the parameters leave, in the metric of each ratio."""
     p, m = x.parameters.shape[2], x.signatures.shape[2]
-    degrees, least = x.degrees, x.least
     columns = np.concatenate([x.parameters, x.residual[..., None], x.signatures, x.flexible], axis=2)
     levels = np.swapaxes(x.left, 1, 2) @ columns
     shrink = damp(x.singular[:, None], RATIOS[:, None])
@@ -442,23 +465,32 @@ def _scan_few(x: Expansion) -> Scan:
     rr = whitened((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
     mr = whitened((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
     mm = whitened(square, levels_m, levels_m)
-    rss = rr - (residual**2).sum(axis=2) + x.prior_square[:, None]
-    b = mr - (residual[:, :, None] @ signatures)[:, :, 0]
     c = mm - (signatures**2).sum(axis=2)
-    c = np.where(c > ABSORBED * square[:, None], c, np.inf)
-    shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
-    shared = np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf)
-    positive = np.where(x.one_sided, np.maximum(b, 0.0), b)
-    least = least[:, None]
-    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
-    left = np.maximum(rss[..., None] - positive**2 / c, least[..., None])
-    effects = shared[..., None] - 0.5 * degrees * np.log(left)
     ff = (np.swapaxes(x.flexible, 1, 2) @ x.flexible)[:, None] - np.swapaxes(flexible, 2, 3) @ flexible
     ff -= (np.swapaxes(levels_f, 1, 2)[:, None] * shrink[:, :, None]) @ levels_f[:, None]
     fr = whitened((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
+    shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
+    return _Projected(
+        shared=np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf),
+        rss=rr - (residual**2).sum(axis=2) + x.prior_square[:, None],
+        along=mr - (residual[:, :, None] @ signatures)[:, :, 0],
+        square=np.where(c > ABSORBED * square[:, None], c, np.inf),
+        smooth_along=fr,
+        smooth_square=ff,
+    )
+
+
+def _scan_few(x: Expansion) -> Scan:
+    """Scan at once: noise of every ratio is integrated out, each amplitude is at its best."""
+    found, degrees, least = _project(x), x.degrees, x.least[:, None]
+    shared, rss, b, c = found.shared, found.rss, found.along, found.square
+    positive = np.where(x.one_sided, np.maximum(b, 0.0), b)
+    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
+    left = np.maximum(rss[..., None] - positive**2 / c, least[..., None])
+    effects = shared[..., None] - 0.5 * degrees * np.log(left)
     loose = []
     for size in SIZES:
-        log_volume, less = _taken_by(ff, fr, size)
+        log_volume, less = _taken_by(found.smooth_square, found.smooth_along, size)
         # The process is measured in units of the noise that is left beside it.
         loose.append(shared - log_volume - 0.5 * degrees * np.log(np.maximum(rss - less, least)))
     reference = logsumexp(plain, axis=1)
@@ -466,16 +498,14 @@ def _scan_few(x: Expansion) -> Scan:
     reference = np.where(seen, reference, 0.0)
     flexible_value = logsumexp(np.concatenate(loose, axis=1), axis=1) - np.log(len(SIZES)) - reference
     best = np.argmax(effects, axis=1)[:, None]
-    amplitude = np.take_along_axis(b / c, best, axis=1)[:, 0]
-    at_best = np.take_along_axis(left, best, axis=1)[:, 0]
-    c_best = np.take_along_axis(c, best, axis=1)[:, 0]
+    amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
     norm = np.sqrt(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best)
     return Scan(
         np.where(seen[:, None], logsumexp(effects, axis=1) - reference[:, None], 0.0),
         np.where(seen, flexible_value, 0.0),
         amplitude,
         norm,
-        Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, least[:, 0], x.one_sided),
+        Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, x.least, x.one_sided),
     )
 
 
