@@ -77,8 +77,8 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
         *picture,
     ]
     rows = [
-        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]), _TOLD[p["determined_by"]],
-         SYMBOLS.get(name, "–")]
+        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]),
+         _TOLD[p["determined_by"]], SYMBOLS.get(name, "–")]
         for name, p in e["parameters"].items()
     ]  # fmt: skip
     caption = "A first estimate by a short run of the sampler; fit gives the posterior."
