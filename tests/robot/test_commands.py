@@ -362,3 +362,28 @@ def test_the_exported_model_settles_at_home_in_mujoco(fitted, tmp_path):
     data.qpos[:3] = [0.0, 0.0, 0.6]
     mujoco.mj_forward(model, data)
     assert np.abs(data.qacc).max() < 1e-6
+
+
+def test_the_command_maps_the_slices_asked_for(fitted, tmp_path):
+    import csv
+
+    import wirebayes as wb
+    from wirebayes.errors import InputError
+
+    out = tmp_path / "out"
+    held = wb.pose(
+        "linear-6", fitted, times=[0, 60], draws=10, map_heights=[0.5], map_rotations=[[0, 0, 0], [0, 0.1, 0]],
+        output=out,
+    )  # fmt: skip
+    slices = held.summary()["workspace"]["slices"]
+    assert [(s["at_m"], s["rotation_vector_rad"]) for s in slices] == [(0.5, [0, 0, 0]), (0.5, [0, 0.1, 0])]
+    with (out / "workspace.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 49
+    assert {"workspace-drift.svg", "workspace-2-drift.svg", "workspace-2-tilt.svg"} <= {p.name for p in out.iterdir()}
+    assert json.loads((out / "pose.json").read_text())["workspace"]["slices"] == slices
+    wb.write_report(out)
+    page = (out / "report.html").read_text()
+    assert "turned by the rotation vector that the title names" in page and "(0, 0.1, 0) rad" in page
+    with pytest.raises(InputError, match="another configuration"):
+        wb.pose("linear-6", fitted, times=[0, 60], draws=10, map_heights=[0.6], output=out)

@@ -26,6 +26,13 @@ def pose(
     tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Allowed pose error.")] = 0.3,
     tolerance_tilt: Annotated[float, typer.Option("--tolerance-tilt", metavar="DEG", help="Allowed rotation.")] = 0.055,
     spread: Spread = 0.05,
+    map_heights: Annotated[
+        str | None, typer.Option("--map-heights", metavar="Z,Z,…", help="Heights of the mapped slices, in metres.")
+    ] = None,
+    map_rotation: Annotated[
+        list[str] | None,
+        typer.Option("--map-rotation", metavar="X,Y,Z", help="Rotation vector of a mapped platform; repeatable."),
+    ] = None,
     other_fit: Annotated[
         Path | None,
         typer.Option("--other-fit", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
@@ -71,10 +78,10 @@ def pose(
     with progress() as report:
         found = run(
             robot, wires, position=position, rotation=rotation, times=times, tolerance=tolerance,
-            tolerance_tilt=tolerance_tilt, specimen_spread=spread, other_fit=other_fit, joints=joints,
-            trajectory=trajectory, payload=payload, payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd,
-            reference_sd=reference_sd, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed,
-            output=output, progress=report,
+            tolerance_tilt=tolerance_tilt, specimen_spread=spread, map_heights=map_heights,
+            map_rotations=map_rotation, other_fit=other_fit, joints=joints, trajectory=trajectory, payload=payload,
+            payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd, draws=draws,
+            experiment=experiment, own_effects=own_effects, seed=seed, output=output, progress=report,
         )  # fmt: skip
     for line in found.messages if found.computed else ():
         typer.echo(line, err=True)

@@ -1,13 +1,19 @@
 """A pose of a robot on creeping wires."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import open_run, write_json
+from wirebayes.io.run_folder import open_run, plain, write_csv, write_json
 from wirebayes.robot.history.history import with_payload
+from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.workflows.options import (
     Numbers,
@@ -40,6 +46,8 @@ def pose(
     tolerance: float = 0.3,
     tolerance_tilt: float = 0.055,
     specimen_spread: float = 0.05,
+    map_heights: Numbers | None = None,
+    map_rotations: Sequence[Numbers] | None = None,
     other_fit: Wires | None = None,
     joints: Any = None,
     trajectory: Any = None,
@@ -77,6 +85,10 @@ def pose(
         Allowed rotation, degrees.
     specimen_spread : float
         Relative difference between wires of one line.
+    map_heights : sequence of float, optional
+        Heights of the workspace's slices that are mapped, m; three through the robot's box when left out.
+    map_rotations : sequence of (3,) arrays, optional
+        Rotation vectors, rad, of the platforms that are mapped; level when left out.
     other_fit : Posterior or path, optional
         Another fit of the line, which one more controller uses.
     joints : path of a CSV, DataFrame, or mapping of name to (t,) array, optional
@@ -140,6 +152,10 @@ def pose(
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
     carried = (payload, None if payload_at is None else text_of(payload_at))
     if over_time:
+        if map_heights is not None or map_rotations is not None:
+            raise InputError(
+                "--map-heights and --map-rotation: found beside a history; expected them for a single pose only"
+            )
         if other_fit is not None or text_of(times) != text_of(TIMES_S):
             raise InputError("--times and --other-fit: found beside a history; expected them for a single pose only")
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
@@ -149,23 +165,48 @@ def pose(
         )  # fmt: skip
         return pose_history(machine, line, joints, trajectory, errors, (where, matrix(turn)), seed, decides,
                             Place.at(output), own, progress)  # fmt: skip
+    slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_of(other_fit, draws, experiment, own)
     asked = PoseRequest(
-        where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed
+        where,
+        matrix(turn),
+        moments,
+        1e-3 * tolerance,
+        math.radians(tolerance_tilt),
+        specimen_spread,
+        seed,
+        slices,
     )
     limits = (tolerance, tolerance_tilt, specimen_spread)
     at = (None if values is None else text_of(values) for values in (position, rotation))
     other_draws = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
     options = (experiment, *at, text_of(times), *limits, other_draws, *carried)
+    mapped = () if slices is LEVEL else (plain(asdict(slices)),)
     place = Place.at(output)
-    decides = configuration("pose", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
+    posterior = folder_of(wires, experiment) / POSTERIOR
+    decides = configuration("pose", robot, posterior, draws, seed, own, *options, *mapped)
     run = open_run(place.path, decides)
     if run.state == "done":
         return Pose(place, own, computed=False)
     found = answer(machine, line, asked, other)
     write_json(run.directory / "pose.json", found.content)
+    if found.maps:
+        write_csv(run.directory / "workspace.csv", TABLE, rows(found.maps))
     from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
 
     pictures.save_pose(run.directory, machine, asked, found)
     run.finish()
     return Pose(place, own)
+
+
+def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
+    """The slices asked for; refused where the robot has only one height or one orientation."""
+    if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
+        raise InputError("--map-heights: found heights for a workspace in a vertical plane; expected none")
+    if rotations is not None and robot.degrees == 3:
+        raise InputError("--map-rotation: found one for a robot whose lines keep the orientation; expected none")
+    if heights is None and rotations is None:
+        return LEVEL
+    levels = None if heights is None else np.unique(numbers("--map-heights", heights))
+    turns = [numbers("--map-rotation", turn, 3) for turn in rotations or ()]
+    return Slices(levels, np.array(turns) if turns else LEVEL.rotations_rad)

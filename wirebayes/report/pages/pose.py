@@ -32,10 +32,11 @@ _CAPTIONS = {
     "rotation": "How far it turns. A symmetric pose turns only because specimens of one line differ.",
     "pose-error": "Distance from the pose, controllers with increasingly complete wire models, identical specimens.",
     "error-budget": "How much each parameter's uncertainty contributes to the variance of the drift.",
-    "workspace-drift": "A level platform at other positions, new wires: how far it moves within a minute. White with a "
+    "workspace-drift": "The platform at other positions, new wires: how far it moves within a minute. White with a "
     "cross: no tensions hold it.",
     "workspace-tilt": "The same: how far it tilts.",
 }
+_TURNED = "The same with the platform turned by the rotation vector that the title names."
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -49,10 +50,13 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         blocks.insert(0, Text(said, strong=True))
     blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
     view = robot_view(folder)
-    files = {name: picture_file(folder, name) for name in _CAPTIONS if not (view and name == "robot")}
-    pictures = [Picture(embedded(p), _CAPTIONS[n], _CAPTIONS[n]) for n, p in files.items() if p is not None]
+    turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
+    told = _CAPTIONS | dict.fromkeys(turned, _TURNED)
+    files = {name: picture_file(folder, name) for name in told if not (view and name == "robot")}
+    pictures = [Picture(embedded(p), told[n], told[n]) for n, p in files.items() if p is not None]
     sections = [Section("Summary", blocks), Section("The robot", view)]
     sections += [Section("Pictures", [Pictures(pictures)] if pictures else [])]
+    sections += [Section("Slices of the workspace", _slices(pose))]
     sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
     sections += [Section("Between calibrations", _between(pose)), Section("Sources of uncertainty", _doubts(pose))]
     sections += [Section("How many equilibria", _equilibria(pose))]
@@ -65,6 +69,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 _FILES = (
     ("pose.json", "every number of this page as JSON"),
+    ("workspace.csv", "every point of the mapped slices"),
     ("scene.json", "points and tensions of the view that can be turned"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
@@ -120,6 +125,26 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
     loose += [sentence for sentence in said if sentence not in _losses(pose)]
     loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
     return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
+
+
+def _slices(pose: dict[str, Any]) -> list[Block]:
+    lines = []
+    for entry in (pose.get("workspace") or {}).get("slices", []):
+        turn = entry["rotation_vector_rad"]
+        named = f"({', '.join(f'{v:.3g}' for v in turn)}) rad" if any(turn) else "level"
+        cells = [named, f"{entry['axis']} = {entry['at_m']:.3g} m", f"{100 * entry['feasible']:.0f} %"]
+        if entry["feasible"]:
+            drift = [number(entry["q50_drift_mm"]), span(entry["q05_drift_mm"], entry["q95_drift_mm"])]
+            tension = span(entry["lowest_tension_N"], entry["highest_tension_N"])
+            cells += [*drift, number(entry["q50_tilt_deg"]), number(entry["probability"], 2), tension]
+        lines.append([*cells, *["–"] * (8 - len(cells))])
+    header = ["orientation", "slice", "held", "moved, mm", "90 %", "tilt, degrees", "probability", "tensions, N"]
+    caption = (
+        "A minute on new wires, over poses and draws. Held: share of the positions that tensions within the bounds "
+        "hold; probability: that the platform moves less than 0.3 mm and tilts less than 0.055°. workspace.csv has "
+        "every point."
+    )
+    return [Table(header, lines, caption)] if lines else []
 
 
 def _drift(pose: dict[str, Any]) -> list[Block]:

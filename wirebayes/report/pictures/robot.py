@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from wirebayes.io.run_folder import write_json
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
-from wirebayes.report.pictures.robot_space import workspace_maps
+from wirebayes.report.pictures.robot_space import orientation, workspace_maps
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.drift import Course
@@ -53,8 +53,10 @@ def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> 
     pictures["pose-error"] = error_in_time(content["pose_error"])
     if "shared_draw" in content["variance_shares"]:
         pictures["error-budget"] = error_budget(content["variance_shares"])
-    if found.workspace is not None:
-        pictures |= {f"workspace-{name}": figure for name, figure in workspace_maps(found.workspace).items()}
+    for i, one in enumerate(one for one in found.maps if len(one.drift.position_m)):
+        key = f"workspace-{i + 1}" if i else "workspace"
+        mapped = workspace_maps(one.drift, orientation(one))
+        pictures |= {f"{key}-{name}": figure for name, figure in mapped.items()}
     for name, figure in pictures.items():
         save(figure, folder / f"{name}.svg")
     write_json(folder / "scene.json", scene_points(robot, asked.position_m, asked.rotation, found.courses[0.0]))

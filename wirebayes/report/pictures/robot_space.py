@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from wirebayes.report.figures import INK, QUIET
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S, WorkspaceDrift
+from wirebayes.robot.pose.maps import Map
 
 Floats = NDArray[np.float64]
 
@@ -15,7 +16,7 @@ Floats = NDArray[np.float64]
 def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]:
     """Median drift and tilt over the workspace, slices above each other, so that a phone shows them whole.
 
-    Where no wires hold the platform, a cross. Slices are level; those of a robot in a vertical plane lie in it.
+    Where no wires hold the platform, a cross. Slices are horizontal; those of a robot in a vertical plane lie in it.
 
     Parameters
     ----------
@@ -65,6 +66,16 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
             figure.colorbar(image, ax=list(panels), label=label)
         figures[name] = figure
     return figures
+
+
+def orientation(one: Map) -> str:
+    """The orientation of a map in words; nothing where it is level.
+
+    Parameters
+    ----------
+    one : Map
+    """
+    return f"({', '.join(f'{value:.3g}' for value in one.rotation_rad)}) rad" if one.rotation_rad.any() else ""
 
 
 def _axes(position_m: Floats) -> tuple[int, int, int]:

@@ -23,9 +23,9 @@ class WorkspaceDrift:
     Attributes
     ----------
     position_m : (p, 3) array
-        Poses asked for, the normal vertical; those that no tensions hold are left out.
+        Positions asked for; those that no tensions hold are left out.
     distance_m, tilt_rad : (p, n) arrays
-        Displacement of the reference point; angle between normal and vertical.
+        Displacement of the reference point; angle between the normal and the one asked for.
     tension_N : (p, w) array
         When the hold begins.
     feasible : float
@@ -55,6 +55,13 @@ class WorkspaceDrift:
         """(p,) probability, at every point, that both limits are kept."""
         return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
 
+    def part(self, rows: NDArray[np.bool_], feasible: float) -> "WorkspaceDrift":
+        """Some of the positions ``(p,)``, and the share of those asked for there that tensions hold."""
+        found = float(np.isfinite(self.distance_m[rows]).all(1).mean()) if rows.any() else 0.0
+        return WorkspaceDrift(
+            self.position_m[rows], self.distance_m[rows], self.tilt_rad[rows], self.tension_N[rows], feasible, found
+        )
+
 
 def _median(values: Floats) -> Floats:
     held = [row[np.isfinite(row)] for row in values]
@@ -71,9 +78,14 @@ def grid(robot: Robot, points: tuple[int, int, int]) -> Floats:
 
 
 def over_workspace(
-    robot: Robot, wires: Wires, position_m: Floats, time_s: float = TIME_S, loaded_s: float = 0.0
+    robot: Robot,
+    wires: Wires,
+    position_m: Floats,
+    time_s: float = TIME_S,
+    loaded_s: float = 0.0,
+    rotation: Floats | None = None,
 ) -> WorkspaceDrift:
-    """Drift of a vertical platform after a time, at every position and draw in one batch.
+    """Drift of a platform after a time, at every position and draw in one batch.
 
     Parameters
     ----------
@@ -84,13 +96,15 @@ def over_workspace(
     time_s : float
     loaded_s : float
         How long the wires carried the same tensions before they were commanded, exactly, to the pose; 0: new wires.
+    rotation : (3, 3) array, optional
+        Orientation of the platform; default: level.
 
     Returns
     -------
     WorkspaceDrift
     """
-    upright = np.broadcast_to(np.eye(3), (len(position_m), 3, 3))
-    tau = inverse.tensions(robot, position_m, upright)
+    turn = np.eye(3) if rotation is None else rotation
+    tau = inverse.tensions(robot, position_m, np.broadcast_to(turn, (len(position_m), 3, 3)))
     good = np.isfinite(tau).all(1)
     if not good.any():
         empty = np.empty((0, 1))
@@ -100,7 +114,7 @@ def over_workspace(
     # Draws vary fastest; every (position, draw) is one row of the batch.
     many = replace(wires, theta={k: np.tile(np.broadcast_to(v, (len(v), n)), p) for k, v in wires.theta.items()})
     where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
-    R = np.broadcast_to(np.eye(3), (n * p, 3, 3))
+    R = np.broadcast_to(turn, (n * p, 3, 3))
     state = fresh(robot.legs, n * p)
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
@@ -108,7 +122,7 @@ def over_workspace(
     held = drift.stably(robot, many, told, where, R)
     course = drift.hold(robot, many, np.where(held[:, None], told.joint_m, np.nan), np.array([time_s]), where, R, state)
     shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
-    tilt = turning.tilt(course.rotation[:, 0])  # commanded level: against the vertical and the command alike
+    tilt = turning.tilt(course.rotation[:, 0], rotation)
     return WorkspaceDrift(
         x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
     )

@@ -14,11 +14,11 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, control, drift, forward, inverse, path
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.pose import controllers, stability, variance_shares
+from wirebayes.robot.pose.maps import Map, map_slices, summaries
 from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
 
 Floats = NDArray[np.float64]
-_GRID, _FLAT, _MAP_DRAWS = (7, 7, 3), (9, 9, 9), 60  # points of the map; of a workspace in one plane
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Answer:
         The content of ``pose.json`` (arrays not yet lists).
     courses : dict of specimen spread to Course
         The drifts, for pictures; empty when the pose cannot be held.
-    workspace : WorkspaceDrift or None
-        A minute's drift over the workspace, for its map.
+    maps : tuple of Map
+        A minute's drift over slices of the workspace.
     """
 
     content: dict[str, Any]
     courses: dict[float, drift.Course]
-    workspace: claim.WorkspaceDrift | None = None
+    maps: tuple[Map, ...] = ()
 
 
 def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws | None = None) -> Answer:
@@ -119,9 +119,12 @@ def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws |
             f"wire {i + 1} is longer here than its drum's wire_length_m, {robot.drums.wire_m[i]:g} m"
             for i in drums.emptied(robot.drums, told.joint_m[told.feasible])
         ]
-    space = _workspace(robot, line)
-    content["workspace"] = claim.summary(space) if space else None
-    return Answer(content, courses, space)
+    spaces = map_slices(robot, line, asked.slices)
+    content["workspace"] = None
+    held = [one for one in spaces if len(one.drift.position_m)]
+    if held:  # the first orientation as a whole, then every slice of each
+        content["workspace"] = claim.summary(held[0].drift) | {"slices": summaries(spaces)}
+    return Answer(content, courses, spaces)
 
 
 def _motors(known: Drums, joint_m: Floats) -> dict[str, Any]:
@@ -134,14 +137,6 @@ def _by_leg(values: Floats) -> dict[str, Any]:
     """Bands of legs one by one: what one leg does not have is no gap in the others."""
     bands = [band(values[:, [i]]) for i in range(values.shape[1])]
     return {key: [None if b[key] is None else b[key][0] for b in bands] for key in bands[0]}
-
-
-def _workspace(robot: Robot, line: WireDraws) -> claim.WorkspaceDrift | None:
-    """A minute's drift of a level platform over the workspace, one draw for all wires of the line."""
-    few = line.part(np.unique(np.linspace(0, line.count - 1, _MAP_DRAWS).round().astype(int)))
-    points = _GRID if (robot.upper_m > robot.lower_m).all() else _FLAT
-    space = claim.over_workspace(robot, draws.for_robot(robot, few), claim.grid(robot, points))
-    return space if len(space.position_m) else None
 
 
 def _round_trip(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
+from wirebayes.robot.pose.maps import LEVEL, Slices
 
 Floats = NDArray[np.float64]
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}  # the median and the 90 % interval, as everywhere
@@ -27,6 +28,8 @@ class PoseRequest:
     specimen_spread : float
         Relative, of stiffness, creep amount and rate from wire to wire; answers are given for it and for wires alike.
     seed : int
+    slices : Slices
+        Of the workspace, to be mapped.
     """
 
     position_m: Floats
@@ -36,6 +39,7 @@ class PoseRequest:
     tolerance_rad: float = TILT_RAD
     specimen_spread: float = 0.05
     seed: int = 0
+    slices: Slices = LEVEL
 
     @property
     def spreads(self) -> tuple[float, float]:
