@@ -23,7 +23,28 @@ Floats = NDArray[np.float64]
 
 
 def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:
-    """Standard errors in the robot's units, mm and N and rad in."""
+    """Standard errors in the robot's units, mm and N and rad in.
+
+    Parameters
+    ----------
+    reference_sd : float
+        Of a wire's reference length, mm.
+    specimen_spread : float
+        Relative difference between specimens of one line.
+    tension_sd : float
+        Of a tension reading, N.
+    tilt_sd : float
+        Of an inclinometer's angle, rad.
+
+    Returns
+    -------
+    Uncertain
+
+    Raises
+    ------
+    InputError
+        If one is not a number that it can be.
+    """
     reference_sd, tension_sd, tilt_sd = float(reference_sd), float(tension_sd), float(tilt_sd)
     above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
     if not 0 <= reference_sd < np.inf:
@@ -44,7 +65,30 @@ def pose_history(
     own_effects: Path | None,
     progress: Progress,
 ) -> Pose:
-    """Poses over time from `joints` or for `trajectory`; ``pose.json``, two tables and pictures.
+    """Poses over time from `joints` or for `trajectory`: ``pose.json``, two tables and pictures.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    joints, trajectory : path, columns or None
+        One of them: measured joint values, or commanded poses.
+    errors : Uncertain
+    start : (position, rotation)
+        The pose near which the first row's is sought.
+    seed : int
+    decides : dict
+        What else decides the results, for ``configuration.json``.
+    place : Place
+        Folder of the results.
+    own_effects : Path or None
+        File of a user's own effects.
+    progress : callable
+        Called with a name, what is done and the total.
+
+    Returns
+    -------
+    Pose
 
     Raises
     ------

@@ -24,6 +24,18 @@ def as_csv(source: str, columns: Any, order: Callable[[list[str]], list[str]] = 
     ------
     InputError
         They are no table, or of different lengths.
+
+    Parameters
+    ----------
+    source : str
+        What errors call the table.
+    columns : mapping of name to values, or DataFrame
+    order : callable
+        Of the list of names to the list in the order that the file has.
+
+    Returns
+    -------
+    str
     """
     names = order(names_of(source, columns))
     values = [plain(list(columns[name])) for name in names]

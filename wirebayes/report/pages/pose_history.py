@@ -36,7 +36,20 @@ _ROWS = 12  # of the tables on the page
 
 
 def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> Page:
-    """The content of ``pose.json`` and the pictures beside it."""
+    """The content of ``pose.json`` and the pictures beside it.
+
+    Parameters
+    ----------
+    folder : Path
+    configuration : dict
+        Content of ``configuration.json``.
+    pose : dict
+        Content of ``pose.json``.
+
+    Returns
+    -------
+    Page
+    """
     measured = pose["history"]["kind"] == "measured"
     lead = "Where the platform was, from measured joint values." if measured else "Where commanded poses lead."
     lead += " The wires' creep is carried through the whole history of their tensions."

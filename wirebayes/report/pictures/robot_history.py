@@ -22,7 +22,17 @@ _OBLIQUE = np.array([[1.0, 0.45, 0.0], [0.0, 0.3, 1.0]])  # depth runs up to the
 
 
 def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> None:
-    """Write the pictures that go with ``pose.json``; none when the platform cannot be held."""
+    """Write the pictures that go with ``pose.json``; none when the platform cannot be held.
+
+    Parameters
+    ----------
+    folder : Path
+    robot : Robot
+    history : History
+        The rows that were read.
+    found : HistoryAnswer
+        What was computed for them.
+    """
     if found.found is None or found.to is None:
         return
     content = found.content
@@ -40,7 +50,24 @@ def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> 
 
 
 def banded(drift: dict[str, Any], key: str, label: str, title: str, history: History) -> Figure:
-    """One quantity over time with its 90 % band; what the platform carries below it, where that changes."""
+    """One quantity over time with its 90 % band; what the platform carries below it, where that changes.
+
+    Parameters
+    ----------
+    drift : dict
+        ``times_s`` and the bands, as in ``pose.json``.
+    key : str
+        Which band is drawn.
+    label : str
+        Of the vertical axis.
+    title : str
+    history : History
+        For what the platform carries.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     figure, axes = panel("time, s", label, title)
     _band(axes, drift["times_s"], drift[key], CHAIN, "median and 90 % of the draws")
     axes.set_ylim(bottom=0)
@@ -99,7 +126,18 @@ def _shapes(robot: Robot, found: HistoryAnswer, rows: NDArray[np.intp]) -> tuple
 
 
 def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
-    """The robot at a few times side by side: where it is meant to be, and where creep has taken it, enlarged."""
+    """The robot at a few times side by side: where it is meant to be, and where creep has taken it, enlarged.
+
+    Parameters
+    ----------
+    robot : Robot
+    history : History
+    found : HistoryAnswer
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     rows = np.unique(np.linspace(0, len(history.times_s) - 1, _PANELS).round().astype(int))
     meant, moved, factor = _shapes(robot, found, rows)
     figure = Figure(figsize=(2.1 * len(rows), 2.75), layout="constrained")
@@ -122,7 +160,19 @@ def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
 
 
 def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
-    """The same as one moving picture (SVG): the whole history in twelve seconds."""
+    """The same as one moving picture (SVG): the whole history in twelve seconds.
+
+    Parameters
+    ----------
+    robot : Robot
+    history : History
+    found : HistoryAnswer
+
+    Returns
+    -------
+    str
+        An SVG document that plays by itself.
+    """
     whole = np.linspace(history.times_s[0], history.times_s[-1], _FRAMES)
     rows = np.clip(np.searchsorted(history.times_s, whole), 0, len(history.times_s) - 1)
     meant, moved, factor = _shapes(robot, found, rows)

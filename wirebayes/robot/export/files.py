@@ -94,7 +94,20 @@ def _spools(robot: Robot, drums: Drums) -> tuple[Floats, Floats]:
 def creep_table(
     robot: Robot, line: WireDraws, tensions_N: Sequence[float], times_s: Sequence[float]
 ) -> list[tuple[float, ...]]:
-    """Growth of a new line under constant tension, rows of `TABLE`: mm per metre of line with a 90 % interval."""
+    """Growth of a new line under constant tension, rows of `TABLE`: mm per metre of line with a 90 % interval.
+
+    Parameters
+    ----------
+    robot : Robot
+        Which of its wires' law and length are used.
+    line : WireDraws
+    tensions_N, times_s : sequence of float
+
+    Returns
+    -------
+    list of tuples
+        Tension, N; time, s; mean, standard deviation and 5, 50 and 95 % quantiles of the growth, mm/m.
+    """
     rows: list[tuple[float, ...]] = []
     sample = _sample(robot, for_robot(robot, line))
     for load in tensions_N:

@@ -260,10 +260,7 @@ def _pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> 
     columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
     for name, values in parts.items():
         quantity, unit = name.rsplit("_", 1)
-        mean, sd, low, middle, high = _described(values)
-        columns[f"{quantity}_mean_{unit}"], columns[f"{quantity}_sd_{unit}"] = mean, sd
-        for label, value in (("q05", low), ("q50", middle), ("q95", high)):
-            columns[f"{quantity}_{label}_{unit}"] = value
+        columns |= {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
     columns |= {f"tension_{i + 1}_N": _mean(track.tension_N[..., i]) for i in range(robot.legs)}
     columns["held"] = track.held.mean(0)
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
@@ -274,7 +271,8 @@ def _correction_table(
 ) -> tuple[list[str], list[list[Any]]]:
     """Corrected joint values (motor angles too), and what they change, with its standard deviation."""
     columns: dict[str, Any] = {"time_s": history.times_s}
-    mean, sd, *_ = _described(change_m)
+    described = _described(change_m)
+    mean, sd = described["mean"], described["sd"]
     for i in range(joint_m.shape[-1]):
         columns[f"joint_{i + 1}_m"] = joint_m[:, i] + mean[:, i]
     if robot.drums is not None:
@@ -285,15 +283,15 @@ def _correction_table(
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
 
 
-def _described(values: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Mean, sd, 5, 50 and 95 % over the draws that have a value."""
+def _described(values: Floats) -> dict[str, Floats]:
+    """Mean, sd, 5, 50 and 95 % over the draws that have a value, by the labels of the tables' columns."""
     mean = _mean(values)
     sd = np.sqrt(_mean((values - mean) ** 2))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a row where no draw hangs has no quantiles
         quantile = np.nanquantile if np.isnan(values).any() else np.quantile
         low, middle, high = quantile(values, [0.05, 0.5, 0.95], axis=0)
-    return mean, sd, low, middle, high
+    return {"mean": mean, "sd": sd, "q05": low, "q50": middle, "q95": high}
 
 
 def _mean(values: Floats) -> Floats:

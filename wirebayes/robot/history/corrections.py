@@ -28,6 +28,18 @@ def target(robot: Robot, history: History, found: Estimate) -> Target:
     """The commanded poses; where none are given, what the joint values would give if no wire crept.
 
     Tensions are those without creep, or the nearest to them that hold the commanded pose.
+
+    Parameters
+    ----------
+    robot : Robot
+    history : History
+        Its poses are the targets where it has them.
+    found : Estimate
+        Its robot without creep gives the targets otherwise.
+
+    Returns
+    -------
+    Target
     """
     plain = found.plain
     if history.position_m is None or history.rotation is None:
@@ -41,7 +53,20 @@ def target(robot: Robot, history: History, found: Estimate) -> Target:
 
 
 def wanted(robot: Robot, found: Estimate, to: Target) -> Floats:
-    """Joint values ``(n, t, w)`` that bring every draw to its target, creep so far included; NaN where none do."""
+    """Joint values that bring every draw to its target, creep so far included.
+
+    Parameters
+    ----------
+    robot : Robot
+    found : Estimate
+        Of n draws at t rows.
+    to : Target
+
+    Returns
+    -------
+    (n, t, w) array
+        m; NaN where no joint values reach the target.
+    """
     out = np.empty_like(found.track.tension_N)
     for k in range(out.shape[1]):
         strain = found.track.strain[:, k].T
@@ -51,7 +76,25 @@ def wanted(robot: Robot, found: Estimate, to: Target) -> Floats:
 
 
 def left(robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: Floats) -> Floats:
-    """Distance from the target, ``(n, rows)`` m, that corrected joint values ``(t, w)`` or ``(n, t, w)`` leave."""
+    """Distance from the target that corrected joint values leave.
+
+    Parameters
+    ----------
+    robot : Robot
+    history : History
+    found : Estimate
+        Of n draws at t rows.
+    to : Target
+    joint_m : (t, w) or (n, t, w) array
+        The same for all draws, or each its own.
+    rows : int array
+        Rows of the history that are evaluated.
+
+    Returns
+    -------
+    (n, len(rows)) array
+        m; NaN where the platform is not held.
+    """
     n, legs = len(found.track.position_m), robot.legs
     out = np.full((n, len(rows)), np.nan)
     for i, k in enumerate(rows):

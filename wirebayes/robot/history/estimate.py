@@ -168,7 +168,24 @@ def _gathered(of: Sensors, slope: Floats, left: Floats, counts: Floats) -> Infor
 
 
 def plain_track(known: Unknowns, history: History, start: tuple[Floats, Floats], progress: Progress) -> Track:
-    """The mean wire, which never creeps, under measured joint values."""
+    """The mean wire, which never creeps, under measured joint values.
+
+    Parameters
+    ----------
+    known : Unknowns
+        Holds the robot and the mean wire.
+    history : History
+        With joint values.
+    start : (position, rotation)
+        The pose near which the first row's is sought.
+    progress : callable
+        Called with a name, the rows done and all rows.
+
+    Returns
+    -------
+    Track
+        One column.
+    """
     assert history.joint_m is not None
     rows = len(history.times_s)
     once = history.times_s[:1]
@@ -187,7 +204,21 @@ class _Way:
     progress: Progress
 
     def track(self, wires: Wires, error_m: Floats, name: str) -> Track:
-        """Wires with reference errors followed."""
+        """The platform's way on given wires.
+
+        Parameters
+        ----------
+        wires : Wires
+            n draws.
+        error_m : (n, w) array
+            Errors of the reference lengths.
+        name : str
+            For the progress.
+
+        Returns
+        -------
+        Track
+        """
         history, rows = self.history, len(self.history.times_s)
         assert history.joint_m is not None
         starts = clock_starts(history, self.plain.tension_N[0])

@@ -79,7 +79,19 @@ class Information:
 
     @classmethod
     def none(cls, unknowns: int, sensors: int, draws: int) -> "Information":
-        """Nothing was read yet."""
+        """The information before any reading.
+
+        Parameters
+        ----------
+        unknowns : int
+        sensors : int
+            Their offsets are unknowns too.
+        draws : int
+
+        Returns
+        -------
+        Information
+        """
         e = unknowns + sensors
         return cls(np.zeros((e, e)), np.zeros((draws, e)))
 

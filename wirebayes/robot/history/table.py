@@ -60,7 +60,19 @@ def _drums(robot: Robot) -> NDArray[np.bool_]:
 
 
 def read(path: Path, robot: Robot, columns_of: Callable[[Robot, bool], Columns]) -> History:
-    """A history from a file; `columns_of` is `measured` or `commanded`.
+    """A history from a file.
+
+    Parameters
+    ----------
+    path : Path
+    robot : Robot
+        Says how many joint values and tensions a row has.
+    columns_of : callable
+        `measured` or `commanded`: which columns the file may and must have.
+
+    Returns
+    -------
+    History
 
     Raises
     ------
@@ -78,7 +90,28 @@ def parse(
     columns_of: Callable[[Robot, bool], Columns],
     place: Callable[[int], str] = "line {}".format,
 ) -> History:
-    """The same of the text of a file, which errors call `source`; `place` says where a line stands, counted from 1."""
+    """A history from the text of a file.
+
+    Parameters
+    ----------
+    source : str
+        What errors call the file.
+    text : str
+    robot : Robot
+    columns_of : callable
+        `measured` or `commanded`.
+    place : callable
+        Of a line's number, counted from 1, to what errors call it.
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    InputError
+        Naming line and column, what was found and what was expected.
+    """
     lines = csv.reader(io.StringIO(text, newline=""))
     try:
         numbered = [(lines.line_num, row) for row in lines if any(cell.strip() for cell in row)]

@@ -149,7 +149,23 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
 
 
 def warnings(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    """One sentence for each way in which a use leaves what was tested."""
+    """One sentence for each way in which a use leaves what was tested.
+
+    Parameters
+    ----------
+    line : WireDraws
+        Knows the tensions, hold durations and length that were tested.
+    tension_N : array
+        Tensions of the use, of any shape; slack and failed ones do not count.
+    time_s : float
+        Longest time of the use.
+    zero_m : array
+        Zero-tension lengths of the use.
+
+    Returns
+    -------
+    list of str
+    """
     out = []
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:

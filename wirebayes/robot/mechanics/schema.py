@@ -72,10 +72,28 @@ class _Table:
         self.content, self.asked = content, set[str]()
 
     def fail(self, key: str, found: str, expected: str) -> InputError:
+        """The error for one key of the table; the caller raises it.
+
+        Parameters
+        ----------
+        key : str
+        found, expected : str
+            As the message shows them.
+        """
         path = f"{self.path}.{key}" if self.path else key
         return InputError(f"{self.where}: {path}: {found}; expected {expected}")
 
     def take(self, key: str, expected: str, default: Any = None) -> Any:
+        """The value of a key, which counts as known from then on.
+
+        Parameters
+        ----------
+        key : str
+        expected : str
+            What the message says is expected.
+        default : any, optional
+            For a key that is missing; without a default that is an error.
+        """
         self.asked.add(key)
         if key not in self.content:
             if default is None:
@@ -86,6 +104,18 @@ class _Table:
     def number(
         self, key: str, default: float | None = None, above: float = -math.inf, least: float = -math.inf
     ) -> float:
+        """A finite number within limits.
+
+        Parameters
+        ----------
+        key : str
+        default : float, optional
+            For a key that is missing; without a default that is an error.
+        above : float
+            The number must be greater.
+        least : float
+            The number must not be less.
+        """
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
         value = self.take(key, f"a number{bound}", default)
         if not _is_number(value) or not value > above or not value >= least:
@@ -106,6 +136,16 @@ class _Table:
         return value / length
 
     def text(self, key: str, default: str | None = None, among: tuple[str, ...] = ()) -> str:
+        """A text, one of some where there is a choice.
+
+        Parameters
+        ----------
+        key : str
+        default : str, optional
+            For a key that is missing; without a default that is an error.
+        among : tuple of str
+            The texts allowed; empty for any.
+        """
         expected = "one of " + ", ".join(among) if among else "a text"
         value = self.take(key, expected, default)
         if not isinstance(value, str) or (among and value not in among):

@@ -56,7 +56,19 @@ def turned(points_m: Floats, rotation: Floats) -> Floats:
 
 
 def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
-    """Distances, directions and lever arms, over pulleys where there are any, at poses ``(3, n)``, ``(3, 3, n)``."""
+    """Distances, directions and lever arms of the wires at poses, over pulleys where there are any.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (3, n) array
+        Reference point of the platform.
+    rotation : (3, 3, n) array
+
+    Returns
+    -------
+    Geometry
+    """
     arm = turned(robot.platform_m, rotation)
     line = position_m[:, None] + arm - robot.exit_m.T[:, :, None]
     if robot.pulleys is not None:
@@ -92,12 +104,39 @@ def weight(robot: Robot, rotation: Floats) -> Floats:
 
 
 def wrench(robot: Robot, shape: Geometry, tension_N: Floats) -> Floats:
-    """Wrench of the wires on the platform about the reference point, ``(6 or 3, n)``."""
+    """Wrench of the wires on the platform about the reference point.
+
+    Parameters
+    ----------
+    robot : Robot
+    shape : Geometry
+        What `geometry` returned for the poses.
+    tension_N : (w, n) array
+
+    Returns
+    -------
+    (6 or 3, n) array
+        Force, N, then moment, N m, in the world's axes.
+    """
     return np.asarray(-(jacobian(robot, shape) * (robot.lines[:, None] * tension_N)).sum(1))
 
 
 def stretched(robot: Robot, shape: Geometry, offset_m: Floats) -> Floats:
-    """Stretched length of every wire, ``(w, n)``: its lines, and what lies beyond the exit point."""
+    """Stretched length of every wire: its lines, and what lies beyond the exit point.
+
+    Parameters
+    ----------
+    robot : Robot
+    shape : Geometry
+        What `geometry` returned for the poses.
+    offset_m : (w, n) or (w, 1) array
+        Length beyond the exit point; a linear actuator changes it.
+
+    Returns
+    -------
+    (w, n) array
+        m.
+    """
     return np.asarray(robot.lines[:, None] * shape.distance_m + offset_m)
 
 
@@ -176,7 +215,24 @@ def _add_rotation(
 def stiffness(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
 ) -> Floats:
-    """Stiffness matrices ``(n, 6, 6)`` (or 3 × 3) at poses: N/m, N and N m, about the reference point."""
+    """Stiffness matrices at poses, about the reference point.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    position_m : (3, n) array
+    rotation : (3, 3, n) array
+    zero_m : (w, n) array
+        Zero-tension lengths, creep included.
+    offset_m : (w, n) or (w, 1) array
+        Length beyond the exit points.
+
+    Returns
+    -------
+    (n, 6, 6) or (n, 3, 3) array
+        N/m, N and N m.
+    """
     shape = geometry(robot, position_m, rotation)
     tau, slope = tension(wires, stretched(robot, shape, offset_m), zero_m)
     _, H = unbalance_and_stiffness(robot, shape, rotation, tau, slope)
@@ -186,7 +242,18 @@ def stiffness(
 def potential(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
 ) -> Floats:
-    """Potential energy of wires and weight, ``(n,)`` J; its minima are the stable equilibria."""
+    """Potential energy of wires and weight; its minima are the stable equilibria.
+
+    Parameters
+    ----------
+    robot, wires, position_m, rotation, zero_m, offset_m
+        As for `stiffness`.
+
+    Returns
+    -------
+    (n,) array
+        J.
+    """
     shape = geometry(robot, position_m, rotation)
     elastic = energy(wires, stretched(robot, shape, offset_m), zero_m).sum(0)
     height = position_m[2]

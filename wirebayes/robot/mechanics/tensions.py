@@ -68,12 +68,36 @@ def _nearest(reference: Floats, structure: Floats, load: Floats, lowest: float, 
 
 
 def minimum_norm(structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:
-    """The smallest tensions (2-norm) above the floor."""
+    """The smallest tensions (2-norm) above the floor.
+
+    Parameters
+    ----------
+    structure : (6 or 3, w) array
+        Wrench matrix: wrench of each wire at 1 N.
+    load : (6 or 3,) array
+        Wrench that the wires have to produce.
+    lowest_N, highest_N : float
+
+    Returns
+    -------
+    (w,) array or None
+        None where no tensions within the limits produce the load.
+    """
     return nearest(np.zeros(structure.shape[1]), structure, load, lowest_N, highest_N)
 
 
 def middle(structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:
-    """The tensions nearest to the middle of the allowed range: stiffer, further from slackness."""
+    """The tensions nearest to the middle of the allowed range: stiffer, further from slackness.
+
+    Parameters
+    ----------
+    structure, load, lowest_N, highest_N
+        As for `minimum_norm`.
+
+    Returns
+    -------
+    (w,) array or None
+    """
     reference = np.full(structure.shape[1], 0.5 * (lowest_N + highest_N))
     return nearest(reference, structure, load, lowest_N, highest_N)
 

@@ -69,7 +69,24 @@ class Wires:
 def hold_context(
     wires: Wires, hold: int = 0, clock_s: float = 0.0, tension_N: Floats | None = None, carried_mm: Floats | None = None
 ) -> HoldContext:
-    """What an effect may look at: a robot's hold begins with a command and has no displacement."""
+    """What an effect may look at: a robot's hold begins with a command and has no displacement.
+
+    Parameters
+    ----------
+    wires : Wires
+    hold : int
+        Number of commands before this one.
+    clock_s : float
+        Time since the first command.
+    tension_N : (w, n) array, optional
+        When the hold begins; zero when left out.
+    carried_mm : (w, n) array, optional
+        Creep carried into the hold, at the tested length; zero when left out.
+
+    Returns
+    -------
+    HoldContext
+    """
     alike = np.ptp(wires.length_mm) == 0
     length = float(wires.length_mm.flat[0]) if alike else wires.length_mm
     return steady_hold(
@@ -115,7 +132,17 @@ def tension(wires: Wires, stretched_m: Floats, zero_m: Floats) -> tuple[Floats, 
 
 
 def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
-    """Elastic energy, J: the integral of the tension from the zero-tension length; zero when slack."""
+    """Elastic energy, J: the integral of the tension from the zero-tension length; zero when slack.
+
+    Parameters
+    ----------
+    wires : Wires
+    stretched_m, zero_m : (w, n) arrays
+
+    Returns
+    -------
+    (w, n) array
+    """
     stretch = np.maximum(stretched_m - zero_m, 0.0)
     if wires.at("strain"):
         total = np.zeros(np.broadcast_shapes(stretch.shape, zero_m.shape))
@@ -129,7 +156,17 @@ def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
 
 
 def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) -> Floats:
-    """Zero-tension length that gives a tension at a stretched length, m; NaN where the law cannot reach the tension."""
+    """Zero-tension length that gives a tension at a stretched length, m; NaN where the law cannot reach the tension.
+
+    Parameters
+    ----------
+    wires : Wires
+    stretched_m, tension_N : (w, n) arrays
+
+    Returns
+    -------
+    (w, n) array
+    """
     goal = tension_N / wires.theta["k1"]
     effective = goal + np.zeros(np.broadcast_shapes(goal.shape, stretched_m.shape))
     strain = strain_of(wires.placed, effective, hold_context(wires))
@@ -139,6 +176,16 @@ def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) ->
 
 
 def stretched_length(wires: Wires, zero_m: Floats, tension_N: Floats) -> Floats:
-    """Stretched length at which a wire of a zero-tension length carries a tension, m."""
+    """Stretched length at which a wire of a zero-tension length carries a tension, m.
+
+    Parameters
+    ----------
+    wires : Wires
+    zero_m, tension_N : (w, n) arrays
+
+    Returns
+    -------
+    (w, n) array
+    """
     unit = zero_tension_length(wires, np.ones_like(zero_m + tension_N), tension_N)
     return zero_m / unit

@@ -129,7 +129,20 @@ def over_workspace(
 
 
 def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
-    """The same robot at another size and mass; tension bounds follow the mass."""
+    """The same robot at another size and mass; tension bounds follow the mass.
+
+    Parameters
+    ----------
+    robot : Robot
+    factor : float
+        By which every length is multiplied.
+    mass_kg : float
+        The new mass, not a factor.
+
+    Returns
+    -------
+    Robot
+    """
     lengths = ("exit_m", "platform_m", "centre_of_mass_m", "beyond_m", "wire_m", "home_m", "lower_m", "upper_m")
     rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
                    highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip

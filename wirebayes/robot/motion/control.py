@@ -23,7 +23,22 @@ def known(wires: Wires) -> Wires:
 
 
 def hooke_only(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
-    """Commands of a controller that knows the mean stiffness and nothing of creep."""
+    """Commands of a controller that knows the mean stiffness and nothing of creep.
+
+    Parameters
+    ----------
+    robot : Robot
+    told : Wires
+        Draws of the wires that the controller knows; it uses their mean stiffness.
+    position_m : (3,) array
+    rotation : (3, 3) array
+        The pose that is to be held.
+
+    Returns
+    -------
+    callable
+        Of a time, s, to the joint values (1, w): here the same at all times.
+    """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
     joint = inverse.commands(robot, known(told), position_m[None], rotation[None], tau).joint_m
     return lambda time_s: joint
@@ -33,6 +48,20 @@ def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats)
     """Commands that take off, at every time, the creep expected under the tensions wanted there.
 
     The expectation is over the draws of `told`: parameters of creep are too entangled for their means to mean a wire.
+
+    Parameters
+    ----------
+    robot : Robot
+    told : Wires
+        Draws of the wires that the controller knows.
+    position_m : (3,) array
+    rotation : (3, 3) array
+        The pose that is to be held.
+
+    Returns
+    -------
+    callable
+        Of a time, s, to the joint values (1, w).
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
     draws = max(v.shape[-1] for v in told.theta.values())
@@ -96,6 +125,20 @@ def longest_interval(
     """Longest time up to which the pose is within tolerance with a probability, at every time before, s.
 
     Zero when not even the first time is; infinite when the last time still is.
+
+    Parameters
+    ----------
+    errors : PoseError
+        At rising times.
+    tolerance_m : float
+    tolerance_rad : float
+        Infinite where only the position counts.
+    probability : float
+
+    Returns
+    -------
+    float
+        One of the times of `errors`, zero or infinity.
     """
     good = errors.probability(tolerance_m, tolerance_rad) >= probability
     if good.all():

@@ -338,7 +338,21 @@ def from_command(
 def stably(
     robot: Robot, wires: Wires, told: inverse.Commands, position_m: Floats, rotation: Floats
 ) -> NDArray[np.bool_]:
-    """(n,) whether commands hold their own poses, ``(3,)`` or ``(n, 3)``, stably: not every balance is stable."""
+    """Whether commands hold their own poses stably: not every balance is stable.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    told : Commands
+        What `inverse.commands` returned for the poses.
+    position_m : (3,) or (n, 3) array
+    rotation : (3, 3) or (n, 3, 3) array
+
+    Returns
+    -------
+    (n,) bool array
+    """
     n = len(told.zero_m)
     pose = np.broadcast_to(position_m, (n, 3)), np.broadcast_to(rotation, (n, 3, 3))
     zero = np.where(told.feasible[:, None], told.zero_m, 1.0)
@@ -346,7 +360,23 @@ def stably(
 
 
 def moved(course: Course, origin_m: Floats, origin_rotation: Floats) -> tuple[Floats, Floats]:
-    """Displacement ``(n, t, 3)``, m, and rotation angle ``(n, t)``, rad, from an origin (of all draws or of each)."""
+    """How far the poses of a course are from an origin.
+
+    Parameters
+    ----------
+    course : Course
+        n draws at t times.
+    origin_m : (3,) or (n, 3) array
+    origin_rotation : (3, 3) or (n, 3, 3) array
+        One for all draws, or one of each.
+
+    Returns
+    -------
+    displacement : (n, t, 3) array
+        m.
+    angle : (n, t) array
+        Of the rotation, rad.
+    """
     x0 = np.broadcast_to(origin_m, (len(course.position_m), 3))[:, None]
     R0 = np.broadcast_to(origin_rotation, (len(course.position_m), 3, 3))[:, None]
     turn = course.rotation @ np.swapaxes(R0, -1, -2)

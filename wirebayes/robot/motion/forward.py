@@ -116,7 +116,24 @@ def solve(
 
 
 def spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
-    """Solutions put back among rows that could not be tried."""
+    """Solutions put back among rows that could not be tried.
+
+    Parameters
+    ----------
+    found : Equilibria or None
+        Solutions of the rows that were tried; None where none was.
+    rows : int array
+        Where they stand among all.
+    n : int
+        Number of all rows.
+    legs : int
+        Needed where `found` is None.
+
+    Returns
+    -------
+    Equilibria
+        Of n rows; those not tried are NaN and not converged.
+    """
     if found is not None:
         legs = found.tension_N.shape[1]
     whole = Equilibria(
@@ -256,7 +273,26 @@ def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Float
 def balance_at(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
 ) -> tuple[Floats, list[list[Floats]]]:
-    """Gradient ``(6 or 3, n)`` and Hessian of the energy at poses ``(n, ...)``, rotations in metres at the edge."""
+    """Gradient and Hessian of the energy at poses; rotations count in metres at the platform's edge.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    position_m : (n, 3) array
+    rotation : (n, 3, 3) array
+    zero_m : (n, w) array
+        Zero-tension lengths, creep included.
+    offset_m : (n, w) or (w,) array
+        Length beyond the exit points.
+
+    Returns
+    -------
+    gradient : (6 or 3, n) array
+        N.
+    hessian : nested lists of (n,) arrays
+        N/m.
+    """
     scale = np.ones((robot.degrees, 1))
     scale[3:] = 1.0 / robot.size_m
     offset = np.broadcast_to(offset_m, zero_m.shape).T
@@ -267,7 +303,18 @@ def balance_at(
 def tensions_at(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
 ) -> Floats:
-    """Tensions ``(n, w)`` that lengths give at poses ``(n, ...)``, in balance or not."""
+    """Tensions that lengths give at poses, in balance or not.
+
+    Parameters
+    ----------
+    robot, wires, position_m, rotation, zero_m, offset_m
+        As for `balance_at`.
+
+    Returns
+    -------
+    (n, w) array
+        N.
+    """
     shape = statics.geometry(robot, position_m.T, np.moveaxis(rotation, 0, -1))
     return tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)[0].T
 

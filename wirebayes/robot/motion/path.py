@@ -115,7 +115,21 @@ def _step(
 def settle(
     robot: Robot, wires: Wires, near: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
 ) -> forward.Equilibria:
-    """Solutions hardly away from poses: one Newton step is exact enough for most, the others are solved in full."""
+    """Solutions hardly away from poses: one Newton step is exact enough for most, the others are solved in full.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    near : (position, rotation)
+        Poses (n, 3), m, and (n, 3, 3), which the solutions are expected to be close to.
+    lengths : (zero, offset)
+        Zero-tension lengths (n, w) and lengths beyond the exit points, m.
+
+    Returns
+    -------
+    Equilibria
+    """
     step = newton_step(robot, wires, near, lengths)
     x, R = moved(robot, near, step)
     n = len(x)
@@ -131,7 +145,21 @@ def settle(
 
 
 def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
-    """Poses ``(n, ...)`` after steps ``(n, 6 or 3)``, turns in metres at the platform's edge; NaN steps change none."""
+    """Poses after small steps.
+
+    Parameters
+    ----------
+    robot : Robot
+    pose : (position, rotation)
+        (n, 3), m, and (n, 3, 3).
+    step : (n, 6 or 3) array
+        Displacement, m, then turn in metres at the platform's edge; a NaN moves nothing.
+
+    Returns
+    -------
+    position : (n, 3) array
+    rotation : (n, 3, 3) array
+    """
     step = np.where(np.isfinite(step), step, 0.0)
     x = pose[0] + step[:, :3]
     if robot.degrees == 3:
@@ -141,9 +169,21 @@ def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floa
 
 
 def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
-    """Where one Newton step leads, ``(n, 6 or 3)`` m: displacement, then turn times the platform's size.
+    """Where one Newton step towards equilibrium leads.
 
-    NaN where the stiffness there is not positive definite.
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    start : (position, rotation)
+        (n, 3), m, and (n, 3, 3).
+    lengths : (zero, offset)
+        Zero-tension lengths (n, w) and lengths beyond the exit points, m.
+
+    Returns
+    -------
+    (n, 6 or 3) array
+        Displacement, m, then turn in metres at the platform's edge; NaN where the stiffness is not positive definite.
     """
     gradient, H = forward.balance_at(robot, wires, *start, *lengths)
     step, positive = cholesky.solve(H, -gradient)
@@ -151,7 +191,22 @@ def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], length
 
 
 def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
-    """Smallest eigenvalue of the stiffness matrix, rotations weighed at the platform's edge, ``(n,)`` N/m."""
+    """Smallest eigenvalue of the stiffness matrix, rotations in metres at the platform's edge.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    pose : (position, rotation)
+        (n, 3), m, and (n, 3, 3).
+    lengths : (zero, offset)
+        Zero-tension lengths (n, w) and lengths beyond the exit points, m.
+
+    Returns
+    -------
+    (n,) array
+        N/m; an equilibrium is stable where it is above zero.
+    """
     turn = np.moveaxis(pose[1], 0, -1)
     K = statics.stiffness(robot, wires, pose[0].T, turn, lengths[0].T, np.broadcast_to(lengths[1], lengths[0].shape).T)
     scale = np.ones(robot.degrees)

@@ -66,6 +66,20 @@ def between_calibrations(
     """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
 
     The pose is exact when the calibration ends; before it the wires carried the same tensions for a time.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    asked : PoseRequest
+        The pose, the tolerances and the specimen spreads.
+    rng : numpy.random.Generator
+        Draws the specimens.
+
+    Returns
+    -------
+    list of dict
+        For each spread, load history and controller: joints held still, or commands that foresee the creep.
     """
     x, R = asked.position_m, asked.rotation
     line = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))

@@ -172,7 +172,20 @@ class Balance:
         return (1 / zero, -S / (zero * zero)) if self.law == "hooke" else (zero / (S * S), -1 / S)
 
     def pull(self, i: int, strain: Any, S: Any) -> tuple[Any, Any]:
-        """Tension and its slope by S; the hull of taut and slack where both are possible."""
+        """Tension and its derivative by the stretched length; the hull of taut and slack where both are possible.
+
+        Parameters
+        ----------
+        i : int
+            The wire.
+        strain, S : ball
+            Its strain and its stretched length, m.
+
+        Returns
+        -------
+        tension, slope : ball
+            N and N/m.
+        """
         slope = self.k1[i] * self.strain_slopes(i, S)[0]
         if strain > 0:
             return self.k1[i] * strain, slope
@@ -181,7 +194,20 @@ class Balance:
         return self.k1[i] * strain.max(self.arb(0)), slope.union(self.arb(0))
 
     def by_wire(self, i: int, S: Any, strain: Any) -> tuple[Any, Any]:
-        """Tension by stiffness and by zero-tension length, slackness minded as in `pull`."""
+        """Derivatives of the tension by the wire's own parameters, slackness treated as in `pull`.
+
+        Parameters
+        ----------
+        i : int
+            The wire.
+        S, strain : ball
+            Its stretched length, m, and its strain.
+
+        Returns
+        -------
+        by_stiffness, by_zero_length : ball
+            The first is the strain, the second in N/m.
+        """
         by_zero = self.k1[i] * self.strain_slopes(i, S)[1]
         if strain > 0:
             return strain, by_zero

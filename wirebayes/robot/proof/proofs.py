@@ -20,7 +20,23 @@ SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of the bands, the largest that can b
 
 
 def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> dict[str, Any]:
-    """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed."""
+    """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        Draws; their mean stiffness is used.
+    position_m : (3,) array
+    rotation : (3, 3) array
+        The commanded pose.
+
+    Returns
+    -------
+    dict
+        ``proved``: True, False, or None where no proof was tried, for the reason in ``sentence``; ``enclosure_m``: how
+        far the equilibrium may be from the pose; ``alone_within_m``: where there is no other.
+    """
     if wires.at("strain"):
         return {"proved": None, "sentence": "Proofs know laws (1), (3) and (6) without further effects."}
     mean = control.known(wires)
@@ -42,6 +58,23 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
     are the mean wire's joint values. The whole way from the commanded pose is proved, not its end alone: the
     equilibrium at the end must be the one that continues the pose. Where the whole band cannot be proved, a share of it
     about its middle is.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        Draws whose 5 and 95 % quantiles are the bands.
+    course : Course
+        The drift of these draws; its end gives the bands of the creep.
+    position_m : (3,) array
+    rotation : (3, 3) array
+        The commanded pose.
+
+    Returns
+    -------
+    dict
+        ``band`` with the time, the share of the band that was proved and the box, mm from the commanded position;
+        empty where no proof can be tried.
     """
     if wires.at("strain"):
         return {}
@@ -97,7 +130,21 @@ class _Way:
         self.bare, self.offset = bare_m, offset_m
 
     def proved(self, x: Floats, R: Floats, k1_N: Floats) -> Reach | None:
-        """The proof for the end, None where a piece of the way is not proved; from the commanded pose and stiffness."""
+        """The proof for the end of the way, from the commanded pose and stiffness.
+
+        Parameters
+        ----------
+        x : (3,) array
+        R : (3, 3) array
+            The commanded pose.
+        k1_N : (w,) array
+            The stiffness that the commands were computed with.
+
+        Returns
+        -------
+        Reach or None
+            None where a piece of the way is not proved.
+        """
         here, at = self._certain((x, R), k1_N, np.zeros(self.robot.legs)), k1_N
         if here is None or np.abs(here[0] - x).max() > 1e-6 * self.robot.span_m:  # not held stably
             return None

@@ -42,7 +42,19 @@ class Reach:
     line_m: Floats
 
     def holds(self, position_m: Floats, rotation: Floats, p: Floats, size_m: float, slack_m: Floats | float) -> bool:
-        """Whether a pose, known to `slack_m`, is the equilibrium that was proved for the parameters ``p``."""
+        """Whether a pose is the equilibrium that was proved for some parameters.
+
+        Parameters
+        ----------
+        position_m : (3,) array
+        rotation : (3, 3) array
+        p : array
+            The parameters, between -1 and 1 in their ranges.
+        size_m : float
+            By which the turn is multiplied to make metres.
+        slack_m : float or array
+            How well the pose is known.
+        """
         turn = vector(rotation @ self.rotation.T)
         angle = float(np.linalg.norm(turn))
         cayley = turn * (2 * np.tan(0.5 * angle) / angle) if angle > 0 else turn

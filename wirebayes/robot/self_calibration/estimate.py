@@ -114,7 +114,23 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
 
 
 def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats, rotation: Floats) -> Floats:
-    """Joint values ``(m, w)`` that bring every calibrated robot to one pose, the creep so far included."""
+    """Joint values that bring every calibrated robot to one pose, the creep so far included.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : Prior
+    known : Calibration
+        Of m robots.
+    position_m : (3,) array
+    rotation : (3, 3) array
+        The pose.
+
+    Returns
+    -------
+    (m, w) array
+        m.
+    """
     wires, error = prior.wires(robot, known.unknowns)
     tau = inverse.tensions(robot, position_m[None], rotation[None])
     told = inverse.commands(robot, wires, position_m[None], rotation[None], tau, known.creep.T, error.T)
@@ -124,10 +140,31 @@ def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats
 def derivatives(
     robot: Robot, prior: Prior, session: Session, mean: Floats, root: Floats, white: Floats, at: Prediction
 ) -> tuple[Floats, Floats]:
-    """Readings ``(m, r, d)`` and final lengths ``(m, w, d)`` by the unknowns in units of their prior.
+    """Derivatives of readings and final lengths by the unknowns in units of their prior.
 
     Central differences of the whole history in one batch: creep answers to tensions about a fifth as much as the
     elastic stretch does, so no part of the loop may be held fixed.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : Prior
+    session : Session
+        Commands and durations of m robots.
+    mean : (d,) array
+    root : (d, d) array
+        Mean of the prior and a factor of its covariance: unknowns are ``mean + root @ white``.
+    white : (m, d) array
+        Where the derivatives are taken.
+    at : Prediction
+        That of `white`; its poses are the starts of all others.
+
+    Returns
+    -------
+    by_reading : (m, r, d) array
+        Of standardised readings.
+    by_length : (m, w, d) array
+        Of final lengths, m.
     """
     m, d = white.shape
     step = 1e-3

@@ -52,7 +52,26 @@ def response(
 def sensitivity(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
 ) -> tuple[Floats, Floats]:
-    """Small motion ``(n, 6 or 3, w)`` and change of the tensions ``(n, w, w)``, N, per metre of zero-tension length."""
+    """Small motion and change of the tensions per metre of zero-tension length.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    position_m : (n, 3) array
+    rotation : (n, 3, 3) array
+        Poses of equilibrium.
+    zero_m : (n, w) array
+        Zero-tension lengths, creep included.
+    offset_m : (n, w) or (w,) array
+        Length beyond the exit points.
+
+    Returns
+    -------
+    motion : (n, 6 or 3, w) array
+    change : (n, w, w) array
+        N/m.
+    """
     motion, change, by_zero = response(robot, wires, position_m, rotation, zero_m, offset_m)
     return motion * by_zero[:, None], change * by_zero[:, None]
 

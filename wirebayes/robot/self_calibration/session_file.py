@@ -25,6 +25,17 @@ def columns(robot: Robot, tilted: bool, motors: bool = False, moved: bool = Fals
 
     With `motors` the legs with a drum of known radius have their motor's angle in place of the joint value; with
     `moved` the directions in which the wires moved last follow the tensions.
+
+    Parameters
+    ----------
+    robot : Robot
+    tilted : bool
+        With the two columns of an inclinometer.
+    motors : bool
+
+    Returns
+    -------
+    list of str
     """
     legs = range(1, robot.legs + 1)
     turned = _motors(robot) if motors else np.zeros(robot.legs, bool)
@@ -61,6 +72,22 @@ def read(
     ------
     InputError
         Naming line and column, what was found and what was expected.
+
+    Parameters
+    ----------
+    path : Path
+    robot : Robot
+        Says how many joint values and tensions a row has.
+    tension_sd_N : float
+        Standard deviation of a tension reading.
+    tilt_sd_rad : float
+        Standard deviation of an inclinometer's component.
+
+    Returns
+    -------
+    session : Session
+    readings : (r,) array
+        In units of their standard deviations.
     """
     text = read_text(path, "the header " + ",".join(columns(robot, False)))
     return parse(str(path), text, robot, tension_sd_N, tilt_sd_rad, biased=biased)
@@ -75,7 +102,29 @@ def parse(
     place: Callable[[int], str] = "line {}".format,
     biased: bool = False,
 ) -> tuple[Session, Floats]:
-    """The same of the text of a file, which errors call `source`; `place` says where a line stands, counted from 1."""
+    """A session and its standardised readings from the text of a file.
+
+    Parameters
+    ----------
+    source : str
+        What errors call the file.
+    text : str
+    robot : Robot
+    tension_sd_N, tilt_sd_rad : float
+        As for `read`.
+    place : callable
+        Of a line's number, counted from 1, to what errors call it.
+
+    Returns
+    -------
+    session : Session
+    readings : (r,) array
+
+    Raises
+    ------
+    InputError
+        Naming line and column, what was found and what was expected.
+    """
     lines = csv.reader(io.StringIO(text, newline=""))
     try:
         numbered = [(lines.line_num, row) for row in lines if row]
