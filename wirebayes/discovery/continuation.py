@@ -254,9 +254,26 @@ class _Ascent:
         return bool(np.isin(np.clip(self.neutral + amplitudes, self.low, self.high), (self.low, self.high)).all())
 
     def look(self, z: Array, amplitude: Array, alive: NDArray[np.bool_], free: list[int], steps: int) -> _Places:
-        """Follow with the amplitudes (starts n,): the best places on the way.
+        """The best places at one step of the path: the other parameters follow while the amplitude is held.
 
         A data set goes on for as long as it gains something from any of its starts.
+
+        Parameters
+        ----------
+        z : (starts n, d) array
+            Where the step begins, in the coordinates that are sampled.
+        amplitude : (starts n,) array
+            The effect's distance from neutral at this step.
+        alive : (n,) bool array
+            Data sets that are still followed.
+        free : list of int
+            Columns of the parameters that follow.
+        steps : int
+            Gauss-Newton steps at most.
+
+        Returns
+        -------
+        _Places
         """
         n, scale = self.data_sets, self.target.coordinates.scale[self.column]
         ends = (1.0, 1.0 / self.half, self.half)

@@ -137,13 +137,8 @@ def pose(
     own, seed = path_of(own_effects), check_seed(seed)
     over_time = joints is not None or trajectory is not None
     draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
-    machine = robot_of(robot)
     payload = float(payload)
-    if not 0 <= payload < math.inf:
-        raise InputError(f"--payload: found {payload:g}; expected kilograms, 0 or more")
-    machine = with_payload(
-        machine, payload, machine.centre_of_mass_m if payload_at is None else numbers("--payload-at", payload_at, 3)
-    )
+    machine = _loaded(robot_of(robot), payload, payload_at)
     line = draws_of(wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
@@ -152,12 +147,8 @@ def pose(
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
     carried = (payload, None if payload_at is None else text_of(payload_at))
     if over_time:
-        if map_heights is not None or map_rotations is not None:
-            raise InputError(
-                "--map-heights and --map-rotation: found beside a history; expected them for a single pose only"
-            )
-        if other_fit is not None or text_of(times) != text_of(TIMES_S):
-            raise InputError("--times and --other-fit: found beside a history; expected them for a single pose only")
+        _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
+        _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
         decides = configuration(
             "pose", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, experiment, *carried,
@@ -168,14 +159,7 @@ def pose(
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_of(other_fit, draws, experiment, own)
     asked = PoseRequest(
-        where,
-        matrix(turn),
-        moments,
-        1e-3 * tolerance,
-        math.radians(tolerance_tilt),
-        specimen_spread,
-        seed,
-        slices,
+        where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed, slices
     )
     limits = (tolerance, tolerance_tilt, specimen_spread)
     at = (None if values is None else text_of(values) for values in (position, rotation))
@@ -197,6 +181,18 @@ def pose(
     pictures.save_pose(run.directory, machine, asked, found)
     run.finish()
     return Pose(place, own)
+
+
+def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
+    """The robot with a payload, at its own centre of mass where no other place is given."""
+    if not 0 <= payload_kg < math.inf:
+        raise InputError(f"--payload: found {payload_kg:g}; expected kilograms, 0 or more")
+    return with_payload(robot, payload_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
+
+
+def _refuse_beside_history(options: str, given: bool) -> None:
+    if given:
+        raise InputError(f"{options}: found beside a history; expected them for a single pose only")
 
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:

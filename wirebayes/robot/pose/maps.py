@@ -37,7 +37,7 @@ class Slices:
     rotations_rad: Floats
 
 
-LEVEL = Slices(None, np.zeros((1, 3)))
+LEVEL = Slices(None, np.zeros((1, 3)))  # a level platform at the default heights, unless others are requested
 
 
 @dataclass(frozen=True)
