@@ -15,6 +15,7 @@ from types import FrameType
 from typing import NoReturn
 
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+_OURS = ("configuration.json", ".lock")  # every run begins with these
 _PATIENCE_S = 2.0  # for a worker to tidy up, before it is killed
 
 _unfinished: set[Path] = set()
@@ -111,4 +112,4 @@ def _begun(arguments: Sequence[str]) -> bool:
     folder = next((Path(after) for word, after in zip(words, words[1:], strict=False) if word == "--output"), None)
     if folder is None or not (folder / "configuration.json").is_file() or (folder / "complete.json").exists():
         return False
-    return any(path.is_file() and path.name != "configuration.json" for path in folder.rglob("*"))
+    return any(path.is_file() and path.name not in _OURS for path in folder.rglob("*"))

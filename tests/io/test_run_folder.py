@@ -1,13 +1,23 @@
 """Files are written whole, and a folder belongs to one configuration."""
 
+import errno
 import json
+import os
 import stat
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import check_file, check_run, open_run, write_bytes, write_csv, write_json
+from wirebayes.io.run_folder import Run, check_file, check_run, open_run, write_bytes, write_csv, write_json
+
+
+def opened(folder: Path, configuration: dict[str, object]) -> Run:
+    """As a run that ends at once."""
+    with open_run(folder, configuration) as run:
+        return run
+
 
 CONFIGURATION = {"command": "fit", "seed": 0, "data": {"wire-a": "abc"}, "effects": ["toe"]}
 
@@ -25,14 +35,14 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
 
 def test_what_a_killed_run_was_writing_is_removed_by_the_next_command(tmp_path):
     folder, table = tmp_path / "out", tmp_path / "predicted.csv"
-    open_run(folder, CONFIGURATION)
+    opened(folder, CONFIGURATION)
     (folder / "wire-a").mkdir()
     left = [folder / ".configuration.json.x.partial", folder / "wire-a" / ".posterior.nc.partial"]
     left.append(tmp_path / ".predicted.csv.x.partial")
     others = [folder / "wire-a" / "thesis.partial", tmp_path / ".other.csv.x.partial"]
     for path in [*left, *others]:
         path.write_text("half")
-    open_run(folder, CONFIGURATION)
+    opened(folder, CONFIGURATION)
     check_file(table)
     assert [path for path in left if path.exists()] == []
     assert all(path.exists() for path in others)
@@ -66,17 +76,17 @@ def test_csv_round_trips(tmp_path):
 
 def test_a_folder_is_new_then_resumed_then_done(tmp_path):
     folder = tmp_path / "out" / "fit"
-    run = open_run(folder, CONFIGURATION)
+    run = opened(folder, CONFIGURATION)
     assert run.state == "new"
     assert json.loads((folder / "configuration.json").read_text()) == CONFIGURATION
-    assert open_run(folder, CONFIGURATION).state == "resumed"
+    assert opened(folder, CONFIGURATION).state == "resumed"
     run.finish()
-    assert open_run(folder, CONFIGURATION).state == "done"
+    assert opened(folder, CONFIGURATION).state == "done"
 
 
 def test_an_empty_folder_or_one_left_by_a_kill_is_new(tmp_path):
     (tmp_path / ".configuration.json.x.partial").write_text("{")
-    assert open_run(tmp_path, CONFIGURATION).state == "new"
+    assert opened(tmp_path, CONFIGURATION).state == "new"
 
 
 def test_checking_makes_nothing(tmp_path):
@@ -94,32 +104,32 @@ def test_checking_makes_nothing(tmp_path):
     ],
 )
 def test_another_configuration_is_refused_by_name(tmp_path, change, said):
-    open_run(tmp_path / "out", CONFIGURATION)
+    opened(tmp_path / "out", CONFIGURATION)
     before = (tmp_path / "out" / "configuration.json").read_bytes()
     with pytest.raises(InputError) as caught:
-        open_run(tmp_path / "out", CONFIGURATION | change)
+        opened(tmp_path / "out", CONFIGURATION | change)
     assert str(caught.value).startswith(f"{tmp_path / 'out'}: made with another configuration: {said} expected a new")
     assert (tmp_path / "out" / "configuration.json").read_bytes() == before
 
 
 def test_a_key_that_is_gone_is_a_difference_too(tmp_path):
-    open_run(tmp_path / "out", CONFIGURATION)
+    opened(tmp_path / "out", CONFIGURATION)
     with pytest.raises(InputError, match="seed is 0 there, nothing here"):
-        open_run(tmp_path / "out", {key: value for key, value in CONFIGURATION.items() if key != "seed"})
+        opened(tmp_path / "out", {key: value for key, value in CONFIGURATION.items() if key != "seed"})
 
 
 def test_what_is_not_ours_is_left_alone(tmp_path):
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(InputError, match="found thesis.tex but no configuration.json"):
-        open_run(tmp_path, CONFIGURATION)
+        opened(tmp_path, CONFIGURATION)
     with pytest.raises(InputError, match="found a file, expected a folder"):
-        open_run(tmp_path / "thesis.tex", CONFIGURATION)
-    with pytest.raises(InputError, match="expected a (writable )?folder"):
-        open_run(tmp_path / "thesis.tex" / "deeper", CONFIGURATION)
+        opened(tmp_path / "thesis.tex", CONFIGURATION)
+    with pytest.raises(InputError, match="cannot be written|expected a folder"):
+        opened(tmp_path / "thesis.tex" / "deeper", CONFIGURATION)
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "configuration.json").write_text("{")
     with pytest.raises(InputError, match="found no readable configuration"):
-        open_run(tmp_path / "broken", CONFIGURATION)
+        opened(tmp_path / "broken", CONFIGURATION)
 
 
 def test_a_file_that_cannot_be_written_is_refused_beforehand(tmp_path):
@@ -128,3 +138,32 @@ def test_a_file_that_cannot_be_written_is_refused_beforehand(tmp_path):
         check_file(tmp_path)
     with pytest.raises(InputError, match="found no writable folder"):
         check_file(tmp_path / "absent" / "new.csv")
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EDQUOT])
+def test_a_disk_that_takes_no_more_ends_in_one_line_and_keeps_what_is_there(tmp_path, monkeypatch, number):
+    folder = tmp_path / "out"
+    opened(folder, CONFIGURATION)
+    write_json(folder / "summary.json", {"k1": 1})
+
+    def full(handle: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match=f"summary.json: cannot be written .{os.strerror(number)}"):
+        write_json(folder / "summary.json", {"k1": 2})
+    assert json.loads((folder / "summary.json").read_text()) == {"k1": 1}
+    assert sorted(path.name for path in folder.iterdir()) == ["configuration.json", "summary.json"]
+
+
+def test_a_folder_that_vanishes_under_a_run_is_told_in_one_line(tmp_path):
+    with pytest.raises(InputError, match="cannot be written"), open_run(tmp_path / "out", CONFIGURATION) as run:
+        for path in run.directory.iterdir():
+            path.unlink()
+        run.directory.rmdir()
+        run.finish()
+
+
+def test_other_errors_of_the_system_are_not_hidden(tmp_path):
+    with pytest.raises(BrokenPipeError), open_run(tmp_path / "out", CONFIGURATION):
+        raise BrokenPipeError(errno.EPIPE, "a bug of ours")

@@ -5,6 +5,7 @@ resumes there, another is refused; so nothing is ever mixed or overwritten.
 """
 
 import csv
+import errno
 import glob
 import io
 import json
@@ -20,6 +21,7 @@ from typing import Any, Literal
 from wirebayes import __version__
 from wirebayes.errors import InputError
 from wirebayes.interrupt import unfinished
+from wirebayes.io.lock import LOCK, locked
 from wirebayes.user_files import read_bytes
 
 CONFIGURATION = "configuration.json"
@@ -27,16 +29,40 @@ COMPLETE = "complete.json"
 _PARTIAL = ".partial"
 
 
+# The disk is full or a limit reached, the folder read-only or gone, or a file stands where a folder should.
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO,
+               errno.ENOENT, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG)  # fmt: skip
+
+
+@contextmanager
+def writable(place: Path) -> Iterator[None]:
+    """Say in one line where nothing can be written; what was finished before stays.
+
+    Raises
+    ------
+    InputError
+        Instead of the system's error within the block.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _UNWRITABLE:
+            raise
+        expected = "a folder to write in, with room for the results; mend that and run the same command again"
+        raise InputError(f"{place}: cannot be written ({os.strerror(error.errno)}), expected {expected}") from error
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a whole file or nothing: a reader, or a run killed half-way, never meets half of it."""
-    handle, partial = tempfile.mkstemp(prefix=f".{path.name}.", suffix=_PARTIAL, dir=path.parent)
-    with unfinished(Path(partial)):
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(partial, 0o666 & ~_umask())  # mkstemp makes private files, results are for everyone
-        os.replace(partial, path)
+    with writable(path):
+        handle, partial = tempfile.mkstemp(prefix=f".{path.name}.", suffix=_PARTIAL, dir=path.parent)
+        with unfinished(Path(partial)):
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(partial, 0o666 & ~_umask())  # mkstemp makes private files, results are for everyone
+            os.replace(partial, path)
 
 
 def write_text(path: Path, content: str) -> None:
@@ -202,10 +228,11 @@ class Run:
         write_json(self.directory / COMPLETE, {"complete": True})
 
 
-def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Run:
-    """Open a folder for a configuration, making it when it is absent.
+@contextmanager
+def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Iterator[Run]:
+    """Open a folder for a configuration, making it when it is absent, and keep other runs out until the block ends.
 
-    Call it once everything that was given has been checked: before that, nothing should be written.
+    Enter it once everything that was given has been checked: before that, nothing should be written.
 
     Parameters
     ----------
@@ -213,33 +240,38 @@ def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Run:
     configuration : mapping
         Everything that decides the results: command, version, options as resolved, seed, hash of the data.
 
-    Returns
-    -------
+    Yields
+    ------
     Run
 
     Raises
     ------
     InputError
-        The folder belongs to another configuration (names what differs) or to something else, or cannot be made.
+        The folder belongs to another configuration (names what differs) or to something else, cannot be made, or
+        another run is writing in it; or its disk is full, whenever that happens.
     """
     directory = Path(directory)
     wanted = plain(configuration)
-    state = check_run(directory, wanted)
-    if state == "new":
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            write_json(directory / CONFIGURATION, wanted)
-        except OSError as error:
-            raise InputError(f"{directory}: cannot be written ({error.strerror}), expected a writable folder") from None
-    clear_leftovers(directory)
-    return Run(directory, state)
+    if check_run(directory, wanted) == "done":
+        yield Run(directory, "done")
+        return
+    with writable(directory):
+        directory.mkdir(parents=True, exist_ok=True)
+        with locked(directory):
+            state = check_run(directory, wanted)  # it may have been finished a moment ago
+            if state == "new":
+                write_json(directory / CONFIGURATION, wanted)
+            clear_leftovers(directory)
+            yield Run(directory, state)
 
 
 def check_run(directory: Path, configuration: Mapping[str, Any]) -> Literal["new", "resumed", "done"]:
     """State in which `open_run` would find a folder; writes nothing and raises as `open_run` does."""
     expected = "a new or empty folder, or one made with the same configuration"
     try:
-        present = sorted(path.name for path in directory.iterdir() if not path.name.endswith(_PARTIAL))
+        present = sorted(
+            path.name for path in directory.iterdir() if path.name != LOCK and not path.name.endswith(_PARTIAL)
+        )
     except FileNotFoundError:
         return "new"
     except NotADirectoryError:

@@ -61,13 +61,13 @@ def reproduce(
     """
     experiments, published = paper.experiments(), paper.published()
     training = int(published["identification"]["training_holds"])
-    run = open_run(directory, configuration(experiments, seed, policy))
-    if run.state != "done":
-        jobs = fits(experiments, training)
-        run_jobs(jobs, directory, seed, policy=policy, report=report)
-        _tables_and_pictures(directory, experiments, published, training, seed, report)
-        write_page(directory)
-        run.finish()
+    with open_run(directory, configuration(experiments, seed, policy)) as run:
+        if run.state != "done":
+            jobs = fits(experiments, training)
+            run_jobs(jobs, directory, seed, policy=policy, report=report)
+            _tables_and_pictures(directory, experiments, published, training, seed, report)
+            write_page(directory)
+            run.finish()
     return _not_converged(directory, fits(experiments, training))
 
 

@@ -1,6 +1,7 @@
 """Results on disk: netCDF that ArviZ reads, and a summary in JSON. The only module that knows xarray and ArviZ."""
 
 import json
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +19,6 @@ from wirebayes import __version__
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
-from wirebayes.interrupt import unfinished
 from wirebayes.io.run_folder import stored_results, write_bytes, write_json
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
@@ -61,14 +61,21 @@ def save(
     if sample is None and len(fit.problem.samples) == 1:
         sample = fit.problem.samples[0]
     tree = _tree(fit, sample, provenance, np.random.default_rng(seed))
-    partial = folder / ".posterior.nc.partial"
-    with unfinished(partial):
-        tree.to_netcdf(partial, engine="h5netcdf")
-        write_bytes(folder / "posterior.nc", partial.read_bytes())
-        partial.unlink()
+    write_bytes(folder / "posterior.nc", _netcdf(tree))
     summary = _summary(fit, sample, tree)
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def _netcdf(tree: xr.DataTree) -> bytes:
+    """The content of a netCDF file, made in memory: HDF5 itself may end the process where a disk is full."""
+    if "dask" not in sys.modules:
+        return bytes(tree.to_netcdf(engine="h5netcdf"))
+    import dask
+
+    # on a cluster's worker xarray would ask the scheduler for a lock of what no other can see
+    with dask.config.set(scheduler="synchronous"):
+        return bytes(tree.to_netcdf(engine="h5netcdf"))
 
 
 @dataclass(frozen=True)

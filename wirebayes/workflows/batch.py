@@ -142,10 +142,11 @@ def batch(
         return Batch(place, own, computed=False)
     with without_script():
         _compute(read, task, place.path, configuration, scheduler, progress or silent)
-    rows = [read_json(place.path / e.name / _ROW) for e, _ in read]
-    rows += [_empty(file) | {"error": said} for file, said in unreadable.items()]
-    _tabulate(rows, outliers(rows), place.path)
-    open_run(place.path, configuration).finish()
+    with open_run(place.path, configuration) as run:
+        rows = [read_json(place.path / e.name / _ROW) for e, _ in read]
+        rows += [_empty(file) | {"error": said} for file, said in unreadable.items()]
+        _tabulate(rows, outliers(rows), place.path)
+        run.finish()
     return Batch(place, own)
 
 
@@ -203,14 +204,17 @@ def _compute(
         if not todo:
             return
         try:
-            with executor(scheduler, len(todo)) as pool:
-                open_run(folder, configuration)  # not before there is somebody to do the work
-                with _scratch(folder, scheduler) as scratch:
-                    progress("experiments", len(read) - len(todo), len(read))
-                    results = _results(pool, todo, replace(task, scratch=scratch))
-                    for done, (name, result) in enumerate(results, len(read) - len(todo) + 1):
-                        _store(result, folder / name)
-                        progress("experiments", done, len(read))
+            # the folder is opened when there is somebody to do the work
+            with (
+                executor(scheduler, len(todo)) as pool,
+                open_run(folder, configuration),
+                _scratch(folder, scheduler) as scratch,
+            ):
+                progress("experiments", len(read) - len(todo), len(read))
+                results = _results(pool, todo, replace(task, scratch=scratch))
+                for done, (name, result) in enumerate(results, len(read) - len(todo) + 1):
+                    _store(result, folder / name)
+                    progress("experiments", done, len(read))
             return
         except BrokenProcessPool:
             if not left:

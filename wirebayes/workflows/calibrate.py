@@ -102,13 +102,13 @@ def calibrate(
     options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read, *((bias,) if bias else ()))
     place = Place.at(output)
     decides = configuration("calibrate", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
-    run = open_run(place.path, decides)
-    if run.state != "done":
-        prior = Prior(line, 1e-3 * reference_sd, specimen_spread, bias_sd_N=bias)
-        with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-            found = answer(machine, prior, session, values, seed)
-        write_json(run.directory / "calibrate.json", found)
-        run.finish()
+    with open_run(place.path, decides) as run:
+        if run.state != "done":
+            prior = Prior(line, 1e-3 * reference_sd, specimen_spread, bias_sd_N=bias)
+            with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
+                found = answer(machine, prior, session, values, seed)
+            write_json(run.directory / "calibrate.json", found)
+            run.finish()
     return Calibration(place, own, computed=run.state != "done")
 
 

@@ -72,22 +72,22 @@ def check(
         "priors": {e.name: e.priors for e in experiments}, "data_sha256": {e.name: e.data_hash for e in experiments},
     }  # fmt: skip
     place = Place.at(output)
-    run = open_run(place.path, configuration)
-    if run.state != "done":
-        from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
+    with open_run(place.path, configuration) as run:
+        if run.state != "done":
+            from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
-        found = {}
-        for done, e in enumerate(experiments):
-            report("check", done, len(experiments))
-            told = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
-            warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *told.warnings]
-            found[e.name] = _understood(e) | {
-                "warnings": warnings, "parameters": told.parameters, "effects": told.effects,
-            }  # fmt: skip
-            understood(e, place.path / f"{e.name}.svg")
-        report("check", len(experiments), len(experiments))
-        write_json(place.path / CHECKED, {"experiments": found})
-        run.finish()
+            found = {}
+            for done, e in enumerate(experiments):
+                report("check", done, len(experiments))
+                told = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
+                warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *told.warnings]
+                found[e.name] = _understood(e) | {
+                    "warnings": warnings, "parameters": told.parameters, "effects": told.effects,
+                }  # fmt: skip
+                understood(e, place.path / f"{e.name}.svg")
+            report("check", len(experiments), len(experiments))
+            write_json(place.path / CHECKED, {"experiments": found})
+            run.finish()
     return Check(place, own, computed=run.state != "done")
 
 

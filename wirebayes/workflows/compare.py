@@ -206,19 +206,19 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
     Comparison
     """
     place = Place.at(output)
-    opened = open_run(place.path, plan.configuration)
-    if opened.state == "done":
-        return Comparison(place, plan.own_effects, computed=False, warnings=plan.warnings)
-    with without_script():
-        run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
-    from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
+    with open_run(place.path, plan.configuration) as opened:
+        if opened.state == "done":
+            return Comparison(place, plan.own_effects, computed=False, warnings=plan.warnings)
+        with without_script():
+            run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
+        from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
 
-    content: dict[str, Any] = {"version": 1, "seed": plan.seed, "experiments": {}}
-    for one in plan.experiments:
-        with stored_results(place.path / one.name):
-            models = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
-            content["experiments"][one.name] = side_by_side(models, BASE)
-        pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
-    write_json(place.path / "comparison.json", content)
-    opened.finish()
+        content: dict[str, Any] = {"version": 1, "seed": plan.seed, "experiments": {}}
+        for one in plan.experiments:
+            with stored_results(place.path / one.name):
+                models = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
+                content["experiments"][one.name] = side_by_side(models, BASE)
+            pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
+        write_json(place.path / "comparison.json", content)
+        opened.finish()
     return Comparison(place, plan.own_effects, warnings=plan.warnings)

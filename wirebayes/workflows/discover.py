@@ -114,17 +114,17 @@ def discover(
     configuration |= {} if policy is None else {"policy": vars(policy)}
     configuration |= {} if simulations is None else {"simulations": simulations}
     place = Place.at(output)
-    opened = open_run(place.path, configuration)
-    if opened.state == "done":
-        return Findings(place, own, computed=False)
-    settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
-    with without_script():
-        with workers(prepare=partial(catalogue, own)) as parallel_map:
-            found = investigate(experiments, settings, seed, progress or silent, parallel_map)
-        jobs = jobs_of(found, elastic_law, history, own)
-        run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
-    write_findings(found, place.path, own)
-    opened.finish()
+    with open_run(place.path, configuration) as opened:
+        if opened.state == "done":
+            return Findings(place, own, computed=False)
+        settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
+        with without_script():
+            with workers(prepare=partial(catalogue, own)) as parallel_map:
+                found = investigate(experiments, settings, seed, progress or silent, parallel_map)
+            jobs = jobs_of(found, elastic_law, history, own)
+            run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+        write_findings(found, place.path, own)
+        opened.finish()
     return Findings(place, own)
 
 

@@ -77,10 +77,10 @@ def export(
     place = Place.at(output)
     options = (experiment, text_of(tensions), text_of(times))
     posterior = folder_of(wires, experiment) / POSTERIOR
-    run = open_run(place.path, configuration("export", robot, posterior, draws, seed, own, *options))
-    if run.state != "done":
-        write_csv(run.directory / "creep-table.csv", files.TABLE, table)
-        for name, text in contents.items():
-            write_text(run.directory / name, text)
-        run.finish()
+    with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, *options)) as run:
+        if run.state != "done":
+            write_csv(run.directory / "creep-table.csv", files.TABLE, table)
+            for name, text in contents.items():
+                write_text(run.directory / name, text)
+            run.finish()
     return Export(place, own, computed=run.state != "done")

@@ -140,13 +140,13 @@ def fit(
         "data_sha256": {e.name: e.data_hash for members in groups.values() for e in members},
     } | ({} if policy is None else {"policy": vars(policy)})  # fmt: skip
     place = Place.at(output)
-    opened = open_run(place.path, configuration)
-    if opened.state != "done":
-        with without_script():
-            run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
-            if check:
-                write_checks(jobs, place.path, seed, progress or silent)
-        opened.finish()
+    with open_run(place.path, configuration) as opened:
+        if opened.state != "done":
+            with without_script():
+                run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+                if check:
+                    write_checks(jobs, place.path, seed, progress or silent)
+            opened.finish()
     return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
 
 

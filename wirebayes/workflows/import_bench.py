@@ -102,10 +102,10 @@ def import_bench(
         "names": names, "length_mm": float(length_mm), "material": material, **vars(choices),
     }  # fmt: skip
     place = Place.at(output)
-    run = open_run(place.path, configuration)
-    if run.state != "done":
-        _write(place.path, paths, tests)
-        run.finish()
+    with open_run(place.path, configuration) as run:
+        if run.state != "done":
+            _write(place.path, paths, tests)
+            run.finish()
     return ImportedTests(place, computed=run.state != "done")
 
 

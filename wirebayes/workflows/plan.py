@@ -148,42 +148,42 @@ def plan(
         "robot": None if told is None else hash_of(asdict(told)) if isinstance(told, Robot) else content(Path(told)),
     } | asked.about  # fmt: skip
     place = Place.at(output)
-    opened = open_run(place.path, configuration)
-    if opened.state == "done":
-        return Plan(place, own, computed=False)
-    report = progress or silent
-    judged: list[Judged] = []
-    tension: float | None = None  # of the first test: all state their creep for it
-    with without_script():
-        for done, (test, words) in enumerate(asked.tests):
-            report("protocols", done, len(asked.tests))
-            guess = asked.guess.at(test.length_mm)
-            test = at_centre(test, guess, elastic_law, history)
-            tension = typical_tension(test) if tension is None else tension
-            one = np.random.default_rng(seed_of(seed, "plan", test.name))
-            try:
-                expected = expected_widths(
-                    test, guess, one, law=elastic_law, history=history, tension_N=tension,
-                    length_mm=asked.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
-                )  # fmt: skip
-            except ValueError as error:
-                raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
-            seen = sensitivity(test, guess, kinds, one, law=elastic_law, history=history, simulations=SIMULATIONS)
-            judged.append(Judged(test, words, expected, seen))
-    report("protocols", len(asked.tests), len(asked.tests))
-    order = ranked(judged, asked.aim, asked.budget_min)
-    rows = [_row(j, asked, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
-    summary = {
-        "version": 1, "aim": list(asked.aim), "budget_min": asked.budget_min, "best": rows[0]["name"],
-        "guess": {"source": asked.guess.source, "length_mm": asked.guess.length_mm,
-                  "parameters": {n: _statistics(v) for n, v in asked.guess.draws.items()}},
-        "robot": None if machine is None else machine.name, "protocols": rows,
-    }  # fmt: skip
-    write_json(opened.directory / "plan.json", summary)
-    from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
+    with open_run(place.path, configuration) as opened:
+        if opened.state == "done":
+            return Plan(place, own, computed=False)
+        report = progress or silent
+        judged: list[Judged] = []
+        tension: float | None = None  # of the first test: all state their creep for it
+        with without_script():
+            for done, (test, words) in enumerate(asked.tests):
+                report("protocols", done, len(asked.tests))
+                guess = asked.guess.at(test.length_mm)
+                test = at_centre(test, guess, elastic_law, history)
+                tension = typical_tension(test) if tension is None else tension
+                one = np.random.default_rng(seed_of(seed, "plan", test.name))
+                try:
+                    expected = expected_widths(
+                        test, guess, one, law=elastic_law, history=history, tension_N=tension,
+                        length_mm=asked.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
+                    )  # fmt: skip
+                except ValueError as error:
+                    raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
+                seen = sensitivity(test, guess, kinds, one, law=elastic_law, history=history, simulations=SIMULATIONS)
+                judged.append(Judged(test, words, expected, seen))
+        report("protocols", len(asked.tests), len(asked.tests))
+        order = ranked(judged, asked.aim, asked.budget_min)
+        rows = [_row(j, asked, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
+        summary = {
+            "version": 1, "aim": list(asked.aim), "budget_min": asked.budget_min, "best": rows[0]["name"],
+            "guess": {"source": asked.guess.source, "length_mm": asked.guess.length_mm,
+                      "parameters": {n: _statistics(v) for n, v in asked.guess.draws.items()}},
+            "robot": None if machine is None else machine.name, "protocols": rows,
+        }  # fmt: skip
+        write_json(opened.directory / "plan.json", summary)
+        from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
 
-    widths_and_effects(plain(summary), opened.directory / "plan.svg")
-    opened.finish()
+        widths_and_effects(plain(summary), opened.directory / "plan.svg")
+        opened.finish()
     return Plan(place, own)
 
 

@@ -169,17 +169,17 @@ def pose(
     place = Place.at(output)
     posterior = folder_of(wires, experiment) / POSTERIOR
     decides = configuration("pose", robot, posterior, draws, seed, own, *options, *mapped)
-    run = open_run(place.path, decides)
-    if run.state == "done":
-        return Pose(place, own, computed=False)
-    found = answer(machine, line, asked, other)
-    write_json(run.directory / "pose.json", found.content)
-    if found.maps:
-        write_csv(run.directory / "workspace.csv", TABLE, rows(found.maps))
-    from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
+    with open_run(place.path, decides) as run:
+        if run.state == "done":
+            return Pose(place, own, computed=False)
+        found = answer(machine, line, asked, other)
+        write_json(run.directory / "pose.json", found.content)
+        if found.maps:
+            write_csv(run.directory / "workspace.csv", TABLE, rows(found.maps))
+        from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
 
-    pictures.save_pose(run.directory, machine, asked, found)
-    run.finish()
+        pictures.save_pose(run.directory, machine, asked, found)
+        run.finish()
     return Pose(place, own)
 
 

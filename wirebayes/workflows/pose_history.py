@@ -107,16 +107,16 @@ def pose_history(
         history = table.parse(option[2:], text, robot, columns, row_place)
         read = hash_of({option: text})
     spread = [errors.reference_m, errors.spread, errors.tension_N, errors.tilt_rad]
-    run = open_run(place.path, decides | {"history": [option[2:], read, *spread]})
-    if run.state == "done":
-        return Pose(place, own_effects, computed=False)
-    with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
-        found = answer(robot, line, history, errors, start, seed, progress)
-    write_json(run.directory / "pose.json", found.content)
-    for name, (header, rows) in found.tables.items():
-        write_csv(run.directory / name, header, rows)
-    from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
+    with open_run(place.path, decides | {"history": [option[2:], read, *spread]}) as run:
+        if run.state == "done":
+            return Pose(place, own_effects, computed=False)
+        with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
+            found = answer(robot, line, history, errors, start, seed, progress)
+        write_json(run.directory / "pose.json", found.content)
+        for name, (header, rows) in found.tables.items():
+            write_csv(run.directory / name, header, rows)
+        from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
 
-    pictures.save(run.directory, robot, history, found)
-    run.finish()
+        pictures.save(run.directory, robot, history, found)
+        run.finish()
     return Pose(place, own_effects)

@@ -124,10 +124,10 @@ def simulate_tests(
     place = Place.at(output)
     if check_run(place.path, configuration) == "new":
         draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made
-    run = open_run(place.path, configuration)
-    if run.state != "done":
-        write(place.path, benches, truth, seed)
-        run.finish()
+    with open_run(place.path, configuration) as run:
+        if run.state != "done":
+            write(place.path, benches, truth, seed)
+            run.finish()
     return SimulatedTests(place, own, computed=run.state != "done")
 
 
