@@ -1,9 +1,11 @@
 """Stiffness that firmware and simulator are given: the tangent at the tensions the robot works at."""
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.robot import cases
 from wirebayes.effects import named
@@ -93,6 +95,48 @@ def test_a_line_that_cannot_carry_the_platform_has_no_spring_constant():
     robot = schema.read("hangprinter-4")
     with pytest.raises(InputError, match="cannot carry"):
         files.reprapfirmware(robot, _line("hooke", "strain_stiffening", {"strain_stiffening.c": -2000.0}))
+
+
+@pytest.mark.parametrize("name", ["linear-7", "hangprinter-4", "cogiro-desk"])
+def test_urdf_and_sdf_put_every_frame_in_its_place(name):
+    mujoco = pytest.importorskip("mujoco")
+    robot = schema.read(name)
+    robot = replace(
+        cases.with_pulleys(robot, np.random.default_rng(0)), name='a "name" & more',
+        home_rotation_rad=np.array([0.02, -0.03, 0.05]) * (robot.degrees == 6),
+    )  # fmt: skip
+    written = files.simulators(robot, _line("hooke", None, {}))
+    assert set(written) == {"robot.xml", "robot.urdf", "robot.sdf"}
+    R = rotation.matrix(robot.home_rotation_rad)
+    points = robot.home_m + robot.platform_m @ R.T
+    # MuJoCo reads URDF; without this extension it would fuse the frames into one body
+    keep = '<mujoco><compiler fusestatic="false"/></mujoco>'
+    mujoco.MjModel.from_xml_string(written["robot.urdf"])
+    text = written["robot.urdf"].replace('  <link name="world"/>', keep + '<link name="world"/>')
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for i in range(robot.legs):
+        np.testing.assert_allclose(data.body(f"exit_{i + 1}").xpos, robot.exit_m[i], atol=1e-12)
+        np.testing.assert_allclose(data.body(f"point_{i + 1}").xpos, points[i], atol=1e-12)
+    assert model.body("platform").mass[0] == robot.mass_kg
+    np.testing.assert_allclose(data.body("platform").xipos, robot.home_m + R @ robot.centre_of_mass_m, atol=1e-12)
+    assert model.nv == 6
+    assert ElementTree.fromstring(written["robot.xml"]).get("model") == robot.name
+    tree = ElementTree.fromstring(written["robot.sdf"])
+    assert tree.find("model").get("name") == robot.name
+    pose = np.array(tree.find("model/link/pose").text.split(), float)
+    turn = Rotation.from_euler("xyz", pose[3:]).as_matrix()
+    np.testing.assert_allclose(turn, R, atol=1e-12)
+    for frame in tree.findall("model/frame"):
+        place = np.array(frame.find("pose").text.split(), float)[:3]
+        kind, i = frame.get("name").split("_")
+        if frame.get("attached_to") == "platform":
+            place = pose[:3] + turn @ place
+        np.testing.assert_allclose(place, (robot.exit_m if kind == "exit" else points)[int(i) - 1], atol=1e-12)
+    for text in (written["robot.urdf"], written["robot.sdf"]):
+        assert "The wires are left out" in text and "wire 1: " in text and "Left out: swivelling pulleys" in text
+        assert ("keep the orientation" in text) == (robot.degrees == 3)
 
 
 def test_firmware_says_that_it_leaves_out_pulleys():

@@ -58,7 +58,7 @@ def export(
     --------
     >>> exported = wb.export("hangprinter-4", posterior, draws=100)
     >>> sorted(exported.files)
-    ['creep-table.csv', 'klipper.cfg', 'reprapfirmware.g', 'robot.xml']
+    ['creep-table.csv', 'klipper.cfg', 'reprapfirmware.g', 'robot.sdf', 'robot.urdf', 'robot.xml']
     """
     own, seed = path_of(own_effects), check_seed(seed)
     machine = robot_of(robot)
@@ -70,9 +70,7 @@ def export(
     if files.is_hangprinter(machine):
         contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
         contents["klipper.cfg"] = files.klipper(machine, line)
-    model = files.mujoco(machine, line)
-    if model is not None:
-        contents["robot.xml"] = model
+    contents |= files.simulators(machine, line)
     table = files.creep_table(machine, line, loads, moments)
     place = Place.at(output)
     options = (experiment, text_of(tensions), text_of(times))

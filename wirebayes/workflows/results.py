@@ -606,7 +606,7 @@ class Export(Result):
         if "klipper.cfg" not in self.files:
             out.append("no firmware settings: they exist for four or five drums with a position-only platform")
         if "robot.xml" not in self.files:
-            out.append("no robot.xml: no tensions within the bounds hold the platform at its home pose")
+            out.append("no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose")
         return tuple(out)
 
     def _shortly(self) -> list[str]:

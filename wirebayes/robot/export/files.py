@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.robot.export.mujoco_model import mjcf
+from wirebayes.robot.export.robot_models import sdf, urdf
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
@@ -171,6 +172,24 @@ def working_spring(robot: Robot, line: WireDraws) -> WorkingSpring:
     if not good.all():
         remark += f" {100 * np.mean(~good):.2g} % of the draws cannot carry that tension and are left out."
     return WorkingSpring(stiffness[good], remark)
+
+
+def simulators(robot: Robot, line: WireDraws) -> dict[str, str]:
+    """The robot for simulators by file name: MuJoCo, URDF and SDF; empty where no tensions hold the home pose.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    """
+    model = mujoco(robot, line)
+    if model is None:
+        return {}
+    wires = for_robot(robot, line.centre())
+    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
+    zero = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R)).zero_m[0]
+    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, 1))[:, 0]
+    return {"robot.xml": model, "robot.urdf": urdf(robot, k1, zero), "robot.sdf": sdf(robot, k1, zero)}
 
 
 def mujoco(robot: Robot, line: WireDraws) -> str | None:

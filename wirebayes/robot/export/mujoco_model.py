@@ -9,6 +9,7 @@ looks towards one pose. There lengths and forces are the robot's; beside it they
 """
 
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,7 @@ def mjcf(
     comment = "".join(f"<!-- {text} -->" for text in (remark, _STILL if pulleys else "") if text)
     inertia = _row(np.full(3, m * arm2))
     return (
-        f'<mujoco model="{robot.name}">{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
+        f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}<body>{slides}{ball}'
         f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
