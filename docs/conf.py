@@ -15,10 +15,11 @@ project = "wirebayes"
 author = "The wirebayes developers"
 copyright = "2026, the wirebayes developers"
 version = release = __version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
 exclude_patterns = ["_build", "generated"]
+html_math_renderer = "mathml"
 html_theme = "alabaster"
-html_theme_options = {"description": "A Bayesian toolkit for wires that creep", "page_width": "1080px"}
+html_theme_options = {"description": "A Bayesian toolkit for wires that creep", "page_width": "1080px", "show_powered_by": False}
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False

@@ -159,7 +159,7 @@ def test_a_table_is_sorted_by_the_keyboard(pages, tab):
 
 def test_a_robot_is_turned_by_the_keyboard_and_followed_in_time(pages, tab):
     tab.open(pages["pose"], 820)
-    points = "[...document.querySelectorAll('figure.view circle')].map(c => c.getAttribute('cx')).join()"
+    points = "[...document.querySelectorAll('figure.view circle')].map(c => c.outerHTML).join()"
     first = tab.run(points)
     tab.run("document.querySelector('figure.view button').focus()")
     tab.press("Enter", 13, "\r")
