@@ -8,7 +8,7 @@ INPUTS := pyproject.toml constraints.txt
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test test-full lint calibration discover-benchmark benchmark docs clean
+.PHONY: run test test-full lint calibration discover-benchmark benchmark docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
@@ -42,6 +42,12 @@ benchmark: .venv/test.stamp
 docs: .venv/docs.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
+# Wheel and source archive as they would be uploaded; nothing is.
+dist: .venv/release.stamp
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	$(BIN)/python -m twine check --strict dist/*
+
 # What is installed follows pyproject.toml and constraints.txt; a stamp is left only by an install that worked.
 .venv/run.stamp: $(INPUTS)
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or later is needed" if sys.version_info < (3, 11) else 0)'
@@ -54,4 +60,4 @@ docs: .venv/docs.stamp
 	touch $@
 
 clean:
-	rm -rf .venv out build docs/_build wirebayes.egg-info
+	rm -rf .venv out build dist docs/_build wirebayes.egg-info

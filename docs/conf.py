@@ -19,7 +19,11 @@ extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
 exclude_patterns = ["_build", "generated"]
 html_math_renderer = "mathml"
 html_theme = "alabaster"
-html_theme_options = {"description": "A Bayesian toolkit for wires that creep", "page_width": "1080px", "show_powered_by": False}
+html_theme_options = {
+    "description": "A Bayesian toolkit for wires that creep",
+    "page_width": "1080px",
+    "show_powered_by": False,
+}
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False

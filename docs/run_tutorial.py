@@ -15,6 +15,10 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from wirebayes.report.blocks import save
+from wirebayes.report.figures import corner
+from wirebayes.results.store import load
+
 DOCS = Path(__file__).parent
 CONTROLLERS = {
     "hooke_only": "ignores creep",
@@ -61,7 +65,9 @@ def follow(folder: Path) -> dict[str, str]:
 
 def _rounded(text: str) -> str:
     """A table with numbers of four digits."""
-    rows = [[f"{float(c):.4g}" if re.fullmatch(r"[\d.e+-]+", c) else c for c in row] for row in csv.reader(text.split())]
+    rows = [
+        [f"{float(c):.4g}" if re.fullmatch(r"[\d.e+-]+", c) else c for c in row] for row in csv.reader(text.split())
+    ]
     return "\n".join(",".join(row) for row in rows) + "\n"
 
 
@@ -87,6 +93,15 @@ def main() -> None:
             (DOCS / "tutorial" / name).write_text(text, encoding="utf-8")
         for name, file in PICTURES.items():
             shutil.copy(Path(folder) / file, DOCS / "gallery" / f"{name}.svg")
+        pairs(Path(folder) / "out/discover/bench/final", DOCS / "gallery" / "corner.svg")
+
+
+def pairs(posterior: Path, target: Path) -> None:
+    """Draw every pair of parameters, as the page of a fit does."""
+    stored = load(posterior)
+    figure = corner(stored.draws, stored.sample.model.effects)
+    assert figure is not None
+    save(figure, target)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """What is installed: the paper's data come along, from a checkout and from a wheel."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -85,3 +86,24 @@ def test_a_wheel_works_outside_the_checkout(tmp_path):
     run(python, "-m", "wirebayes", "--help")
     for name in COMMANDS:
         run(python, "-m", "wirebayes", name, "--help")
+
+
+def test_the_paper_cites_what_its_bibliography_holds():
+    text = (ROOT / "docs" / "paper" / "paper.md").read_text(encoding="utf-8")
+    entries = re.findall(r"^@\w+\{(\w+),", (ROOT / "docs" / "paper" / "paper.bib").read_text(encoding="utf-8"), re.M)
+    assert set(re.findall(r"(?<![\w.])@(\w+)", text)) == set(entries)
+    assert text.startswith("---\ntitle:") and "\nbibliography: paper.bib\n" in text
+    for heading in ("Summary", "Statement of need", "References"):
+        assert f"\n# {heading}\n" in text
+
+
+def test_the_paper_claims_only_what_the_documentation_shows():
+    """Every figure of its measured part, as digits, stands in the README or the documentation too."""
+    text = (ROOT / "docs" / "paper" / "paper.md").read_text(encoding="utf-8")
+    measured = text.partition("# Measured behaviour")[2].partition("# Limits")[0]
+    shown = " ".join(p.read_text(encoding="utf-8") for p in [ROOT / "README.md", *(ROOT / "docs").glob("*.*st")])
+    shown += " ".join(p.read_text(encoding="utf-8") for p in (ROOT / "docs").glob("*.inc"))
+    digits = {number.lstrip("0") for number in re.findall(r"\d[\d,]*\.?\d*(?:e-\d+)?", shown.replace(" .", " 0."))}
+    digits |= {number.rstrip(".,") for number in digits}
+    for number in re.findall(r"\d[\d,]*\.?\d*(?:e-\d+)?", measured):
+        assert number.rstrip(".,").lstrip("0") in digits, number
