@@ -9,7 +9,7 @@ import numpy as np
 from analyses.benchmarks.measure import Costs, judged, looked_at
 from wirebayes.inference.modes import modes
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import ensemble
+from wirebayes.inference.sampler import ensemble, kept
 from wirebayes.inference.transform import LogPosterior
 
 
@@ -25,8 +25,8 @@ def ours(problem, seed, seconds, wanted=20_000):
         return timed
 
     # kept draws and the stop rule apart from search and burn-in, in the one run that counts
-    kept = {name: watched(getattr(ensemble, name)) for name in ("_kept_block", "_look")}
-    with patch.multiple(ensemble, **kept), costs.part("burn"):
+    timed = {name: watched(getattr(kept, name)) for name in ("more", "looked")}
+    with patch.multiple(kept, **timed), costs.part("burn"):
         chains = ensemble.sample(target, seed, Policy(ess=wanted))
     for book in (costs.cpu, costs.wall):
         book["burn"] -= book["sample"]

@@ -1,5 +1,6 @@
 """The sampler on analytic targets: first and second moments over independent runs, and broken ones that must fail."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from wirebayes.inference import convergence
 from wirebayes.inference.fit import fit
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import burn_in, ensemble, moves
+from wirebayes.inference.sampler import burn_in, kept, moves
 from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.io import paper
@@ -75,7 +76,7 @@ def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(
     t, ratio = worst(gaussian, HASTY)
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
-    monkeypatch.setattr(ensemble, "_promises_more", lambda state, policy: False)
+    monkeypatch.setattr(kept, "promises_more", lambda state, policy: False)
     stubborn = sample(TARGETS["two_modes"](), 1, HASTY)
     assert again.converged and stubborn.converged
     assert again.kept_evaluations == again.log_density.size  # none of those kept before
@@ -99,13 +100,14 @@ def test_a_sampler_that_forgets_the_proposal_s_density_fails(monkeypatch):
 def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
     """Walkers set back to good places during the kept steps, which only burn-in may do, shrink the second moments."""
 
-    def wrong(target, state, policy, kept=ensemble._kept_block):
-        low = state.values < np.median(state.values)
-        state.positions[low], state.values[low] = state.positions[state.values.argmax()], state.values.max()
-        kept(target, state, policy)
+    def wrong(target, state, policy, more=kept.more):
+        positions, values = state.walkers.positions.copy(), state.walkers.values.copy()
+        low = values < np.median(values)
+        positions[low], values[low] = positions[values.argmax()], values.max()
+        return more(target, replace(state, walkers=replace(state.walkers, positions=positions, values=values)), policy)
 
-    monkeypatch.setattr(ensemble, "_kept_block", wrong)
-    monkeypatch.setattr(ensemble, "_block_steps", lambda state, policy: 1 if state.kept_z else 2)
+    monkeypatch.setattr(kept, "more", wrong)
+    monkeypatch.setattr(kept, "block_steps", lambda state, policy: 1 if state.kept.z else 2)
     t, _ = worst(gaussian, Policy(**{**SMALL.__dict__, "most_steps": 24, "ess": 1e9}))
     assert t > LIMIT
 
@@ -139,7 +141,7 @@ def test_a_funnel_whose_neck_is_taken_for_its_last_coordinate_is_refused():
 
 
 def test_without_its_witness_the_sampler_believes_a_funnel_without_a_neck(monkeypatch):
-    monkeypatch.setattr(ensemble, "OUTWEIGHS", np.inf)
+    monkeypatch.setattr(kept, "OUTWEIGHS", np.inf)
     assert funnels(0, 2)[:, 1].min() < 0.02
 
 
@@ -175,17 +177,19 @@ def fake(draws):
     """A state that kept (ensembles, steps, walkers, d) draws of a Gaussian, and the target that it came from."""
     ensembles, steps, walkers_, d = draws.shape
     z = np.moveaxis(draws, 0, 1).reshape(steps, ensembles * walkers_, d)
-    state = sampler_state.State(
-        z[-1], np.zeros(len(z[-1])), None, None, None, np.random.default_rng(0), 1, 0, learned=False
+    state = sampler_state.Sampling(
+        sampler_state.Walkers(z[-1], np.zeros(len(z[-1])), None),
+        sampler_state.Learned(None, None, 1, trusted=False),
+        np.random.default_rng(0),
+        0,
+        sampler_state.Kept((z,), (np.zeros(z.shape[:2]),)),
     )
-    state.frozen, state.kept_z, state.kept_log_density = True, [z], [np.zeros(z.shape[:2])]
     return state, SimpleNamespace(coordinates=gaussian(d).coordinates, problem=gaussian(d).problem)
 
 
 def looked(draws, **asked):
     state, target = fake(draws)
-    ensemble._look(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **asked))
-    return state
+    return kept.looked(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **asked))
 
 
 def test_a_chain_that_gives_enough_draws_is_believed_and_one_with_too_few_is_not():
@@ -198,14 +202,14 @@ def test_an_ensemble_that_stands_apart_is_not_believed_however_many_draws_there_
     x = np.random.default_rng(4).normal(size=(4, 100, 64, 2))
     x[0, ..., 1] += 0.4  # R-hat of 1.02 by the walkers' spread, when ESS alone would do
     state = looked(np.repeat(x, 8, axis=1), ess=50.0)
-    assert (state.ess > 50.0).all() and state.r_hat.max() > 1.01
+    assert (state.diagnostics.ess > 50.0).all() and state.diagnostics.r_hat.max() > 1.01
     assert not state.finished
 
 
 def test_a_chain_shorter_than_five_autocorrelation_times_is_not_believed():
     x = first_order(0.95, (4, 120, 256, 2), np.random.default_rng(5))  # 39 steps remember: three times as long
     state = looked(x, ess=1000.0)
-    assert (state.ess > 1000.0).all() and (state.r_hat < 1.01).all()
+    assert (state.diagnostics.ess > 1000.0).all() and (state.diagnostics.r_hat < 1.01).all()
     assert not state.finished
     longer = looked(first_order(0.95, (4, 400, 256, 2), np.random.default_rng(6)), ess=1000.0)
     assert longer.finished and longer.converged
@@ -297,7 +301,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(policy, blow, tmp_path, monkeypa
         return advance(*arguments)
 
     monkeypatch.setattr(burn_in, "advance", mortal)
-    monkeypatch.setattr(ensemble, "advance", mortal)
+    monkeypatch.setattr(kept, "advance", mortal)
     with pytest.raises(Killed):
         sample(gaussian(), 11, policy, checkpoint=path)
     monkeypatch.undo()

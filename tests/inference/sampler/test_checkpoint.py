@@ -16,9 +16,9 @@ from tests.statistical.targets import two_modes
 from wirebayes.cli import main
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import checkpoint
+from wirebayes.inference.sampler import checkpoint, resume
 from wirebayes.inference.sampler.ensemble import sample
-from wirebayes.inference.sampler.state import State
+from wirebayes.inference.sampler.state import BurnIn
 from wirebayes.io import paper
 from wirebayes.results import jobs
 
@@ -45,12 +45,12 @@ def kill_once(stage: Callable[[Mapping[str, Any]], bool], patch: pytest.MonkeyPa
 
 
 STAGES: dict[str, Callable[[Mapping[str, Any]], bool]] = {
-    "search": lambda values: values["round"] == 0,
-    "burn-in": lambda values: values["round"] == 1,
-    "frozen": lambda values: values["frozen"],
-    "kept": lambda values: values["kept_evaluations"] > 0,
-    "learned again": lambda values: values["again"] > 0,
-    "finished": lambda values: values["finished"],
+    "search": lambda values: values.get("round") == 0,
+    "burn-in": lambda values: values.get("round") == 1,
+    "frozen": lambda values: values["stage"] == "sampling",
+    "kept": lambda values: values.get("kept", {}).get("evaluations", 0) > 0,
+    "learned again": lambda values: values["learned"]["again"] > 0,
+    "finished": lambda values: values.get("finished", False),
 }
 
 
@@ -104,9 +104,9 @@ def of_fit(path: Path) -> Any:
 
 def test_a_state_that_was_stored_is_the_same_state(written: Path, tmp_path: Path) -> None:
     about = of_fit(written)
-    state = State.load(written, about)
-    assert state is not None and state.seen is not None and state.witness is not None
-    state.save(tmp_path / "again", about)
+    state = resume.load(written, about)
+    assert isinstance(state, BurnIn) and state.seen is not None and state.learned.witness is not None
+    resume.save(state, tmp_path / "again", about)
     first, again = checkpoint.read(written, about), checkpoint.read(tmp_path / "again", about)
     assert first is not None and again is not None
     assert first[0] == again[0]
@@ -151,11 +151,13 @@ def test_another_format_is_refused_before_anything_else_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / ".checkpoint"
-    monkeypatch.setattr(checkpoint, "FORMAT", 2)
+    monkeypatch.setattr(checkpoint, "FORMAT", 99)
     checkpoint.write(path, {"unknown": "here"}, {}, {"x": np.zeros(2)})
     monkeypatch.undo()
     monkeypatch.setattr(checkpoint.np, "load", None)
-    with pytest.raises(InputError, match=r"found format 2, expected 1; remove this file to start the fit anew"):
+    with pytest.raises(
+        InputError, match=rf"found format 99, expected {checkpoint.FORMAT}; remove this file to start the fit anew"
+    ):
         checkpoint.read(path, OF_FIT)
 
 

@@ -9,6 +9,7 @@ from tests.statistical.targets import two_modes
 from wirebayes.inference import modes
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, mixture, moves, proposal, transport_map
+from wirebayes.inference.sampler.state import BurnIn
 
 
 def crescent(n, rng):
@@ -122,12 +123,12 @@ def test_a_mode_that_died_out_on_the_way_is_still_found(seed):
 def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
     policy = Policy(ensembles=2, walkers=64, rounds=3, round_draws=1024, most_rounds=3)
     target = two_modes()
-    state, shares = burn_in.begin(target, 1, policy, None, None, None), []
-    while not state.frozen:
-        shares.append(state.proposal.shares)
-        burn_in.one_round(target, state, policy)
+    state, shares = burn_in.init(target, 1, policy, None, None, None), []
+    while isinstance(state, BurnIn):
+        shares.append(state.learned.proposal.shares)
+        state = burn_in.step(target, state, policy)
     assert shares == [proposal.ROUGH_SHARES, proposal.EXPLORING, proposal.EXPLORING]
-    assert state.proposal.shares == proposal.SHARES
+    assert state.learned.proposal.shares == proposal.SHARES
 
 
 def test_a_climb_is_given_up_on_the_way_and_no_other_with_it():

@@ -21,15 +21,15 @@ from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.inference.sampler.state import State, advance
+from wirebayes.inference.sampler.state import BurnIn, Learned, Pair, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
 
 Array = NDArray[Any]
 
 
-def begin(
+def init(
     target: LogPosterior, seed: int, policy: Policy, found: Optimum | None, near: Array | None, rough: Array | None
-) -> State:
+) -> BurnIn:
     """Search where nothing is known, and learn a first proposal from rough draws.
 
     Parameters
@@ -48,84 +48,100 @@ def begin(
 
     Returns
     -------
-    State
+    BurnIn
         Walkers drawn from the modes' normal approximations, widened; nothing is kept yet.
     """
     spawned = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
-    seen, witness = None if rough is None else (rough, rough), None
+    seen: Pair | None = None if rough is None else (rough, rough)
+    witness: Pair | None = None
     if found is None:
         searched = search(target, rng, extra=near)
         found, seen = searched.modes, seen or (searched.warm, searched.cold)
         witness = searched.cold, searched.height
     known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
     random = np.random.RandomState(np.random.MT19937(spawned[1]))
-    positions, values = _finite_draws(target, known, _walking(target, policy), random)
-    before = target.evaluations - before
-    state = State(positions, values, random.get_state(), known, known, rng, len(found.z), before, witness=witness)
-    if seen is not None and _fit(target, state, policy, *seen, proposal.ROUGH_SHARES):
-        state.acceptance, state.seen = 1.0, None  # to be believed until draws tell better
+    places = _finite_draws(target, known, _walking(target, policy), random)
+    learned = Learned(known, known, len(found.z), witness)
+    state = BurnIn(Walkers(*places, random.get_state()), learned, rng, target.evaluations - before)
+    if seen is not None:
+        state = _fitted(target, state, policy, *seen, proposal.ROUGH_SHARES)
+        if state.learned.proposal is not known:
+            state = replace(state.knowing(acceptance=1.0), seen=None)  # to be believed until draws tell better
     return state
 
 
-def one_round(target: LogPosterior, state: State, policy: Policy) -> None:
+def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampling:
     """Learn from a walk, as long as the proposal is not to be trusted, then from weighted draws of the proposal.
 
     Parameters
     ----------
     target : LogPosterior
-    state : State
-        Changed in place: proposal, acceptance and round; after the last round it is frozen and its walkers are placed.
+    state : BurnIn
     policy : Policy
         How many rounds, how many draws in each, and what acceptance is enough.
+
+    Returns
+    -------
+    BurnIn or Sampling
+        After the last round the proposal is frozen and walkers are placed.
     """
-    state.round += 1
-    if state.acceptance < _USEFUL:
-        _fit(target, state, policy, *_resampled_twice(*_walked(target, state, policy), state.generator))
-    z, value, base = _drawn(target, state, policy)
+    state = replace(state, round=state.round + 1)
+    if state.learned.acceptance < _USEFUL:
+        state, walk = _walked(target, state, policy)
+        state = _fitted(target, state, policy, *_resampled_twice(*walk, state.generator))
+    state, z, value, base = _drawn(target, state, policy)
     weight = value - base
     typical = weight[_resampled(weight, len(weight), state.generator)]
-    state.acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
+    acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
+    state = state.knowing(acceptance=acceptance)
     middle, high = np.quantile(typical, [0.5, 0.999])
-    settled = state.acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
+    settled = acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
     last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
-    if state.acceptance >= _USEFUL:
+    if acceptance >= _USEFUL:
         seen = _resampled_twice(z, value, base, state.generator)
-        _fit(target, state, policy, *seen, points=proposal.ENOUGH if last else _PASSING)
-    if last:
-        state.frozen, state.learned = True, state.acceptance > policy.acceptance
-        if isinstance(state.proposal, Proposal):
-            state.proposal = replace(state.proposal, shares=proposal.SHARES)
-        _place(state, policy, *((z, value, base) if state.learned or state.walk is None else state.walk))
-        state.walk = state.seen = None
-        # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
-        steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
-        advance(target, state, steps, policy.ensembles)
+        state = _fitted(target, state, policy, *seen, points=proposal.ENOUGH if last else _PASSING)
+    # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
+    steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
+    return _frozen(target, state, policy, (z, value, base), steps) if last else state
 
 
-def learn_again(target: LogPosterior, state: State, policy: Policy) -> None:
+def _frozen(
+    target: LogPosterior, state: BurnIn, policy: Policy, drawn: tuple[Array, Array, Array], steps: int
+) -> Sampling:
+    """The run with its proposal as it will stay, every ensemble placed by weight and settled for some steps."""
+    learned = replace(state.learned, trusted=state.learned.acceptance > policy.acceptance)
+    if isinstance(learned.proposal, Proposal):
+        learned = replace(learned, proposal=replace(learned.proposal, shares=proposal.SHARES))
+    z, value, base = drawn if learned.trusted or state.walk is None else state.walk
+    rows = _placed(policy, value - base, state.generator)
+    walkers = Walkers(z[rows], value[rows], state.walkers.random)
+    move = move_of(learned, policy.ensembles, steps, frozen=True)
+    settled = advance(target, walkers, move, steps)
+    return Sampling(settled.walkers, learned, state.generator, state.evaluations + settled.evaluations)
+
+
+def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before.
 
     Parameters
     ----------
     target : LogPosterior
-    state : State
-        Changed in place: unfrozen, without kept draws.
+    state : Sampling
     policy : Policy
     """
-    z = np.concatenate(state.kept_z).reshape(-1, state.positions.shape[1])
-    value = np.concatenate(state.kept_log_density).ravel()
-    state.frozen, state.again, state.round = False, state.again + 1, policy.rounds - 1
-    if state.overlooked:  # few rounds of many draws: what is overlooked is rare
-        state.round = max(state.round, policy.most_rounds - _FEW_ROUNDS)
-    state.kept_z, state.kept_log_density = [], []
-    state.kept_evaluations = state.accepted = state.proposed = 0
+    z = np.concatenate(state.kept.z).reshape(-1, state.walkers.positions.shape[1])
+    value = np.concatenate(state.kept.log_density).ravel()
+    learned = replace(state.learned, again=state.learned.again + 1)
+    done = policy.rounds - 1
+    if learned.overlooked:  # few rounds of many draws: what is overlooked is rare
+        done = max(done, policy.most_rounds - _FEW_ROUNDS)
     hot = z[_resampled((_HOT - 1.0) * value, len(z), state.generator)]
-    _fit(target, state, policy, hot, z)
+    return _fitted(target, BurnIn(state.walkers, learned, state.generator, state.evaluations, done), policy, hot, z)
 
 
-def overlooked(state: State, z: Array, value: Array) -> float:
+def overlooked(learned: Learned, z: Array, value: Array) -> float:
     """How far places that matter lie above what the frozen proposal makes of them, in nats.
 
     The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
@@ -134,8 +150,8 @@ def overlooked(state: State, z: Array, value: Array) -> float:
 
     Parameters
     ----------
-    state : State
-        Holds the proposal and, in `witness`, what the search left.
+    learned : Learned
+        The proposal and, as `witness`, what the search left.
     z : (n, d) array
         Kept draws, in the coordinates that are sampled.
     value : (n,) array
@@ -145,59 +161,61 @@ def overlooked(state: State, z: Array, value: Array) -> float:
     -------
     float
     """
-    over = value - state.proposal.log_density(z)
+    over = value - learned.proposal.log_density(z)
     middle, high = np.quantile(over, [0.5, 0.999])
-    if state.witness is None:
+    if learned.witness is None:
         return float(high - middle)
-    z, value = state.witness
-    return float(max(high, np.quantile(value - state.proposal.log_density(z), 0.99)) - middle)
+    z, value = learned.witness
+    return float(max(high, np.quantile(value - learned.proposal.log_density(z), 0.99)) - middle)
 
 
-def _walked(target: LogPosterior, state: State, policy: Policy) -> tuple[Array, Array, Array]:
+def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
-    again = min(state.walks, len(_WARM) - 1)
-    state.walks += 1
-    steps = policy.round_draws // _walking(target, policy) * 2**again
-    sampler, _ = advance(target, state, steps, power=_WARM[again])
-    walked = sampler.get_log_prob(discard=steps // 2, flat=True)
-    state.walk = sampler.get_chain(discard=steps // 2, flat=True), walked / _WARM[again], walked
-    return state.walk
+    power = _WARM[min(state.learned.walks, len(_WARM) - 1)]
+    steps = policy.round_draws // _walking(target, policy) * 2 ** min(state.learned.walks, len(_WARM) - 1)
+    move = move_of(state.learned, 1, steps, frozen=False)
+    done = advance(target, state.walkers, move, steps, power)
+    walked = done.sampler.get_log_prob(discard=steps // 2, flat=True)
+    walk = done.sampler.get_chain(discard=steps // 2, flat=True), walked / power, walked
+    state = state.knowing(walks=state.learned.walks + 1)
+    return replace(state, walkers=done.walkers, evaluations=state.evaluations + done.evaluations, walk=walk), walk
 
 
-def _drawn(target: LogPosterior, state: State, policy: Policy) -> tuple[Array, Array, Array]:
+def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, Array, Array, Array]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
-    most = policy.round_draws * (_TO_FIND_MORE if state.overlooked else 1)
+    drawn_from = state.learned.proposal
+    most = policy.round_draws * (_TO_FIND_MORE if state.learned.overlooked else 1)
     n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS))
-    z = state.proposal.rvs(n, state.generator)
+    z = drawn_from.rvs(n, state.generator)
     before = target.evaluations
     value = target(z)
-    state.evaluations += target.evaluations - before
+    state = replace(state, evaluations=state.evaluations + target.evaluations - before)
     good = np.isfinite(value)
-    return z[good], value[good], state.proposal.log_density(z[good])
+    return state, z[good], value[good], drawn_from.log_density(z[good])
 
 
-def _fit(
+def _fitted(
     target: LogPosterior,
-    state: State,
+    state: BurnIn,
     policy: Policy,
     hot: Array,
     cold: Array,
     shares: tuple[float, float, float, float] = proposal.EXPLORING,
     points: int = proposal.ENOUGH,
-) -> bool:
+) -> BurnIn:
     """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
-    before, state.seen = state.seen, (hot, cold)
+    learned, before, state = state.learned, state.seen, replace(state, seen=(hot, cold))
     if before is not None:
         hot, cold = np.vstack([before[0], hot]), np.vstack([before[1], cold])
     try:
-        state.proposal = proposal.fit(
-            hot, cold, state.start, target.coordinates.order, state.generator, shares,
-            most=max(policy.components, min(state.modes, _MOST_COMPONENTS)), points=points,
-            before=state.proposal if isinstance(state.proposal, Proposal) else None,
+        new = proposal.fit(
+            hot, cold, learned.start, target.coordinates.order, state.generator, shares,
+            most=max(policy.components, min(learned.modes, _MOST_COMPONENTS)), points=points,
+            before=learned.proposal if isinstance(learned.proposal, Proposal) else None,
         )  # fmt: skip
     except np.linalg.LinAlgError:
-        return False  # too few distinct points yet: keep the proposal that made them
-    return True
+        return state  # too few distinct points yet: keep the proposal that made them
+    return state.knowing(proposal=new)
 
 
 def _resampled_twice(z: Array, value: Array, base: Array, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -206,13 +224,13 @@ def _resampled_twice(z: Array, value: Array, base: Array, rng: np.random.Generat
     return hot, cold
 
 
-def _place(state: State, policy: Policy, z: Array, value: Array, base: Array) -> None:
-    """Start every ensemble from a share of the places of its own."""
+def _placed(policy: Policy, log_weight: Array, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Rows by weight where walkers begin: every ensemble has a share of the places of its own."""
     chosen = []
     for i in range(policy.ensembles):
-        own = np.arange(i, len(z), policy.ensembles)
-        chosen.append(own[_resampled((value - base)[own], policy.walkers, state.generator)])
-    state.positions, state.values = z[np.concatenate(chosen)], value[np.concatenate(chosen)]
+        own = np.arange(i, len(log_weight), policy.ensembles)
+        chosen.append(own[_resampled(log_weight[own], policy.walkers, rng)])
+    return np.concatenate(chosen)
 
 
 def _walking(target: LogPosterior, policy: Policy) -> int:

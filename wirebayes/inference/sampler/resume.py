@@ -1,0 +1,108 @@
+"""States of a run as plain values and named arrays, which a resume file holds (`checkpoint` knows the file)."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.inference.sampler import checkpoint
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, State, Walkers
+from wirebayes.io.run_folder import stored_results
+
+_PLAIN_LEARNED = ("modes", "trusted", "acceptance", "walks", "again", "overlooked")
+_PLAIN_KEPT = ("evaluations", "accepted", "proposed")
+_PLAIN_SAMPLING = ("finished", "converged", "why")
+
+
+def load(path: Path | None, of_fit: Mapping[str, Any]) -> State | None:
+    """The state in a resume file; None where there is none (errors: `checkpoint.read`)."""
+    stored = None if path is None else checkpoint.read(path, of_fit)
+    if path is None or stored is None:
+        return None
+    with stored_results(path, checkpoint.INSTEAD):
+        return from_stored(*stored)
+
+
+def save(state: State, path: Path | None, of_fit: Mapping[str, Any]) -> None:
+    """Write the resume file whole.
+
+    Parameters
+    ----------
+    state : BurnIn or Sampling
+    path : Path or None
+        Nothing is written without one.
+    of_fit : mapping
+        What tells this fit from others.
+    """
+    if path is not None:
+        checkpoint.write(path, of_fit, to_values(state), to_arrays(state))
+
+
+def to_values(state: State) -> dict[str, Any]:
+    """Everything but the arrays, in JSON's own types."""
+    out: dict[str, Any] = {
+        "stage": "burn-in" if isinstance(state, BurnIn) else "sampling",
+        "evaluations": state.evaluations,
+        "generator": state.generator.bit_generator.state,
+        "random": list(state.walkers.random[2:]),
+        "learned": {name: getattr(state.learned, name) for name in _PLAIN_LEARNED},
+    }
+    if isinstance(state, BurnIn):
+        return out | {"round": state.round}
+    kept = {name: getattr(state.kept, name) for name in _PLAIN_KEPT}
+    return out | {"kept": kept} | {name: getattr(state, name) for name in _PLAIN_SAMPLING}
+
+
+def to_arrays(state: State) -> dict[str, Any]:
+    """Arrays by name, those of parts under the part's name; absent ones are None."""
+    walkers, learned = state.walkers, state.learned
+    kind = "proposal" if isinstance(learned.proposal, Proposal) else "mixture"
+    out: dict[str, Any] = {
+        "positions": walkers.positions,
+        "values": walkers.values,
+        "random": walkers.random[1],
+        kind: learned.proposal.to_arrays(),
+        "start": learned.start.to_arrays(),
+        "witness": _numbered(learned.witness),
+    }
+    if isinstance(state, BurnIn):
+        return out | {"walk": _numbered(state.walk), "seen": _numbered(state.seen)}
+    kept = state.kept
+    blocks = {name: np.concatenate(v) for name, v in (("z", kept.z), ("log_density", kept.log_density)) if v}
+    return out | {"kept": blocks} | (asdict(state.diagnostics) if state.diagnostics else {})
+
+
+def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
+    """The state that gave these values and arrays."""
+    learned = Learned(
+        proposal=Proposal.from_arrays(arrays["proposal"])
+        if "proposal" in arrays
+        else Mixture.from_arrays(arrays["mixture"]),
+        start=Mixture.from_arrays(arrays["start"]),
+        witness=_tuple(arrays, "witness"),
+        **values["learned"],
+    )
+    generator = np.random.default_rng()
+    generator.bit_generator.state = values["generator"]
+    random = ("MT19937", arrays["random"], *values["random"])
+    walkers = Walkers(arrays["positions"], arrays["values"], random)
+    run = walkers, learned, generator, values["evaluations"]
+    if values["stage"] == "burn-in":
+        return BurnIn(*run, values["round"], _tuple(arrays, "walk"), _tuple(arrays, "seen"))
+    blocks = arrays.get("kept", {})
+    z, log_density = ((blocks[name],) if name in blocks else () for name in ("z", "log_density"))
+    kept = Kept(z, log_density, **values["kept"])
+    looked = Diagnostics(*(arrays[name] for name in ("autocorrelation", "ess", "r_hat"))) if "ess" in arrays else None
+    return Sampling(*run, kept, looked, *(values[name] for name in _PLAIN_SAMPLING))
+
+
+def _numbered(arrays: tuple[Any, ...] | None) -> dict[str, Any] | None:
+    return None if arrays is None else {str(i): array for i, array in enumerate(arrays)}
+
+
+def _tuple(arrays: Mapping[str, Any], name: str) -> Any:
+    return tuple(arrays[name].values()) if name in arrays else None
