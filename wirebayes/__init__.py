@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from wirebayes.io.arrays import from_arrays as from_arrays
     from wirebayes.io.experiment import Experiment as Experiment
     from wirebayes.io.experiment import read_experiments as read_experiments
+    from wirebayes.robot.history.live import LiveEstimator as LiveEstimator
+    from wirebayes.robot.history.live import LivePose as LivePose
     from wirebayes.robot.mechanics.description import Robot as Robot
     from wirebayes.workflows.batch import batch as batch
     from wirebayes.workflows.calibrate import calibrate as calibrate
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.import_bench import import_bench as import_bench
     from wirebayes.workflows.list_effects import EffectDescription as EffectDescription
     from wirebayes.workflows.list_effects import list_effects as list_effects
+    from wirebayes.workflows.live import live as live
     from wirebayes.workflows.load import load as load
     from wirebayes.workflows.new_experiment import new_experiment as new_experiment
     from wirebayes.workflows.plan import plan as plan
@@ -65,6 +68,7 @@ _PLACES = {
     "load": "wirebayes.workflows.load",
     "read_robot": "wirebayes.workflows.wires",
     "pose": "wirebayes.workflows.pose",
+    "live": "wirebayes.workflows.live",
     "calibrate": "wirebayes.workflows.calibrate",
     "export": "wirebayes.workflows.export",
     "list_effects": "wirebayes.workflows.list_effects",
@@ -81,6 +85,8 @@ _PLACES = {
     "Check": "wirebayes.workflows.results",
     "SimulatedTests": "wirebayes.workflows.results",
     "Robot": "wirebayes.robot.mechanics.description",
+    "LiveEstimator": "wirebayes.robot.history.live",
+    "LivePose": "wirebayes.robot.history.live",
     "Pose": "wirebayes.workflows.results",
     "Calibration": "wirebayes.workflows.results",
     "Export": "wirebayes.workflows.results",

@@ -118,19 +118,20 @@ class Information:
         self.matrix += scaled @ H.T
         self.vector += left @ scaled.T
 
-    def moves(self, before: Floats, noise: Floats) -> Floats:
+    def moves(self, before: Floats, noise: Floats | None) -> Floats:
         """How far white unknowns with offsets ``(n, e)`` move.
 
         Parameters
         ----------
         before : (n, e) array
             From where the draws are to where the prior has them; zero when they are the prior's own.
-        noise : (n, e) array
-            Standard normal, one row a draw: the noise of its own readings.
+        noise : (n, e) array or None
+            Standard normal, one row a draw: the noise of its own readings. None: it was in the residuals.
         """
-        values, vectors = np.linalg.eigh(self.matrix)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        right = before + self.vector + noise @ root.T
+        right = before + self.vector
+        if noise is not None:
+            values, vectors = np.linalg.eigh(self.matrix)
+            right = right + noise @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
         return np.asarray(cho_solve(cho_factor(self.matrix + np.eye(len(self.matrix))), right.T).T)
 
     @property

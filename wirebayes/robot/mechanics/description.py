@@ -1,6 +1,7 @@
 """The robot as data: exit points, platform, legs, and the choices that are stated with it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -165,12 +166,12 @@ class Robot:
         """(w,) True where a linear actuator drives the leg."""
         return np.array([a == "linear" for a in self.actuator])
 
-    @property
+    @cached_property
     def span_m(self) -> float:
         """Largest extent of the exit points along an axis: the robot's own measure of length."""
         return float(np.ptp(self.exit_m, axis=0).max())
 
-    @property
+    @cached_property
     def size_m(self) -> float:
         """Typical lever arm of the platform, by which rotations are compared with displacements."""
         arms = np.linalg.norm(self.platform_m - self.platform_m.mean(0), axis=1)

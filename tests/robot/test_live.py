@@ -1,0 +1,149 @@
+"""The running estimate against the batch estimate of the same history."""
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robot.test_history import _line, _places, _told
+from wirebayes.robot.history.estimate import estimate
+from wirebayes.robot.history.follow import clock_starts, follow
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.live import LiveEstimator
+from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.mechanics import schema
+
+TIMES = np.array([0, 60, 70, 400, 420, 900, 930, 2000, 2030, 3600.0])
+
+
+def _history(robot):
+    a, _, b, _, c, _ = _places(robot)
+    return _told(robot, TIMES, [a, a, b, b, c, c, b, b, a, a])
+
+
+def _run(live, history, **more):
+    """Fed twice a second while the robot moves, every ten seconds while it stands; the answers at the rows."""
+    out = []
+    spans = zip(TIMES[:-1], TIMES[1:], strict=True)
+    times = np.unique(np.concatenate([TIMES, *(np.arange(a, b, 0.5 if b - a < 50 else 10.0) for a, b in spans)]))
+    joints = np.stack([np.interp(times, TIMES, column) for column in history.joint_m.T], 1)
+    for time, joint in zip(times, joints, strict=True):
+        row = np.flatnonzero(time == TIMES)
+        readings = {name: values[row[0]] for name, values in more.items()} if row.size else {}
+        now = live.step(time, joint, **readings)
+        if row.size:
+            out.append(now)
+    return out
+
+
+@pytest.mark.parametrize("name", ["cogiro-desk", "linear-7"])
+def test_an_hour_agrees_with_the_batch(name):
+    robot = schema.read(name)
+    history, start, line = _history(robot), (robot.home_m, np.eye(3)), _line(32)
+    batch = estimate(robot, line, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
+    now = _run(LiveEstimator(robot, line, Uncertain(1e-3), start, reads=False), history)
+    low, high = np.quantile(batch, [0.05, 0.95], axis=0)
+    band = high - low
+    assert (np.abs([p.position_m for p in now] - batch.mean(0)) < 0.1 * band).all()
+    assert (np.abs([p.low_m for p in now] - low) < 0.1 * band).all()
+    assert (np.abs([p.high_m for p in now] - high) < 0.1 * band).all()
+    assert all(p.held == 1 for p in now)
+
+
+def test_with_readings_it_agrees_with_the_batch_in_the_end():
+    robot = schema.read("hangprinter-4")
+    history, start, line, errors = _history(robot), (robot.home_m, np.eye(3)), _line(64), Uncertain(1e-3, 0.05, 0.05)
+    true = unknowns(robot, _line(1, seed=3), errors, np.random.default_rng(7))
+    plain = follow(robot, true.plain, history, history.joint_m, start, TIMES[:1]).tension_N[0]
+    wires, error = true.columns(true.draws)
+    truth = follow(robot, wires, history, history.joint_m, start, clock_starts(history, plain), error)
+    rng = np.random.default_rng(8)
+    tension = truth.tension_N[0] + 0.05 * rng.standard_normal(plain.shape)
+    read = replace(history, tension_N=tension)
+    batch = estimate(robot, line, read, start, errors, np.random.default_rng(0)).track.position_m[:, -1]
+    batch = batch[np.isfinite(batch).all(1)]
+    last = _run(LiveEstimator(robot, line, errors, start), history, tension_N=tension)[-1]
+    blind = _run(LiveEstimator(robot, line, errors, start, reads=False), history)[-1]
+    assert np.linalg.norm(last.position_sd_m) < 0.85 * np.linalg.norm(blind.position_sd_m)
+    np.testing.assert_allclose(last.position_sd_m, batch.std(0), rtol=0.4)
+    assert (np.abs(last.position_m - batch.mean(0)) < 0.1 * 3.3 * batch.std(0)).all()
+    assert (np.abs(last.position_m - truth.position_m[0, -1]) < 3 * last.position_sd_m).all()
+
+
+def test_joint_values_that_are_sent_back_bring_the_platform_back():
+    robot = schema.read("linear-7")
+    line = _line(24)
+    live = LiveEstimator(robot, line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    nominal = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    joint = nominal
+    for time in np.arange(0, 600.0, 5.0):
+        now = live.step(time, joint, nominal_m=nominal)
+        joint = nominal + now.correction_m
+    still = LiveEstimator(robot, line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    for time in (0.0, 595.0):
+        drifted = still.step(time, nominal)
+    meant = still._x[-1]
+    assert np.linalg.norm(drifted.position_m - meant) > 2e-3
+    assert np.linalg.norm(now.position_m - meant) < 1e-4
+    np.testing.assert_allclose(now.correction_m, drifted.correction_m, atol=0.15 * np.abs(drifted.correction_m).max())
+
+
+def test_a_long_step_is_as_good_as_short_ones():
+    robot = schema.read("cogiro-desk")
+    ends = []
+    joint = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    for times in ([0.0, 600.0], np.arange(0, 601.0, 2.0)):
+        live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+        for time in times:
+            now = live.step(time, joint)
+        ends.append(now.position_m)
+    drift = np.linalg.norm(ends[1] - robot.home_m)
+    assert np.linalg.norm(ends[0] - ends[1]) < 0.005 * drift
+
+
+def test_a_payload_that_is_told_starts_the_clocks_and_lowers_the_platform():
+    robot = schema.read("cogiro-desk")
+    live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    joint = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    before = live.step(0.0, joint)
+    live.load(0.5 * robot.mass_kg)
+    after = live.step(1.0, joint)
+    assert after.position_m[2] < before.position_m[2] - 1e-4
+    assert live._since == 1.0
+    loaded = History(np.array([0.0, 1.0]), np.stack([joint, joint]), None, None, np.full(2, 0.5 * robot.mass_kg),
+                     np.tile(robot.centre_of_mass_m, (2, 1)))  # fmt: skip
+    batch = estimate(robot, _line(4), loaded, (robot.home_m, np.eye(3)), Uncertain(), np.random.default_rng(0))
+    np.testing.assert_allclose(after.position_m, batch.track.position_m[:, 0].mean(0), atol=2e-4)
+
+
+def test_time_goes_on_and_readings_are_asked_for():
+    robot = schema.read("cogiro-desk")
+    live = LiveEstimator(robot, _line(2), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    joint = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    live.step(1.0, joint)
+    with pytest.raises(ValueError, match="found 1 after 1, expected a later time"):
+        live.step(1.0, joint)
+    with pytest.raises(ValueError, match="expected none"):
+        live.step(2.0, joint, tension_N=np.ones(8))
+
+
+def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
+    path = Path(__file__).parents[2] / "docs" / "live_firmware.py"
+    spec = importlib.util.spec_from_file_location("live_firmware", path)
+    sample = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sample)
+    robot = schema.read("hangprinter-4")
+    live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    nominal = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    now, sent = [0.0], []
+    made = sample.correct(
+        live, lambda: nominal, sent.append, 0.1, lambda: now[0], lambda s: now.__setitem__(0, now[0] + s)
+    )
+    assert len(sent) > 2
+    np.testing.assert_allclose(np.sum(sent, 0), made)
+    assert np.linalg.norm(live.step(400.0, nominal + 1e-3 * np.array(made), nominal_m=nominal).position_m
+                          - live._x[-1]) < 2e-4  # fmt: skip
+    assert sample.klipper([1, 2, 3, -4]).splitlines()[3] == "FORCE_MOVE STEPPER=stepper_d DISTANCE=-4.0000 VELOCITY=2"
+    assert sample.reprapfirmware([1, 2, 3, -4]) == "M120 G91 G1 H2 X1.0000 Y2.0000 Z3.0000 U-4.0000 F120 M121"

@@ -1,0 +1,317 @@
+"""The pose while the robot runs: fed with joint values step by step, every draw's creep carried along.
+
+A fixed set of posterior draws, each with its own creep, integrated as it goes: their spread is the band, whatever its
+shape, and nothing is sampled while the robot runs. A step is short, so that one Newton step on the balance of forces is
+the forward solution. Where tensions or angles are read, columns beside the draws give the derivatives by everything
+unknown, and the draws are moved by what the readings so far say (`readings`): the batch estimate, without its repeated
+passes.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.history.follow import RESTART
+from wirebayes.robot.history.history import roll_and_pitch, with_payload
+from wirebayes.robot.history.readings import Information, sensors, weight
+from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward, inverse, path
+from wirebayes.robot.motion.creep import HoldCreep, fresh
+
+Floats = NDArray[np.float64]
+_LONG = 5e-2  # of the platform's size: a longer Newton step is followed with care instead
+_AGAIN = 5e-3  # of the platform's size: after a shorter one, less than a micrometre is left
+_SHARE, _SHORT_S = 0.2, 1.0  # a step may last so much of its hold's age, and so long in any case
+_FAR = 8.0  # prior sd: a draw that readings move so far contradicts them (a wire is slack, say) and is left out
+_REFRESH_S = 0.1  # what all readings say together changes slowly
+
+
+@dataclass(frozen=True)
+class LivePose:
+    """Where the platform is, and what would bring it back.
+
+    Attributes
+    ----------
+    time_s : float
+    position_m, position_sd_m : (3,) arrays
+        Mean and standard deviation.
+    low_m, high_m : (3,) arrays
+        5 and 95 % of the position.
+    rotation : (3, 3) array
+        Mean orientation.
+    rotation_sd_rad : (3,) array
+        About the world's axes.
+    joint_m, joint_sd_m : (w,) arrays
+        Joint values that bring the platform to where the nominal joint values would hold it if no wire crept.
+    correction_m : (w,) array
+        What that is beyond the nominal joint values.
+    tension_N : (w,) array
+        Mean.
+    held : float
+        Share of the draws that hold the platform.
+
+    Examples
+    --------
+    >>> now = wb.live("linear-7", posterior, draws=16).step(0.0, held.summary()["inverse"]["joint_value_m"]["q50"])
+    >>> now.held
+    1.0
+    """
+
+    time_s: float
+    position_m: Floats
+    position_sd_m: Floats
+    low_m: Floats
+    high_m: Floats
+    rotation: Floats
+    rotation_sd_rad: Floats
+    joint_m: Floats
+    joint_sd_m: Floats
+    correction_m: Floats
+    tension_N: Floats
+    held: float
+
+
+class LiveEstimator:
+    """The pose of a running robot, from joint values and, where they are read, tensions and angles.
+
+    Made by `wirebayes.live`.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+        Its draws are the columns that are carried along.
+    errors : Uncertain
+    reads : bool
+        Whether tensions or angles will be given; without them a step is faster.
+    start : (3,), (3, 3) arrays
+        About where the platform is at the first step.
+    seed : int
+
+    Examples
+    --------
+    >>> joints = held.summary()["inverse"]["joint_value_m"]["q50"]
+    >>> running = wb.live("linear-7", posterior, draws=16)
+    >>> first = running.step(0.0, joints)
+    >>> later = running.step(60.0, joints)
+    >>> bool(later.position_m[2] < first.position_m[2])  # the platform sinks
+    True
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        line: WireDraws,
+        errors: Uncertain,
+        start: tuple[Floats, Floats],
+        reads: bool = True,
+        seed: int = 0,
+    ) -> None:
+        self._rng = np.random.default_rng(seed)
+        known = unknowns(robot, line, errors, self._rng)
+        self._bare, self.robot, self._reads = robot, robot, reads
+        n, d, m = line.count, known.count, robot.legs + 2
+        white = known.draws
+        if reads:
+            white = np.concatenate([white, known.differences(np.zeros(d))])
+        wires, error = known.columns(white)
+        self._wires, self._error = _beside(wires, known.plain), np.concatenate([error, np.zeros((1, robot.legs))])
+        self._n, self._columns = n, len(self._error)
+        self._of = sensors(robot, errors)
+        self._offset = self._rng.standard_normal((n, m))
+        self._information = Information.none(d, m, n)
+        self._moves, self._sane = np.zeros((n, d)), np.ones(n, bool)
+        self._refreshed = self._last = -np.inf
+        self._start, self._state = start, fresh(robot.legs, self._columns)
+        self._live = np.ones(self._columns, bool)
+        self._joint = np.empty((self._columns, robot.legs))
+
+    def load(self, mass_kg: float, centre_m: Floats | None = None) -> None:
+        """Tell what the platform carries from now on beside its own mass.
+
+        Parameters
+        ----------
+        mass_kg : float
+        centre_m : (3,) array, optional
+            Its centre of mass in the platform's frame; the platform's own when left out.
+        """
+        self.robot = with_payload(self._bare, mass_kg, self._bare.centre_of_mass_m if centre_m is None else centre_m)
+
+    def step(
+        self,
+        time_s: float,
+        joint_m: Floats,
+        tension_N: Floats | None = None,
+        tilt_rad: Floats | None = None,
+        nominal_m: Floats | None = None,
+    ) -> LivePose:
+        """Take in what was measured at a time, and say where the platform is.
+
+        Parameters
+        ----------
+        time_s : float
+            Later than at the step before; at the first step the wires are new.
+        joint_m : (w,) array
+            Joint values, corrections included.
+        tension_N : (w,) array, optional
+            NaN where a sensor was not read.
+        tilt_rad : (2,) array, optional
+            Roll and pitch.
+        nominal_m : (w,) array, optional
+            Joint values before any correction; `joint_m` when left out.
+
+        Returns
+        -------
+        LivePose
+
+        Raises
+        ------
+        ValueError
+            Time does not go on, or readings are given to an estimator that was made without them.
+        """
+        if not time_s > self._last:
+            raise ValueError(f"time_s: found {time_s:g} after {self._last:g}, expected a later time")
+        if (tension_N is not None or tilt_rad is not None) and not self._reads:
+            raise ValueError("readings: found some, expected none; make the estimator with reads=True")
+        joint = np.asarray(joint_m, float)
+        nominal = joint if nominal_m is None else np.asarray(nominal_m, float)
+        each: Floats = np.broadcast_to(joint, (self._columns, self.robot.legs)).copy()
+        each[-1] = nominal
+        if self._last == -np.inf:
+            self._settle(each)
+            self._begin(time_s)
+        else:
+            before, joints = self._last, self._joint
+            for part in self._parts(time_s):
+                share = (part - before) / (time_s - before)
+                self._advance(part, joints + share * (each - joints))
+        self._joint = each
+        if tension_N is not None or tilt_rad is not None:
+            self._read(time_s, tension_N, tilt_rad)
+        self._last = time_s
+        return self._pose(time_s, nominal)
+
+    def _parts(self, time_s: float) -> list[float]:
+        """Where a long step is divided: while a hold is young, its creep is fast."""
+        out, time = [], self._last
+        while time < time_s:
+            time = min(time_s, time + max(_SHARE * (time - self._since), _SHORT_S))
+            out.append(time)
+        return out
+
+    def _advance(self, time_s: float, joint_m: Floats) -> None:
+        """Creep under the tensions so far, then the pose."""
+        bare, offset = inverse.lengths(self.robot, joint_m)
+        self._state = self._creep.advance(time_s - self._since, self._tension.T)
+        self._go((bare + self._error) * (1.0 + self._state.strain(self._wires).T), offset)
+        if np.abs(self._tension[-1] - self._reference).max() > RESTART * self._reference.mean():
+            self._begin(time_s)
+
+    def _settle(self, joint_m: Floats) -> None:
+        """The first pose, found from afar."""
+        bare, offset = inverse.lengths(self.robot, joint_m)
+        bare = bare + self._error
+        here = forward.solve(self.robot, self._wires, bare, offset, *self._start)
+        self._live = here.found
+        x, R = self._start
+        self._x = np.where(here.found[:, None], here.position_m, x)
+        self._R = np.where(here.found[:, None, None], here.rotation, R)
+        self._tension = np.where(here.found[:, None], here.tension_N, 0.0)
+        self._lengths = bare, np.broadcast_to(offset, bare.shape)
+
+    def _begin(self, time_s: float) -> None:
+        """The wires' clocks start anew."""
+        state = self._state if self._wires.effects else replace(self._state, past=())
+        self._creep = HoldCreep(self._wires, state, self._tension.T)
+        self._since, self._reference = time_s, self._tension[-1]
+
+    def _go(self, zero: Floats, offset: Floats) -> None:
+        """Poses at new lengths, a short way on."""
+        robot, wires = self.robot, self._wires
+        for _ in range(3):
+            step = path.newton_step(robot, wires, (self._x, self._R), (zero, offset))
+            length = np.sqrt((step * step).sum(1))
+            hard = self._live & ~(length < _LONG * robot.size_m)
+            if hard.any():
+                step[hard] = np.nan
+            self._x, self._R = path.moved(robot, (self._x, self._R), step)
+            if hard.any():
+                self._carefully(np.flatnonzero(hard), zero, offset)
+            if not (length[self._live & ~hard] > _AGAIN * robot.size_m).any():
+                break
+        self._tension = forward.tensions_at(robot, wires, self._x, self._R, zero, offset)
+        self._lengths = zero, offset
+
+    def _carefully(self, rows: NDArray[np.intp], zero: Floats, offset: Floats) -> None:
+        """Columns whose way is long or unstable: followed in parts; lost where the platform falls."""
+        new, old = ((a[rows], b[rows]) for a, b in ((zero, offset), self._lengths))
+        there = path.follow(self.robot, self._wires.part(rows), (self._x[rows], self._R[rows]), old, new).here
+        good = rows[there.found]
+        self._x[good], self._R[good] = there.position_m[there.found], there.rotation[there.found]
+        self._live[rows[~there.found]] = False
+
+    def _read(self, time_s: float, tension_N: Floats | None, tilt_rad: Floats | None) -> None:
+        """What the sensors say, added to what they said before."""
+        n, legs, of = self._n, self.robot.legs, self._of
+        y = np.full(legs + 2, np.nan)
+        if tension_N is not None:
+            y[:legs] = tension_N
+        if tilt_rad is not None:
+            y[legs:] = tilt_rad
+        h = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
+        counts = weight(None if self._last == -np.inf else time_s - self._last)
+        noise = of.noise * self._rng.standard_normal((n, len(y))) / np.sqrt(counts)
+        left = np.where(self._live[:n, None], y - h[:n] - of.offset * self._offset + noise, np.nan)
+        self._information.add(of, slopes(h[n:]), left, counts)
+        if time_s - self._refreshed >= _REFRESH_S or self._refreshed == -np.inf:
+            none = np.zeros(1)
+            self._moves = self._information.moves(none, None)[:, : self._moves.shape[1]]
+            self._sane = np.abs(self._moves).max(1) < _FAR
+            self._refreshed = time_s
+
+    def _pose(self, time_s: float, nominal: Floats) -> LivePose:
+        """The draws, moved by the readings, in numbers."""
+        n, live = self._n, self._live[: self._n]
+        shown = live & self._sane if (live & self._sane).any() else live
+        centre = self._R[n if self._reads else -1]
+        turned = self._R @ centre.T
+        turn = 0.5 * np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0],
+                               turned[:, 1, 0] - turned[:, 0, 1]], 1)  # fmt: skip
+        target = self._x[-1:], self._R[-1:], self._tension[-1:]
+        strain = self._state.strain(self._wires)
+        wanted = inverse.commands(self.robot, self._wires, *target, strain, self._error.T).joint_m
+        values = np.concatenate([self._x, turn, wanted, self._tension], 1)
+        own = values[:n]
+        if self._reads:
+            own = own + self._moves @ slopes(values[n:-1])
+        own = own if shown.all() else own[shown]
+        if not len(own):
+            own = np.full((1, values.shape[1]), np.nan)
+        mean, sd = own.mean(0), own.std(0)
+        ordered = np.sort(own[:, :3], 0)
+        last = len(own) - 1
+        at = np.array([0.05, 0.95]) * last
+        below = at.astype(int)
+        low, high = ordered[below] + (at - below)[:, None] * (ordered[np.minimum(below + 1, last)] - ordered[below])
+        w = self.robot.legs
+        joint = mean[6 : 6 + w]
+        return LivePose(
+            time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, sd[6 : 6 + w],
+            joint - nominal, mean[6 + w :], float(live.mean()),
+        )  # fmt: skip
+
+
+def _beside(first: Wires, other: Wires) -> Wires:
+    """Columns of wires of one model side by side."""
+    theta = {}
+    counts = [max(v.shape[-1] for v in wires.theta.values()) for wires in (first, other)]
+    for name, value in first.theta.items():
+        rows = max(len(value), len(other.theta[name]))
+        both = [np.broadcast_to(v, (rows, n)) for v, n in zip((value, other.theta[name]), counts, strict=True)]
+        theta[name] = np.concatenate(both, 1)
+    return replace(first, theta=theta)
