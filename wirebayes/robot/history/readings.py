@@ -114,7 +114,8 @@ class Information:
         H = np.concatenate([slope, np.diag(of.offset)])[:, there]
         scaled = H * (counts / of.noise[there] ** 2)
         left = residual[:, there]
-        left = np.where(np.isfinite(left), left, np.nanmean(left, 0))  # a fallen draw has no say
+        if not np.isfinite(left).all():
+            left = np.where(np.isfinite(left), left, np.nanmean(left, 0))  # a fallen draw has no say
         self.matrix += scaled @ H.T
         self.vector += left @ scaled.T
 
