@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery import power, residual_patterns, shrinking
-from wirebayes.discovery.global_test import examine
-from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand
+from wirebayes.discovery.global_test import Gate, examine
+from wirebayes.discovery.linear_scan import Expansion, expand
 from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.name_evidence import weigh_names
-from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.discovery.stepwise import Accepted, Explored, explore
 from wirebayes.discovery.verdict import Alternative, Decision, Verdict, alternatives, decide, verdict_of
@@ -120,49 +119,66 @@ def investigate(
     laws = repeat(settings.law), repeat(settings.history)
     start = list(parallel_map(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
     gate = examine(start, settings.kinds, settings.simulations, rng, report=report, parallel_map=parallel_map)
-    plain, trials, candidates, data, nulls = gate.blocks, gate.trials, gate.candidates, gate.data, gate.nulls
-    test = gate.test
     where = [
-        residual_patterns.findings(p, len(trials), d, n, ", ".join(b.names))
-        for p, d, n, b in zip(gate.patterns, data, nulls, plain, strict=True)
+        residual_patterns.findings(p, len(gate.trials), d, n, ", ".join(b.names))
+        for p, d, n, b in zip(gate.patterns, gate.data, gate.nulls, gate.blocks, strict=True)
     ]
-    ratios = [float(x.ratio[0]) for x in gate.expansions]
-    expansions = [_only(x, len(trials)) for x in gate.expansions]
+    expansions = [_only(x, len(gate.trials)) for x in gate.expansions]
     decision, explored = None, None
-    if test.p <= ALPHA:
+    if gate.test.p <= ALPHA:
         report("naming", 0, 1)
-        found = weigh_names(plain, trials, candidates, data, gate.further, parallel_map)
-        explored = explore(plain, found, expansions, trials, data, settings, rng, parallel_map)
-        copies = power.copies(expansions, trials, ratios)
-        decision = decide(plain, explored, copies, settings, rng, parallel_map)
+        explored, decision = _named(gate, expansions, settings, rng, parallel_map)
         report("naming", 1, 1)
-    answers = [_answer(plain, decision, explored, i, where[i], rng) for i in range(len(plain))]
-    final = [a.stages[-1] if a.stages else block for a, block in zip(answers, plain, strict=True)]
+    answers = [_answer(gate.blocks, decision, explored, i, where[i], rng) for i in range(len(gate.blocks))]
+    final = [a.stages[-1] if a.stages else block for a, block in zip(answers, gate.blocks, strict=True)]
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
-    alike = power.similarity(expansions, trials, ratios)
+    alike = power.similarity(expansions, gate.trials, ratios)
     out: dict[str, Any] = {}
-    for i, (block, answer) in enumerate(zip(plain, answers, strict=True)):
-        report("held-out holds", i, len(plain))
-        common = _common(answers, i, plain, test.p, where[i], alike)
-        common |= _outlook(block, i, trials, candidates, nulls[i], test, settings, answer, alike)
-        names = [a.name for a in answer.accepted]
-        remains = answer.verdict in ("partial", "unknown")
-        checks = shrinking.shrinking(block, answer.stages, names, remains, rng, parallel_map)
-        for e, check in zip(block.experiments, checks, strict=True):
-            out[e.name] = common | {
-                "steps": check.steps,
-                "held_out": check.held_out,
-                "residual_rms_N": shrinking.left_over(block, e.name),
-                "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
-            }
-    report("held-out holds", len(plain), len(plain))
+    for i, block in enumerate(gate.blocks):
+        report("held-out holds", i, len(gate.blocks))
+        common = _common(answers, i, gate.blocks, gate.test.p, where[i], alike)
+        common |= _outlook(gate, i, settings, answers[i], alike)
+        out |= {name: common | own for name, own in _own_reports(gate, block, answers[i], rng, parallel_map).items()}
+    report("held-out holds", len(gate.blocks), len(gate.blocks))
     undecided = [
-        alternatives(decision, explored, i, stages_end, answer.verdict)
+        alternatives(decision, explored, i, last, answer.verdict)
         if decision is not None and explored is not None and answer.verdict in ("ambiguous", "partial")
         else []
-        for i, (answer, stages_end) in enumerate(zip(answers, final, strict=True))
+        for i, (answer, last) in enumerate(zip(answers, final, strict=True))
     ]
     return Findings({"version": 2, "experiments": out}, tuple(final), tuple(undecided))
+
+
+def _named(
+    gate: Gate,
+    expansions: Sequence[Expansion],
+    settings: Settings,
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
+) -> tuple[Explored, Decision]:
+    """The sets of effects that were looked at, past the global test, and what they say."""
+    found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map)
+    explored = explore(gate.blocks, found, expansions, gate.trials, gate.data, settings, rng, parallel_map)
+    copies = power.copies(expansions, gate.trials, [float(x.ratio[0]) for x in gate.expansions])
+    return explored, decide(gate.blocks, explored, copies, settings, rng, parallel_map)
+
+
+def _own_reports(
+    gate: Gate, block: LaplaceFit, answer: "_Answer", rng: np.random.Generator, parallel_map: ParallelMap
+) -> dict[str, dict[str, Any]]:
+    """What the report says of each experiment of a block apart from the others."""
+    remains = answer.verdict in ("partial", "unknown")
+    names = [a.name for a in answer.accepted]
+    checks = shrinking.shrinking(block, answer.stages, names, remains, rng, parallel_map)
+    return {
+        e.name: {
+            "steps": check.steps,
+            "held_out": check.held_out,
+            "residual_rms_N": shrinking.left_over(block, e.name),
+            "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
+        }
+        for e, check in zip(block.experiments, checks, strict=True)
+    }
 
 
 @dataclass(frozen=True)
@@ -307,11 +323,11 @@ def _common(
 
 
 def _outlook(
-    block: LaplaceFit, i: int, trials: list[Probe], candidates: list[Candidate], null: Scan, test: GlobalTest,
-    settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float],
-) -> dict[str, Any]:  # fmt: skip
-    """What could have been seen, what cannot be, and what to measure next."""
-    found = power.detectable(null, trials, candidates, test, i)
+    gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float]
+) -> dict[str, Any]:
+    """What could have been seen in block `i`, what cannot be, and what to measure next."""
+    block, trials, candidates = gate.blocks[i], gate.trials, gate.candidates
+    found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)
     best_probe = {name: k for name, (k, _) in found.items()}
     seen = {
         name: {"amplitude_80": amplitude, "unit": trials[k].effect.amplitudes[0].unit}

@@ -1,6 +1,7 @@
 """Synthetic tests with known truth, as files the other functions read."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import get_args
 
 from wirebayes import __version__
@@ -8,6 +9,7 @@ from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import check_run, open_run
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
+from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workflows.options import Numbers, PathLike, check_choice, check_seed, path_of, text_of, words
 from wirebayes.workflows.results import Place, SimulatedTests
@@ -85,31 +87,15 @@ def simulate_tests(
     check_choice("history", history, get_args(History))
     own, seed = path_of(own_effects), check_seed(seed)
     chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
-    resolution = float(resolution)
-    found = {}
-    known = catalogue(own)
-    listed = [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else words(effects)
-    for text in listed:
-        effect, amplitudes = effect_option(text, known)
-        found[effect.key] = effect
-        chosen |= amplitudes
-    path = _numbers("--displacements", displacements)
-    if unload >= len(path):
-        raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} displacements")
-    path += path[-2 : -2 - unload : -1]
+    found, amplitudes = _effects(effects, own)
+    chosen |= amplitudes
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
-    if min(sizes) <= 0 or len(set(sizes)) < len(sizes):
-        raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
-    if min(path) <= -min(sizes):
-        raise InputError(f"--displacements: found {min(path):g}, expected more than -{min(sizes):g} mm, a length")
-    if moments[0] < 0 or any(b <= a for a, b in zip(moments, moments[1:], strict=False)):
-        raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
+    path = _path(displacements, unload)
     gaps = frozenset(unrecorded)
-    if not gaps <= set(range(1, len(path))):
-        raise InputError(f"--unrecorded: found {max(gaps)}, expected a hold from 1 to {len(path) - 1}")
+    _check_protocol(path, sizes, moments, gaps)
     warmth = _numbers("--temperature", temperature) if len(temperature) else []
     benches = [
-        Bench(_name(tests, sizes, i, length), f"line-{i + 1}", length, resolution, path, moments, gaps, warmth)
+        Bench(_name(tests, sizes, i, length), f"line-{i + 1}", length, float(resolution), path, moments, gaps, warmth)
         for i in range(tests)
         for length in sizes
     ]
@@ -117,7 +103,7 @@ def simulate_tests(
     configuration = {
         "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
         "displacements_mm": path, "times_s": moments, "unrecorded": sorted(gaps), "temperatures_C": warmth,
-        "resolution_N": resolution, "parameters": chosen, "effects": list(found),
+        "resolution_N": float(resolution), "parameters": chosen, "effects": list(found),
         "own_effects": source_of(own),
         "elastic_law": elastic_law, "history": history,
     }  # fmt: skip
@@ -129,6 +115,43 @@ def simulate_tests(
             write(place.path, benches, truth, seed)
             run.finish()
     return SimulatedTests(place, own, computed=run.state != "done")
+
+
+def _effects(
+    effects: str | Sequence[str] | Mapping[str, float], own: Path | None
+) -> tuple[dict[str, Effect], dict[str, float]]:
+    """The effects by key, and the amplitudes that were given."""
+    found: dict[str, Effect] = {}
+    given: dict[str, float] = {}
+    known = catalogue(own)
+    listed = [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else words(effects)
+    for text in listed:
+        effect, amplitudes = effect_option(text, known)
+        found[effect.key] = effect
+        given |= amplitudes
+    return found, given
+
+
+def _path(displacements: Numbers, unload: int) -> list[float]:
+    """Displacements of all holds, mm: up as given, then so many back down."""
+    path = _numbers("--displacements", displacements)
+    if unload >= len(path):
+        raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} displacements")
+    return path + path[-2 : -2 - unload : -1]
+
+
+def _check_protocol(
+    path: Sequence[float], lengths: Sequence[float], times: Sequence[float], unrecorded: frozenset[int]
+) -> None:
+    """Refuse what no bench could do."""
+    if min(lengths) <= 0 or len(set(lengths)) < len(lengths):
+        raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
+    if min(path) <= -min(lengths):
+        raise InputError(f"--displacements: found {min(path):g}, expected more than -{min(lengths):g} mm, a length")
+    if times[0] < 0 or any(b <= a for a, b in zip(times, times[1:], strict=False)):
+        raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
+    if not unrecorded <= set(range(1, len(path))):
+        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {len(path) - 1}")
 
 
 def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str:

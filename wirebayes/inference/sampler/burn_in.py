@@ -91,7 +91,7 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
     if state.learned.acceptance < _USEFUL:
         state, walk = _walked(target, state, policy)
         state = _fitted(target, state, policy, *_resampled_twice(*walk, state.generator))
-    state, z, value, base = _drawn(target, state, policy)
+    state, (z, value, base) = _drawn(target, state, policy)
     weight = value - base
     typical = weight[_resampled(weight, len(weight), state.generator)]
     acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
@@ -181,7 +181,7 @@ def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn
     return replace(state, walkers=done.walkers, evaluations=state.evaluations + done.evaluations, walk=walk), walk
 
 
-def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, Array, Array, Array]:
+def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
     drawn_from = state.learned.proposal
     most = policy.round_draws * (_TO_FIND_MORE if state.learned.overlooked else 1)
@@ -191,7 +191,7 @@ def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn,
     value = target(z)
     state = replace(state, evaluations=state.evaluations + target.evaluations - before)
     good = np.isfinite(value)
-    return state, z[good], value[good], drawn_from.log_density(z[good])
+    return state, (z[good], value[good], drawn_from.log_density(z[good]))
 
 
 def _fitted(

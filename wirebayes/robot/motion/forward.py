@@ -17,6 +17,7 @@ from wirebayes.robot.mechanics.wires import Wires, energy, tension
 
 Floats = NDArray[np.float64]
 FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
+_GOING_ON = -1  # of a case that is still being solved
 STATUS = {
     FOUND: "stable equilibrium",
     NOT_CONVERGED: "not converged",
@@ -157,75 +158,133 @@ def _in_chunks(
     return [np.concatenate(arrays, -1) for arrays in zip(*parts, strict=True)]
 
 
+@dataclass(frozen=True)
+class _Cases:
+    """Cases that are still being solved, n of them.
+
+    Attributes
+    ----------
+    number : (n,) int array
+        Which they are among all.
+    wires : Wires
+    zero, offset : (w, n) arrays
+    x, R : (3, n) and (3, 3, n) arrays
+    at : _Point
+        Energy and its derivatives there.
+    damping : (n,) array
+        Added to the Hessian, in units of `level`.
+    level : (n,) array
+        The stiffness if every wire were taut: a measure of damping that exists also when all are slack.
+    floor : (n,) array
+        Force below which no computed one can be trusted, N.
+    span : (n,) array
+        Size of the robot with its wires, m.
+    """
+
+    number: NDArray[np.intp]
+    wires: Wires
+    zero: Floats
+    offset: Floats
+    x: Floats
+    R: Floats
+    at: "_Point"
+    damping: Floats
+    level: Floats
+    floor: Floats
+    span: Floats
+
+    def part(self, keep: NDArray[np.intp]) -> "_Cases":
+        return _Cases(
+            number=self.number[keep],
+            wires=self.wires.part(keep),
+            zero=self.zero[:, keep],
+            offset=self.offset[:, keep],
+            x=self.x[:, keep],
+            R=self.R[..., keep],
+            at=self.at.part(keep),
+            damping=self.damping[keep],
+            level=self.level[keep],
+            floor=self.floor[keep],
+            span=self.span[keep],
+        )
+
+
 def _solve(
     robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
 ) -> tuple[NDArray[Any], ...]:
     """One chunk; solved cases leave the batch as they finish."""
-    n, d, size = zero.shape[1], robot.degrees, robot.size_m
-    scale = np.ones((d, 1))
-    scale[3:] = 1.0 / size  # rotations are stepped in metres at the platform's edge
-    span = robot.span_m + zero.max(0)
-    reach = 10.0 * span
+    n = zero.shape[1]
     out_x, out_R, out_tau = np.array(x), np.array(R), np.zeros_like(zero)
     status, count, left = np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf)
-    live = np.arange(n)
-    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, n))
-    # Below this no computed force can be trusted: S/ℓ - 1 is known to one rounding error.
-    # Moments are divided by the platform's size; points far from the reference point make more of the same error.
-    arm = max(1.0, np.abs(robot.platform_m).max() / size) if d == 6 else 1.0
-    floor = 32 * np.finfo(float).eps * arm * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
-    # The stiffness if every wire were taut: a measure of damping that exists also when all are slack.
-    level = np.sum(k1 * robot.lines[:, None] ** 2 / zero, axis=0)
-    damping = np.zeros(n)
-    at = _evaluate(robot, wires, zero, offset, x, R, scale)
+
+    def store(cases: _Cases) -> None:
+        out_x[:, cases.number], out_R[..., cases.number] = cases.x, cases.R
+        out_tau[:, cases.number], left[cases.number] = cases.at.tau, cases.at.size
+
+    scale = np.ones((robot.degrees, 1))
+    scale[3:] = 1.0 / robot.size_m  # rotations are stepped in metres at the platform's edge
+    cases = _begin(robot, wires, zero, offset, x, R, scale)
     for iteration in range(1, max_iterations + 1):
-        damped = [row[:] for row in at.H]
-        for i in range(d):
-            damped[i][i] = at.H[i][i] + damping * level
-        step, positive = cholesky.solve(damped, -at.gradient)
-        np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
-        length = np.sqrt((step * step).sum(0))
-        # A step across the room is no Newton step; it is cut, the direction kept.
-        cut = np.minimum(1.0, 0.25 * reach / np.maximum(length, 1e-300))
-        step *= cut
-        new_x = x + step[:3] * scale[:3]
-        new_R = turning.compose(step[3:] * scale[3:], R) if d == 6 else R
-        new = _evaluate(robot, wires, zero, offset, new_x, new_R, scale)
-        downhill = (at.gradient * step).sum(0)
-        noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * span)
-        accept = positive & (new.energy <= at.energy + 1e-4 * downhill + noise)
-        accept |= positive & (damping == 0) & (new.size < 0.5 * at.size) & (length < 1e-3 * size)
-        # Uphill or indefinite: shorter, more cautious steps; as predicted: back towards pure Newton.
-        predicted = 0.5 * (damping * level * length * length - downhill)
-        foretold = at.energy - new.energy > 0.5 * predicted - noise
-        calmer = np.where(foretold, np.where(damping < 2e-5, 0.0, damping / 100), damping)
-        tried, damping = damping, np.where(accept, calmer, np.maximum(1e-3, damping * 10))
-        x, R = np.where(accept, new_x, x), np.where(accept, new_R, R)
-        at = at.where(accept, new)
-        balanced = at.size <= floor
-        done = positive & (tried == 0) & (balanced | (accept & (length < 1e-9 * size)))
-        loose = balanced & ~positive & (tried == 0)
-        damping = np.where(balanced, 0.0, damping)  # so that the next step asks the bare stiffness
-        lost = np.abs(x).max(0) > reach
-        stuck = damping > 1e12
-        finished = done | lost | stuck | loose
-        count[live] = iteration
+        cases, ended = _iterate(robot, cases, scale)
+        count[cases.number] = iteration
+        finished = ended != _GOING_ON
         if finished.any():
-            gone = live[finished]
-            out_x[:, gone], out_R[..., gone], out_tau[:, gone] = x[:, finished], R[..., finished], at.tau[:, finished]
-            kinds = np.select([lost, done, loose], [NO_EQUILIBRIUM, FOUND, NOT_HELD], NOT_CONVERGED)
-            status[gone] = kinds[finished]
-            left[gone] = at.size[finished]
-            keep = np.flatnonzero(~finished)
-            live, damping, floor, level = live[keep], damping[keep], floor[keep], level[keep]
-            reach, span = reach[keep], span[keep]
-            x, R, zero, offset = x[:, keep], R[..., keep], zero[:, keep], offset[:, keep]
-            wires, at = wires.part(keep), at.part(keep)
-        if not live.size:
+            store(cases.part(np.flatnonzero(finished)))
+            status[cases.number[finished]] = ended[finished]
+            cases = cases.part(np.flatnonzero(~finished))
+        if not cases.number.size:
             break
-    if live.size:
-        out_x[:, live], out_R[..., live], out_tau[:, live], left[live] = x, R, at.tau, at.size
+    if cases.number.size:
+        store(cases)
     return out_x, out_R, out_tau, status, count, left
+
+
+def _begin(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Cases:
+    """All cases at their starts, undamped."""
+    n = zero.shape[1]
+    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, n))
+    # S/ℓ - 1 is known to one rounding error. Moments are divided by the platform's size; points far from the reference
+    # point make more of the same error.
+    arm = max(1.0, np.abs(robot.platform_m).max() / robot.size_m) if robot.degrees == 6 else 1.0
+    floor = 32 * np.finfo(float).eps * arm * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
+    level = np.sum(k1 * robot.lines[:, None] ** 2 / zero, axis=0)
+    at = _evaluate(robot, wires, zero, offset, x, R, scale)
+    return _Cases(np.arange(n), wires, zero, offset, x, R, at, np.zeros(n), level, floor, robot.span_m + zero.max(0))
+
+
+def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArray[np.int64]]:
+    """A damped Newton step of every case, taken where it leads down, and how it ended (`_GOING_ON` if it did not)."""
+    at, damping, level, size = cases.at, cases.damping, cases.level, robot.size_m
+    reach = 10.0 * cases.span
+    damped = [row[:] for row in at.H]
+    for i in range(robot.degrees):
+        damped[i][i] = at.H[i][i] + damping * level
+    step, positive = cholesky.solve(damped, -at.gradient)
+    np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
+    length = np.sqrt((step * step).sum(0))
+    # A step across the room is no Newton step; it is cut, the direction kept.
+    step *= np.minimum(1.0, 0.25 * reach / np.maximum(length, 1e-300))
+    new_x = cases.x + step[:3] * scale[:3]
+    new_R = turning.compose(step[3:] * scale[3:], cases.R) if robot.degrees == 6 else cases.R
+    new = _evaluate(robot, cases.wires, cases.zero, cases.offset, new_x, new_R, scale)
+    downhill = (at.gradient * step).sum(0)
+    noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * cases.span)
+    accept = positive & (new.energy <= at.energy + 1e-4 * downhill + noise)
+    accept |= positive & (damping == 0) & (new.size < 0.5 * at.size) & (length < 1e-3 * size)
+    # Uphill or indefinite: shorter, more cautious steps; as predicted: back towards pure Newton.
+    predicted = 0.5 * (damping * level * length * length - downhill)
+    as_predicted = at.energy - new.energy > 0.5 * predicted - noise
+    calmer = np.where(as_predicted, np.where(damping < 2e-5, 0.0, damping / 100), damping)
+    x, R = np.where(accept, new_x, cases.x), np.where(accept, new_R, cases.R)
+    at = at.where(accept, new)
+    balanced = at.size <= cases.floor
+    done = positive & (damping == 0) & (balanced | (accept & (length < 1e-9 * size)))
+    loose = balanced & ~positive & (damping == 0)
+    next_damping = np.where(accept, calmer, np.maximum(1e-3, damping * 10))
+    next_damping = np.where(balanced, 0.0, next_damping)  # so that the next step asks the bare stiffness
+    lost, stuck = np.abs(x).max(0) > reach, next_damping > 1e12
+    ended = np.select([lost, done, loose, stuck], [NO_EQUILIBRIUM, FOUND, NOT_HELD, NOT_CONVERGED], _GOING_ON)
+    return replace(cases, x=x, R=R, at=at, damping=next_damping), ended
 
 
 @dataclass(frozen=True)
