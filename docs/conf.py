@@ -17,8 +17,10 @@ copyright = "2026, the wirebayes developers"
 version = release = __version__
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
 exclude_patterns = ["_build", "generated"]
+highlight_language = "text"  # what stands in a plain block is a command or a file
 html_math_renderer = "mathml"
 html_theme = "alabaster"
+html_static_path = ["_static"]  # the theme looks there for custom.css
 html_theme_options = {
     "description": "A Bayesian toolkit for wires that creep",
     "page_width": "1080px",

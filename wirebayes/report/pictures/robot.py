@@ -231,7 +231,7 @@ def _banded(axes: Any, entry: dict[str, Any], key: str, colour: str, label: str)
 
 def error_budget(result: dict[str, Any]) -> Figure:
     """Shares of the drift's variance by parameter."""
-    label = f"share of the variance of the drift after {result['time_s']:g} s, %"
+    label = f"share of the variance of the drift\nafter {result['time_s']:g} s, %"
     figure, axes = panel(label, "", "Sources of uncertainty", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))
     names = list(result["shared_draw"])[::-1]
     bars = axes.barh(names, [100 * result["shared_draw"][name] for name in names], color=CHAIN)
