@@ -21,7 +21,7 @@ FLAGS = doctest.NORMALIZE_WHITESPACE
 def shared(tmp_path_factory):
     """A folder with the paper's files, and what the page "From Python" leaves there: names that later examples use."""
     folder = tmp_path_factory.mktemp("doctests")
-    for file in [*PAPER.iterdir(), DOCS / "example" / "linear-7-session.csv"]:
+    for file in [*PAPER.iterdir(), *(DOCS / "example").glob("*session.csv"), *(DOCS / "example").glob("desk_*.xml")]:
         shutil.copy(file, folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

@@ -18,7 +18,7 @@ from wirebayes.io import paper
 FUNCTIONS = {
     "read_experiments", "from_arrays", "fit", "compare", "discover", "predict", "simulate_tests", "load", "read_robot",
     "pose", "calibrate", "export", "list_effects", "write_report", "reproduce_paper", "import_bench",
-    "batch", "new_experiment", "check", "plan",
+    "batch", "new_experiment", "check", "plan", "import_robot",
 }  # fmt: skip
 FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 DOCS = Path(wb.__file__).parents[1] / "docs"

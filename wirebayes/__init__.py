@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from wirebayes.workflows.export import export as export
     from wirebayes.workflows.fit import fit as fit
     from wirebayes.workflows.import_bench import import_bench as import_bench
+    from wirebayes.workflows.import_robot import import_robot as import_robot
     from wirebayes.workflows.list_effects import EffectDescription as EffectDescription
     from wirebayes.workflows.list_effects import list_effects as list_effects
     from wirebayes.workflows.live import live as live
@@ -67,6 +68,7 @@ _PLACES = {
     "simulate_tests": "wirebayes.workflows.simulate_tests",
     "load": "wirebayes.workflows.load",
     "read_robot": "wirebayes.workflows.wires",
+    "import_robot": "wirebayes.workflows.import_robot",
     "pose": "wirebayes.workflows.pose",
     "live": "wirebayes.workflows.live",
     "calibrate": "wirebayes.workflows.calibrate",

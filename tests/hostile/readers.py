@@ -16,6 +16,7 @@ from wirebayes.io.readings import protocol_holds, protocol_table
 from wirebayes.model.problem import build
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.self_calibration import session_file
+from wirebayes.workflows.import_robot import import_robot
 
 ROOT = Path(__file__).parents[2]
 PRIOR = """
@@ -65,6 +66,18 @@ Stufe;Weg;Zeit;Kraft;Temp.
 RECORDED = "elapsed [s],position [mm],force [lbf]\n" + "".join(
     f"{t / 2:.1f},{1 + t // 40},{(1 + t // 40) * (0.5 - 0.02 * np.log1p(t % 40)):.4f}\n" for t in range(200)
 )
+ROLLING = (ROOT / "data/robots/hangprinter-4.toml").read_text(encoding="utf-8").replace("lines = 2", """lines = 2
+pulley_radius_m = 0.02
+swivel_axis = [0.0, 0.0, 1.0]
+drum_radius_m = 0.03
+drum_pitch_m = 0.001
+drum_layer_turns = 7
+drum_layer_height_m = 0.0006
+wire_length_m = 12.0
+gear_ratio = 12.75""").replace("[workspace]", """[sensors]
+tension_bias_N = 0.1
+
+[workspace]""")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -99,6 +112,17 @@ def session(path: Path) -> None:
     session_file.read(path, schema.read("linear-7"), 1.0, 0.01)
 
 
+def robot(path: Path) -> None:
+    """A robot of CASPR; damage that leaves one makes a robot file that is read."""
+    written = path.with_suffix(".toml")
+    written.unlink(missing_ok=True)
+    schema.read(import_robot(path, written))
+
+
+def _example(name: str) -> bytes:
+    return (ROOT / "docs" / "example" / name).read_bytes()
+
+
 READERS = {
     "experiment": Reader("e.toml", (TOML + PRIOR).encode(), {"a.csv": CSV.encode()}, experiments),
     "readings": Reader("a.csv", CSV.encode(), {"e.toml": TOML.encode()}, beside),
@@ -108,6 +132,13 @@ READERS = {
     "robot": Reader("robot.toml", (ROOT / "data/robots/linear-7.toml").read_bytes(), {}, schema.read),
     "drums": Reader("robot.toml", (ROOT / "data/robots/hangprinter-4.toml").read_bytes(), {}, schema.read),
     "session": Reader("session.csv", (ROOT / "docs/example/linear-7-session.csv").read_bytes(), {}, session),
+    "pulleys": Reader("robot.toml", ROLLING.encode(), {}, schema.read),
+    "caspr": Reader(
+        "desk_cables.xml", _example("desk_cables.xml"), {"desk_bodies.xml": _example("desk_bodies.xml")}, robot
+    ),
+    "caspr bodies": Reader(
+        "desk_bodies.xml", _example("desk_bodies.xml"), {"desk_cables.xml": _example("desk_cables.xml")}, robot
+    ),
     "bench": Reader("raw.csv", BENCH.encode(), {}, bench),
     "bench in cp1252": Reader("raw.txt", BENCH.encode("cp1252"), {}, bench),
     "recording": Reader("raw.csv", RECORDED.encode(), {}, bench),

@@ -98,6 +98,12 @@ COMMANDS = {
         "Write synthetic tests with known truth.",
         "wirebayes simulate --output out/simulated --seed 1",
     ),
+    "import-robot": Command(
+        "wirebayes.cli.import_robot",
+        "import_robot",
+        "Turn a robot of CASPR or WireX into a robot file.",
+        "wirebayes import-robot CoGiRo_bodies.xml CoGiRo_cables.xml --output cogiro.toml",
+    ),
     "pose": Command(
         "wirebayes.cli.robot",
         "pose",

@@ -42,7 +42,25 @@ def read(name_or_file: str | Path) -> Robot:
     InputError
         Naming the file and the key, what was found and what was expected.
     """
-    text, where = _text(str(name_or_file))
+    return parse(*_text(str(name_or_file)))
+
+
+def parse(text: str, where: str) -> Robot:
+    """Read a robot from the text of a file, which errors call `where`.
+
+    Parameters
+    ----------
+    text, where : str
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        As `read`.
+    """
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also what Python refuses: an integer of thousands of digits

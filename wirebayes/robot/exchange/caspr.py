@@ -1,0 +1,139 @@
+"""Robots of CASPR: a file of bodies beside a file of cables (D. Lau and others, github.com/darwinlau/CASPR).
+
+Lengths are metres, forces newtons, gravity points along -z; an attachment's location counts from the joint or from the
+centre of mass of its link, that of link 0 from the origin. CASPR's pulley is that of `mechanics.pulleys`: it is fixed
+where the cable enters, and turns about the direction in which it does.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.exchange.imported import ImportedRobot
+from wirebayes.robot.exchange.xml_file import Element
+from wirebayes.robot.mechanics.description import Freedom
+from wirebayes.robot.mechanics.rotation import matrix, vector
+
+Floats = NDArray[np.float64]
+_JOINTS: dict[str, tuple[Freedom, tuple[int, ...]]] = {  # freedom, and the axes that the first coordinates move along
+    "SPATIAL_EULER_XYZ": ("pose", (0, 1, 2)),
+    "T_XYZ": ("position", (0, 1, 2)),
+    "P_XZ": ("position", (0, 2)),
+}
+
+
+def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> ImportedRobot:
+    """A robot of one rigid platform from the root elements of both files.
+
+    Parameters
+    ----------
+    bodies, cables : Element
+    cable_set : str, optional
+        Which set of cables; default: the file's own.
+
+    Raises
+    ------
+    InputError
+        What the files describe is no platform on wires, with file and line.
+    """
+    link = _platform(bodies)
+    joint, physical = link.one("joint"), link.one("physical")
+    kind = joint.attribute("type")
+    if kind not in _JOINTS:
+        raise joint.fail(f"the type {kind!r}", f"a free platform: {', '.join(_JOINTS)}")
+    freedom, axes = _JOINTS[kind]
+    centre = physical.one("com_location").vector()
+    base = link.one("parent").one("location").vector()
+    home, turn = _home(joint, freedom, axes, base)
+    chosen = _set(cables, cable_set)
+    legs = [_leg(cable, centre) for cable in chosen.children if cable.tag.startswith("cable_")]
+    if len(legs) < 2:
+        raise chosen.fail(f"{len(legs)} cables", "at least two")
+    low, high = (np.array([_force(c, key) for c in chosen.children if c.tag.startswith("cable_")])
+                 for key in ("force_min", "force_max"))  # fmt: skip
+    notes = ["Lengths, mass and bounds of the tensions are that file's; its stiffnesses are left out."]
+    if np.ptp(low) or np.ptp(high):
+        notes.append("Its cables have bounds of their own: the highest force_min and the lowest force_max are taken.")
+    names = " and ".join(Path(root.file).name for root in (bodies, cables))
+    return ImportedRobot(
+        link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
+        f"Imported from CASPR's {names}, cable set {chosen.attribute('id')!r}.",
+        freedom, physical.one("mass").number(), centre,
+        np.array([leg[0] for leg in legs]), np.array([leg[1] for leg in legs]),
+        np.array([leg[2] for leg in legs]), np.array([leg[3] for leg in legs]),
+        (float(low.max()), float(high.min())), home, turn, tuple(notes),
+    )  # fmt: skip
+
+
+def _platform(bodies: Element) -> Element:
+    links = bodies if bodies.tag == "links" else bodies.one("links")
+    bodily = [child for child in links.children if child.tag.startswith("link")]
+    if len(bodily) != 1 or bodily[0].tag != "link_rigid":
+        raise links.fail(f"{len(bodily)} links", "one <link_rigid>: a single platform")
+    parent = bodily[0].one("parent").one("num")
+    if parent.number() != 0:
+        raise parent.fail(f"{parent.text.strip()!r}", "0, the base")
+    return bodily[0]
+
+
+def _home(joint: Element, freedom: Freedom, axes: tuple[int, ...], base: Floats) -> tuple[Floats | None, Floats]:
+    """Position and rotation vector of ``q_initial``; angles turn about x, then y, then z of the turned platform."""
+    if "q_initial" not in joint.attributes:
+        return None, np.zeros(3)
+    words = Element(joint.file, joint.tag, joint.line, {}, text=joint.attributes["q_initial"])
+    q = words.vector(6 if freedom == "pose" else len(axes))
+    position = np.array(base)
+    position[list(axes)] += q[: len(axes)]
+    if freedom == "position":
+        return position, np.zeros(3)
+    about = [matrix(angle * np.eye(3)[k]) for k, angle in enumerate(q[3:])]
+    return position, vector(about[0] @ about[1] @ about[2])
+
+
+def _set(cables: Element, name: str | None) -> Element:
+    sets = cables.all("cable_set")
+    wanted = name or cables.attributes.get("default_cable_set")
+    known = [s.attributes.get("id", "") for s in sets]
+    if wanted is None and len(sets) == 1:
+        return sets[0]
+    if wanted not in known:
+        raise cables.fail(f"no cable set {wanted!r}" if wanted else "several cable sets", f"one of {', '.join(known)}")
+    return sets[known.index(wanted)]
+
+
+def _leg(cable: Element, centre: Floats) -> tuple[Floats, Floats, float, Floats]:
+    """Exit point, platform point, pulley radius and swivel axis of a cable."""
+    reference = cable.attribute("attachment_reference")
+    if reference not in ("joint", "com"):
+        raise cable.fail(f"attachment_reference {reference!r}", "joint or com")
+    ends = cable.one("attachments").children
+    if len(ends) != 2:
+        raise cable.fail(f"{len(ends)} attachments", "two: a wire runs straight from the base to the platform")
+    radius, axis = 0.0, np.array([0.0, 0.0, 1.0])
+    first, last = ends
+    if first.tag == "base_rotating_pulley":
+        exit_m, radius = first.one("fixed_location").vector(), first.one("pulley_radius").number()
+        entry = first.one("cable_entry_vector")
+        axis = entry.vector()
+        if not radius > 0 or not axis.any():
+            raise first.fail("a pulley without radius or direction", "both above 0")
+    else:
+        if _link(first) == 1 and _link(last) == 0:
+            first, last = last, first
+        if _link(first) != 0:
+            raise first.fail(f"link {_link(first)}", "link 0, the base")
+        exit_m = first.one("location").vector()
+    if _link(last) != 1:
+        raise last.fail(f"link {_link(last)}", "link 1, the platform")
+    return exit_m, last.one("location").vector() + (centre if reference == "com" else 0.0), radius, axis
+
+
+def _link(attachment: Element) -> int:
+    if attachment.tag != "attachment":
+        raise attachment.fail("this kind of attachment", "<attachment>, or <base_rotating_pulley> at the base")
+    return int(attachment.one("link").number())
+
+
+def _force(cable: Element, key: str) -> float:
+    return cable.one("properties").one(key).number()
