@@ -8,7 +8,7 @@ INPUTS := pyproject.toml constraints.txt
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test test-full lint calibration discover-benchmark benchmark docs dist clean
+.PHONY: run test test-full coverage lint calibration discover-benchmark benchmark docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
@@ -18,6 +18,10 @@ test: lint
 
 test-full: lint
 	$(BIN)/python -m pytest
+
+# Not part of make test: counting lines doubles its time.
+coverage: .venv/test.stamp
+	$(BIN)/python -m pytest -m "not slow and not browser" --cov=wirebayes --cov-report=term:skip-covered
 
 lint: .venv/test.stamp
 	$(BIN)/ruff check .
