@@ -3,9 +3,10 @@
     wirebayes fit data/paper/experiments.toml --experiment roc-line-1m --output out/fit
     python analyses/robot_pulleys.py out/fit/roc-line-1m > docs/pulleys-table.inc
 
-Shipped robots get a pulley at every exit, the wire coming from the floor (for exits below the platform from above). A
-controller takes the exit points for the points where the wires leave, and is zeroed at the home pose: what is left is
-what the arcs and tangents change on the way. Creep: new wires held still, everything else known.
+Shipped robots get a pulley at every exit, the wire coming from the floor (from above for exits below the platform,
+level for exits right above or below it). A controller takes the exit points for the points where the wires leave, and
+is zeroed at the home pose: what is left is what the arcs and tangents change on the way. Creep: new wires held still,
+everything else known.
 """
 
 import argparse
@@ -25,9 +26,12 @@ GRID, DRAWS, TIMES_S = (5, 5, 3), 40, (60.0, 3600.0)
 
 
 def with_pulleys(robot, radius_m):
-    """Pulleys of one radius at all exits."""
-    up = np.where(robot.exit_m[:, 2] > robot.home_m[2], 1.0, -1.0)
-    return replace(robot, pulleys=Pulleys(np.full(robot.legs, radius_m), up[:, None] * [0.0, 0.0, 1.0]))
+    """Pulleys of one radius at all exits; the wire comes level where the platform is right above or below."""
+    line = robot.exit_m - robot.home_m
+    steep = np.abs(line[:, 2]) > 2 * np.linalg.norm(line[:, :2], axis=1)
+    upright = np.where(line[:, 2] > 0, 1.0, -1.0)[:, None] * [0.0, 0.0, 1.0]
+    axis = np.where(steep[:, None], [1.0, 0.0, 0.0], upright)
+    return replace(robot, pulleys=Pulleys(np.full(robot.legs, radius_m), axis))
 
 
 def ignored(robot, wires, radius_m):

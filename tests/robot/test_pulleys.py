@@ -12,6 +12,8 @@ from wirebayes.robot.mechanics import draws, pulleys, rotation, schema, statics
 from wirebayes.robot.mechanics.description import Pulleys
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, drift, forward, inverse
+from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.robot.proof import proofs
 from wirebayes.robot.proof.ball_arithmetic import Balance
 from wirebayes.robot.proof.certificate import certify
@@ -138,6 +140,11 @@ def test_a_platform_inside_a_pulley_is_not_held():
     at = robot.exit_m[3] + [0.0, 0.0, -wheel.radius_m[3]]
     assert np.isfinite(inverse.tensions(inside, robot.home_m[None] - [0, 0, 0.1], np.eye(3)[None])).all()
     assert np.isnan(inverse.tensions(inside, at[None], np.eye(3)[None])).all()
+    along = robot.exit_m[3] - [1.0, 0.0, 0.0]  # on the swivel axis: the pulley may turn anyhow
+    assert np.isnan(inverse.tensions(inside, along[None], np.eye(3)[None])).all()
+    asked = PoseRequest(at, np.eye(3), np.array([0.0, 60.0]))
+    line = draws.WireDraws({k: np.ones(3) for k in draws.CORE} | {"k1": np.full(3, 3000.0)}, 1000.0)
+    assert "inside a pulley" in answer(inside, line, asked).content["sentence"]
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wirebayes.robot.mechanics.description import Pulleys
 
 Floats = NDArray[np.float64]
-_LEAST = 1e-3  # of the radius: a point nearer to the rim has no tangent worth the name, and counts as inside
+_LEAST = 1e-3  # of the radius: a point nearer to the rim has no tangent worth the name, and nearer to the axis no plane
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,8 @@ class WireRun:
     wrap_rad : (w, n) array
         Arc on the rim.
     clear : (w, n) bool array
-        False where the platform point lies inside the pulley: there the other values mean nothing.
+        False where the platform point lies inside the pulley, or on its swivel axis, where the pulley turns anyhow:
+        there the other values mean nothing.
     """
 
     length_m: Floats
@@ -60,7 +61,7 @@ def run(pulleys: Pulleys, line_m: Floats) -> WireRun:
     outward = beside / away
     h = away - rho
     square = h * h + along * along - rho * rho
-    clear = (square > (_LEAST * rho) ** 2) | (rho == 0)
+    clear = ((square > (_LEAST * rho) ** 2) & (away > _LEAST * rho)) | (rho == 0)
     straight = np.sqrt(np.maximum(square, (_LEAST * rho) ** 2 + tiny * tiny))
     size = np.maximum(np.sqrt(h * h + along * along), tiny) * np.sqrt(straight * straight + rho * rho)
     cosine, sine = (along * straight - h * rho) / size, (along * rho + h * straight) / size

@@ -44,7 +44,7 @@ class Geometry:
 
     @property
     def clear(self) -> NDArray[np.bool_]:
-        """(n,) False where a platform point lies inside a pulley."""
+        """(n,) False where a platform point lies inside a pulley or on its swivel axis."""
         none = np.ones(self.distance_m.shape[-1], bool)
         return none if self.over is None else np.asarray(self.over.clear.all(0))
 

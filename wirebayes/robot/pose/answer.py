@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import draws, drums
+from wirebayes.robot.mechanics import draws, drums, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -79,7 +79,10 @@ def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws |
         "feasible": bool(np.isfinite(tau).all()),
     }  # fmt: skip
     if not content["feasible"]:
-        return Answer(content | {"sentence": "No tensions within the bounds hold the platform at this pose."}, {})
+        said = "No tensions within the bounds hold the platform at this pose."
+        if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
+            said = "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
+        return Answer(content | {"sentence": said}, {})
     told = inverse.commands(robot, shared, x[None], R[None], tau)
     content["feasible_draws"] = float(told.feasible.mean())
     if not told.feasible.any():
