@@ -35,7 +35,7 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import write_csv
-from wirebayes.prediction.request import read_question
+from wirebayes.prediction.request import read_request
 from wirebayes.prediction.table import table as predicted_table
 from wirebayes.results.jobs import Job, one
 from wirebayes.results.store import CREEP_TIMES_S, Stored, load
@@ -175,7 +175,7 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
     stiff, value = (w.stiffness_N(tension) for w in wires)
     add("derived", "stiffness_N", float(value[0]), *map(float, np.quantile(stiff, [0.05, 0.95])))
 
-    asked = read_question(folder / "later.csv", stored)
+    asked = read_request(folder / "later.csv", stored)
     rows = predicted_table(asked)
     measured = truth.readings[-LATER:, :, 0][truth.protocol.mask[-LATER:]]
     for row, reading in zip(rows, measured, strict=True):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.comparison.compare import told
+from wirebayes.comparison.compare import scores_dict
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
@@ -47,8 +47,8 @@ def main() -> None:
                         output.mkdir(parents=True, exist_ok=True)
                         name = f"{experiment.name}-{trained}-{likelihood}-{way.replace('_', '-')}"
                         title = f"{experiment.name}, {trained} holds, {pictures.WORDS[way]}"
-                        save(pictures.bands(title, told(scores)), output / f"{name}.svg")
-                        save(pictures.pit(title, told(scores)), output / f"{name}-pit.svg")
+                        save(pictures.bands(title, scores_dict(scores)), output / f"{name}.svg")
+                        save(pictures.pit(title, scores_dict(scores)), output / f"{name}-pit.svg")
 
 
 if __name__ == "__main__":

@@ -288,7 +288,7 @@ def test_training_asked_for_by_a_user_has_enough_readings_too(experiment_file):
     assert len(experiment.first(2).recorded_holds) == 2
     with pytest.raises(InputError, match="found 1 hold with 2 readings in the first 1 of 3 .*, expected at least 2"):
         experiment.first(1)
-    with pytest.raises(InputError, match="found 4 training holds asked for, expected 1 to 3"):
+    with pytest.raises(InputError, match="found 4 training holds requested, expected 1 to 3"):
         experiment.first(4)
 
 

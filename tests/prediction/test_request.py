@@ -9,7 +9,7 @@ from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import read_experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.request import read_question
+from wirebayes.prediction.request import read_request
 from wirebayes.results.store import Stored
 
 TRAINED = """hold,displacement_mm,time_s,tension_N,temperature_C
@@ -46,17 +46,17 @@ def ask(folder: Path, text: str) -> Path:
 
 def test_holds_to_come_follow_all_that_was_held(tmp_path: Path, stored: Stored) -> None:
     text = "hold,displacement_mm,time_s,temperature_C\n3,2,0,21.0\n3,2,60,21.5\n7,4,0,25\n7,4,10,25\n7,4,90,26\n"
-    asked = read_question(ask(tmp_path, text), stored)
-    question = asked.question
-    assert question.trained == 3
-    assert list(question.asked) == [False, False, True, True]
-    assert list(question.protocol.number) == [1, -1, 3, 7]
-    assert list(question.protocol.duration_s) == [60, 30, 60, 90]
-    assert question.protocol.warming_K is not None
+    request = read_request(ask(tmp_path, text), stored)
+    prediction = request.prediction
+    assert prediction.trained == 3
+    assert list(prediction.requested) == [False, False, True, True]
+    assert list(prediction.protocol.number) == [1, -1, 3, 7]
+    assert list(prediction.protocol.duration_s) == [60, 30, 60, 90]
+    assert prediction.protocol.warming_K is not None
     # warming counts from the first temperature of the training, hold 1's 20.0, which this file does not repeat
-    assert question.protocol.warming_K[3] == pytest.approx([5.0, 5.0, 6.0])
-    assert asked.stored is stored
-    assert asked.sentence == (
+    assert prediction.protocol.warming_K[3] == pytest.approx([5.0, 5.0, 6.0])
+    assert request.stored is stored
+    assert request.sentence == (
         "hold 3 of the training predicted as replicates; hold 7 predicted as a continuation of the tested sample from "
         "the end of hold 3 on, given all training readings (--fresh for a fresh sample); "
         "nothing is assumed to have happened in between: holds 4 to 6 not in its history"
@@ -66,11 +66,11 @@ def test_holds_to_come_follow_all_that_was_held(tmp_path: Path, stored: Stored) 
 def test_later_holds_continue_the_test_though_no_training_hold_is_repeated(tmp_path: Path, stored: Stored) -> None:
     later = "7,4,0,25\n7,4,10,25\n7,4,90,26\n9,5,0,25\n10,4.5,0,25\n"
     header = "hold,displacement_mm,time_s,temperature_C\n"
-    alone = read_question(ask(tmp_path, header + later), stored)
-    repeating = read_question(ask(tmp_path, header + "3,2,0,21.0\n3,2,60,21.5\n" + later), stored)
-    assert alone.question.trained == repeating.question.trained == 3
-    assert list(alone.question.asked) == [False, False, False, True, True, True]
-    one, other = alone.question.protocol, repeating.question.protocol
+    alone = read_request(ask(tmp_path, header + later), stored)
+    repeating = read_request(ask(tmp_path, header + "3,2,0,21.0\n3,2,60,21.5\n" + later), stored)
+    assert alone.prediction.trained == repeating.prediction.trained == 3
+    assert list(alone.prediction.requested) == [False, False, False, True, True, True]
+    one, other = alone.prediction.protocol, repeating.prediction.protocol
     for name in ("number", "displacement_mm", "duration_s", "start_s", "time_s", "mask", "warming_K"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
     # the slip at hold 3 goes on, the temperature reference is the training's, the clock goes on after 150 s
@@ -84,17 +84,17 @@ def test_later_holds_continue_the_test_though_no_training_hold_is_repeated(tmp_p
 @pytest.mark.parametrize("number", [1, 2, 101])
 def test_a_fresh_sample_starts_anew_without_the_others_events(tmp_path: Path, stored: Stored, number: int) -> None:
     text = f"hold,displacement_mm,time_s,temperature_C\n{number},3,0,24\n{number},3,60,26\n"
-    asked = read_question(ask(tmp_path, text), stored, fresh=True)
-    protocol = asked.question.protocol
-    assert asked.question.trained == 0 and list(protocol.start_s) == [0.0]
+    request = read_request(ask(tmp_path, text), stored, fresh=True)
+    protocol = request.prediction.protocol
+    assert request.prediction.trained == 0 and list(protocol.start_s) == [0.0]
     assert protocol.warming_K is not None and protocol.warming_K[0] == pytest.approx([0.0, 2.0])
-    assert [e.key for e in asked.stored.sample.model.effects] == ["thermal_expansion"]
-    assert "fresh sample with no history" in asked.sentence
+    assert [e.key for e in request.stored.sample.model.effects] == ["thermal_expansion"]
+    assert "fresh sample with no history" in request.sentence
 
 
 def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) -> None:
     text = "hold,displacement_mm,time_s,temperature_C\n1,1,0,20\n1,1,60,20.5\n3,2,0,21\n3,2,60,21.5\n"
-    assert read_question(ask(tmp_path, text), stored).sentence == "holds 1, 3 of the training predicted as replicates"
+    assert read_request(ask(tmp_path, text), stored).sentence == "holds 1, 3 of the training predicted as replicates"
 
 
 @pytest.mark.parametrize(
@@ -125,5 +125,5 @@ def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) ->
 )
 def test_refusals_say_where(tmp_path: Path, stored: Stored, text: str, words: str) -> None:
     with pytest.raises(InputError) as caught:
-        read_question(ask(tmp_path, text), stored)
+        read_request(ask(tmp_path, text), stored)
     assert words in str(caught.value)

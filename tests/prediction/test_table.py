@@ -26,8 +26,8 @@ def test_quantiles_are_those_of_the_known_normal() -> None:
     stored = Stored({name: np.full(DRAWS, value) for name, value in WIRE.items()}, sample, "chain")
     every = np.ones(3, bool)
     question = PredictionRequest(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
-    asked = SimpleNamespace(stored=stored, question=question, holds=experiment.holds)
-    rows = [dict(zip(HEADER, row, strict=True)) for row in table(asked, draws=DRAWS)]  # type: ignore[arg-type]
+    request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
+    rows = [dict(zip(HEADER, row, strict=True)) for row in table(request, draws=DRAWS)]  # type: ignore[arg-type]
     r, covariance, hold = normal(protocol, WIRE, Model(), experiment.tension(), 0.02)
     mean, sd = experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))
     assert [row["hold"] for row in rows] == list(hold + 1)
@@ -49,7 +49,7 @@ def test_undecided_models_answer_as_often_as_they_are_probable() -> None:
     for share, stiffness in ((0.7, 900.0), (0.3, 1200.0)):
         wire = WIRE | {"k1": stiffness}
         stored = Stored({name: np.full(DRAWS, value) for name, value in wire.items()}, sample, "chain")
-        members.append((share, SimpleNamespace(stored=stored, question=question, holds=experiment.holds)))
+        members.append((share, SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)))
         r, covariance, _ = normal(protocol, wire, Model(), experiment.tension(), 0.02)
         parts.append((share, experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))))
     rows = [dict(zip(HEADER, row, strict=True)) for row in mixture_table(members, draws=DRAWS)]  # type: ignore[arg-type]

@@ -62,7 +62,7 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
     np.testing.assert_allclose(said["inverse"]["zero_tension_length_m"]["mean"], zero.mean(0), rtol=1e-12)
     assert said["forward"]["solved"] == 1.0
     named = {row["controller"] for row in said["pose_error"]}
-    assert named == {"hooke_only", "creep_aware", "creep_aware_told_otherwise"}
+    assert named == {"hooke_only", "creep_aware", "creep_aware_other_fit"}
     assert f"{effect}.{column}" in said["variance_shares"]["shared_draw"]
 
 

@@ -88,7 +88,7 @@ def candidates(
     else:
         out.append(other("hooke", LAW, "Strain is taken over the zero-tension length, eq (1).", law="hooke"))
     if base.history == "saturating":
-        out.append(other("additive", HISTORY, "Every hold adds the creep of eq (4) anew.", history="additive"))
+        out.append(other("additive", HISTORY, "Every hold adds the creep of eq (4) again.", history="additive"))
     else:
         out.append(other("saturating", HISTORY, "Creep saturates towards the amount of eq (4).", history="saturating"))
     if base.likelihood == "chain":

@@ -122,12 +122,12 @@ def _held_out(result: HeldOut) -> dict[str, Any]:
     return {
         "trained_on": result.trained,
         "holds": np.unique(result.given.hold),
-        "free": None if result.free is None else told(result.free),
-        "given_first": told(result.given),
+        "free": None if result.free is None else scores_dict(result.free),
+        "given_first": scores_dict(result.given),
     }
 
 
-def told(scores: Scores) -> dict[str, Any]:
+def scores_dict(scores: Scores) -> dict[str, Any]:
     """Scores as plain values, with what the pictures need."""
     return {
         "rmse_N": scores.rmse_N, "elpd": float(scores.elpd.sum()), "per_hold": scores.elpd,
@@ -179,7 +179,7 @@ def side_by_side(models: Sequence[dict[str, Any]], base: str) -> dict[str, Any]:
     Parameters
     ----------
     models : sequence of dict
-        What `judge` told, read back from JSON.
+        What `judge` returned, read back from JSON.
     base : str
         Name of the model that the others are compared with.
 
@@ -243,20 +243,20 @@ def _meaning(row: dict[str, Any], base: str) -> str:
         return f"could not be judged ({row['failed']})"
     if row["name"] == base:
         return "the reference for the other models"
-    told = row["difference"]
+    gain = row["difference"]
     where = "leaving out each hold in turn"
-    if told is None:
-        told, where = row["given_first_difference"], "on held-out holds given their first reading"
-    if told is None:
+    if gain is None:
+        gain, where = row["given_first_difference"], "on held-out holds given their first reading"
+    if gain is None:
         return "scored on other readings, so not comparable here"
-    size = f"elpd {told['elpd']:+.1f} ± {told['se']:.1f} against {base}, {where}"
-    if np.isnan(told["se"]):
-        return f"elpd {told['elpd']:+.1f} against {base}, {where}: one hold alone, which says nothing of its error"
+    size = f"elpd {gain['elpd']:+.1f} ± {gain['se']:.1f} against {base}, {where}"
+    if np.isnan(gain["se"]):
+        return f"elpd {gain['elpd']:+.1f} against {base}, {where}: one hold alone, which says nothing of its error"
     if not row["converged"]:
         return f"{size}; its sampling did not converge, so this may be wrong"
-    if abs(told["elpd"]) < MEANINGFUL_ELPD or abs(told["elpd"]) < MEANINGFUL_SE * told["se"]:
+    if abs(gain["elpd"]) < MEANINGFUL_ELPD or abs(gain["elpd"]) < MEANINGFUL_SE * gain["se"]:
         return f"{size}: no meaningful difference"
-    return f"{size}: predicts {'better' if told['elpd'] > 0 else 'worse'}"
+    return f"{size}: predicts {'better' if gain['elpd'] > 0 else 'worse'}"
 
 
 def stacking(log_density: Array, iterations: int = 2000) -> Array:

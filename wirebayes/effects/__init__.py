@@ -43,7 +43,7 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     Raises
     ------
     InputError
-        If the file cannot be run, holds no effect, or one of them lacks what `Effect` asks for.
+        If the file cannot be run, holds no effect, or one of them lacks what `Effect` requires.
     """
     if own is None:
         return CATALOGUE
@@ -56,7 +56,7 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     sys.modules[spec.name] = module  # so that other processes can be sent its effects
     try:
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # whatever the user's file raises is told in one line
+    except (Exception, SystemExit) as error:  # whatever the user's file raises is reported in one line
         raise InputError(
             f"{own}: cannot be run ({type(error).__name__}: {error}), expected a Python file with effects"
         ) from None

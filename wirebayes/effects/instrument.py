@@ -98,7 +98,7 @@ class LostMotion(_NeedsReversal):
 
 
 class GuideFriction(_NeedsReversal):
-    """τ (1 ± μ) by direction of motion, told from the first direction's own value."""
+    """τ (1 ± μ) by direction of motion, relative to the first direction's value."""
 
     name = "guide_friction"
     place = "reading"

@@ -17,7 +17,7 @@ from wirebayes.inference.transform import LogPosterior
 Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
-_LOOKED = 400  # places that are asked whether a mode explains them
+_LOOKED = 400  # places at which it is tested whether a mode explains them
 # where on the line to a mode the density is evaluated: a valley between two hills seldom avoids all three
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
@@ -152,7 +152,8 @@ def _positive(matrices: Array) -> tuple[Array, Array]:
 def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array, sides: int) -> tuple[Array, Array]:
     """Gradient and Hessian by central differences, all points of all rows in one batch.
 
-    Mixed derivatives take most of the points: with one side only, half as many, they tell the way well enough.
+    Mixed derivatives take most of the points: with one side only, half as many, they give the
+    direction well enough.
     """
     n, d = z.shape
     upper = np.triu_indices(d, 1)
@@ -261,7 +262,7 @@ def search(
 def _sag(target: LogPosterior, z: Array, height: Array, found: Optimum) -> Array:
     """(n,) how far the density between (n, d) places and a mode seen from there lies below the straight line.
 
-    Within one hill it lies above. The best mode is asked first, the others where no one before was seen.
+    Within one hill it lies above. The best mode is tried first, the others where none before was visible.
     """
     least = np.full(len(z), 1e3)
     for mode, top in zip(found.z, found.log_density, strict=True):

@@ -6,7 +6,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Policy:
-    """What is asked of a chain before its draws are believed.
+    """What a chain has to satisfy before its draws are used.
 
     Attributes
     ----------

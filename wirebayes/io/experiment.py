@@ -92,7 +92,7 @@ class Experiment:
         places = [place for place, hold in enumerate(self.holds) if hold.recorded]
         if not 1 <= holds <= len(places):
             raise InputError(
-                f"{self.source}, experiment {self.name}: found {holds} training holds asked for, "
+                f"{self.source}, experiment {self.name}: found {holds} training holds requested, "
                 f"expected 1 to {len(places)}, the recorded ones"
             )
         return replace(self, holds=self.holds[: places[holds - 1] + 1])
@@ -102,7 +102,7 @@ class Experiment:
         return replace(self, holds=_in_sequence(self.recorded_holds))
 
     def first(self, holds: int) -> "Experiment":
-        """`train`, for what a user asks to be fitted.
+        """`train`, for what a user wants fitted.
 
         Raises
         ------

@@ -68,7 +68,7 @@ class PlanFile:
     robot : str or None
         Name or file of a robot.
     aim : tuple of str
-        ``("parameters",)``, ``("creep",)``, or two effects to tell apart.
+        ``("parameters",)``, ``("creep",)``, or two effects to distinguish.
     """
 
     source: Path
@@ -246,7 +246,7 @@ def _aim(top: Keys, effects: Sequence[str]) -> tuple[str, ...]:
     aim = top.table.get("aim", "parameters")
     if aim in ("parameters", "creep"):
         return (str(aim),)
-    expected = '"parameters", "creep", or a list of two effects to tell apart'
+    expected = '"parameters", "creep", or a list of two effects to distinguish'
     if not (isinstance(aim, list) and len(aim) == 2 and all(isinstance(name, str) for name in aim)):
         raise top.complain("aim", shown(aim), expected)
     for name in aim:

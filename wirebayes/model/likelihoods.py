@@ -74,7 +74,7 @@ def held_out(
     line: Linearised,
     readings: Array,
     mask: Array,
-    asked: NDArray[np.bool_],
+    requested: NDArray[np.bool_],
     variance: Array,
     setting_sd: Array,
     first_only: bool = False,
@@ -85,20 +85,20 @@ def held_out(
     ----------
     line, readings, mask, variance, setting_sd
         As for `chain`; the mask covers all readings.
-    asked : (H,) bool array
+    requested : (H,) bool array
         Which holds are held out.
     first_only : bool
         Of each held-out hold only the first reading.
 
     Returns
     -------
-    (holds asked, n) array
+    (requested holds, n) array
     """
-    before = chain(line, readings, mask & ~asked[:, None], variance, setting_sd)
+    before = chain(line, readings, mask & ~requested[:, None], variance, setting_sd)
     noise = _Noise.of(variance, setting_sd)
     rows = mask & (np.arange(mask.shape[1]) == 0) if first_only else mask
     mean, var = before.carried_mean, before.carried_var
-    holds = np.flatnonzero(asked).tolist()
+    holds = np.flatnonzero(requested).tolist()
     return np.array([_hold(line, j, readings[j], rows[j], mean[j], var[j], noise)[0] for j in holds])
 
 
@@ -142,7 +142,7 @@ def _hold(
 
 
 def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> tuple[Array, ...]:
-    """What a hold (R, n) tells of the creep carried in, of variance p before, and of its setting error, q.
+    """What a hold (R, n) says about the creep carried in, of variance p before, and of its setting error, q.
 
     Products of the slopes, the determinant by which the readings' covariance exceeds that of sensor errors alone, and
     the covariance of the two given the readings.

@@ -208,7 +208,7 @@ def _reference_length(members: Sequence[Experiment]) -> float:
 def _material_priors(
     members: Sequence[Experiment], effects: Sequence[Effect], mark: str, length_exponent: Any
 ) -> dict[str, Any]:
-    """Default priors of what the samples of one material share; `mark` tells materials apart in the names."""
+    """Default priors of what the samples of one material share; `mark` distinguishes materials in the names."""
     defaults = wire_defaults(_reference_length(members))
     out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in MATERIAL}
     if len({e.length_mm for e in members}) > 1:

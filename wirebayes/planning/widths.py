@@ -25,7 +25,7 @@ from wirebayes.wire.staircase import simulate
 Array = NDArray[Any]
 Guess = Mapping[str, Array]
 HOUR_S = 3600.0
-_DRAWS = (500, 500, 3000)  # of each posterior, round by round: the last tell its width to some 5 %, tails included
+_DRAWS = (500, 500, 3000)  # of each posterior, round by round: the last give its width to some 5 %, tails included
 _ROWS = 16  # simulated tests weighted at once
 _KEPT = 400  # draws that are handed on of a posterior
 _NUMBERS = 4_000_000  # draws times readings at once, so that a long protocol does not fill the memory
@@ -75,7 +75,7 @@ class Expected:
         For which creep is stated.
     longest_hold_s : float
     information_bits : float
-        What the test tells of the material: the logarithm, to base 2, of how often the volume that its parameters
+        What the test says about the material: the logarithm, to base 2, of how often the volume that its parameters
         (as logarithms) may lie in is halved, from the model's prior to the posterior; median over the tests.
     tests : int
         Simulated tests that could be used.

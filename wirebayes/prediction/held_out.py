@@ -122,27 +122,27 @@ def held_out(fitted: Fit, experiment: Experiment, rng: np.random.Generator, samp
     problem, here = fitted.problem, fitted.problem.samples[sample]
     whole, trained = experiment.protocol(), len(here.protocol.number)
     theta = thinned(fitted.flat)
-    asked = whole.recorded.copy()
-    asked[:trained] = False
-    if not asked.any():
+    requested = whole.recorded.copy()
+    requested[:trained] = False
+    if not requested.any():
         raise ValueError(f"{experiment.name}: all {trained} holds were trained on")
     tension = experiment.tension()
-    nothing = np.full(len(asked), np.nan)
+    nothing = np.full(len(requested), np.nan)
     past = int(here.protocol.recorded.sum())
     free = None
     if problem.likelihood == "chain":
-        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, asked, nothing), rng)
-        elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, asked)
-        free = _scores(drawn, whole.mask & asked[:, None], whole.number, whole.time_s, tension, elpd, together)
+        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, requested, nothing), rng)
+        elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, requested)
+        free = _scores(drawn, whole.mask & requested[:, None], whole.number, whole.time_s, tension, elpd, together)
         # Each hold given its own first reading alone, as the paper's figures were made.
-        for j in np.flatnonzero(asked):
-            only = np.arange(len(asked)) == j
-            question = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
-            drawn[j] = predict(problem, theta, here, question, rng)[j]
+        for j in np.flatnonzero(requested):
+            only = np.arange(len(requested)) == j
+            request = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
+            drawn[j] = predict(problem, theta, here, request, rng)[j]
     else:
-        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, asked, tension[:, 0]), rng)
-        elpd_given = _hold_scores(fitted, experiment, sample, asked)
-    later = whole.mask & asked[:, None]
+        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, requested, tension[:, 0]), rng)
+        elpd_given = _hold_scores(fitted, experiment, sample, requested)
+    later = whole.mask & requested[:, None]
     later[:, 0] = False
     return HeldOut(
         experiment.name, past, free, _scores(drawn, later, whole.number, whole.time_s, tension, elpd_given, np.nan)
@@ -202,7 +202,7 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
 
 
 def _chain_scores(
-    fitted: Fit, experiment: Experiment, sample: int, asked: NDArray[np.bool_]
+    fitted: Fit, experiment: Experiment, sample: int, requested: NDArray[np.bool_]
 ) -> tuple[Array, Array, float]:
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
     problem, here = fitted.problem, fitted.problem.samples[sample]
@@ -215,22 +215,22 @@ def _chain_scores(
         noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N), own["setting_sd"]
         with np.errstate(all="ignore"):
             holds, first = (
-                likelihoods.held_out(line, tension, whole.mask, asked, *noise, first_only=only)
+                likelihoods.held_out(line, tension, whole.mask, requested, *noise, first_only=only)
                 for only in (False, True)
             )
-            together = likelihoods.chain(line, tension, whole.mask, *noise).log_likelihood[asked].sum(axis=0)
+            together = likelihoods.chain(line, tension, whole.mask, *noise).log_likelihood[requested].sum(axis=0)
         parts.append((holds, first, together))
     whole_hold, first_reading, every = (_log_mean(np.concatenate(v, axis=-1)) for v in zip(*parts, strict=True))
     return whole_hold, whole_hold - first_reading, float(every)
 
 
-def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, asked: NDArray[np.bool_]) -> Array:
+def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["k1"]}
     variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N)
     log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
-    return _log_mean(log_p[asked])
+    return _log_mean(log_p[requested])
 
 
 def _log_mean(log_p: Array) -> Array:

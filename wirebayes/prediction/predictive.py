@@ -25,30 +25,30 @@ _CHUNK = 500  # draws at a time: bounds the memory of the normal equations
 
 @dataclass(frozen=True)
 class PredictionRequest:
-    """Which readings are asked for, after which history.
+    """Which readings are to be predicted, after which history.
 
     Attributes
     ----------
     protocol : Protocol
-        The training holds first, then the holds to come; or, for a fresh sample, the asked holds alone.
+        The training holds first, then the holds to come; or, for a fresh sample, the requested holds alone.
     trained : int
         How many leading holds belong to the training; 0 for a fresh sample.
-    asked : (H,) bool array
-        A trained hold that is asked for is answered as a replicate: new noise, new setting error.
+    requested : (H,) bool array
+        A trained hold that is requested is predicted as a replicate: new noise, new setting error.
     first_N : (H,) array
         A hold's first reading where the prediction shall be given it, else NaN.
     """
 
     protocol: Protocol
     trained: int
-    asked: NDArray[np.bool_]
+    requested: NDArray[np.bool_]
     first_N: Array
 
 
 def predict(
-    problem: Problem, theta: Array, sample: Sample, question: PredictionRequest, rng: np.random.Generator
+    problem: Problem, theta: Array, sample: Sample, request: PredictionRequest, rng: np.random.Generator
 ) -> Array:
-    """Draws of the asked readings.
+    """Draws of the requested readings.
 
     Parameters
     ----------
@@ -58,35 +58,35 @@ def predict(
         Posterior draws.
     sample : Sample
         The one of the problem's samples that goes on; its readings are the history.
-    question : PredictionRequest
+    request : PredictionRequest
     rng : numpy Generator
 
     Returns
     -------
     (H, R, n) array, N
-        Zero for holds that were not asked for. Rounding is continuous: uniform within half a step.
+        Zero for holds that were not requested. Rounding is continuous: uniform within half a step.
     """
     parts = [
-        _readings(problem, theta[start : start + _CHUNK], sample, question, rng)
+        _readings(problem, theta[start : start + _CHUNK], sample, request, rng)
         for start in range(0, len(theta), _CHUNK)
     ]
     drawn = np.concatenate(parts, axis=-1)
-    return drawn if problem.likelihood == "hold" else _given_first(drawn, question)
+    return drawn if problem.likelihood == "hold" else _given_first(drawn, request)
 
 
 def _readings(
-    problem: Problem, theta: Array, sample: Sample, question: PredictionRequest, rng: np.random.Generator
+    problem: Problem, theta: Array, sample: Sample, request: PredictionRequest, rng: np.random.Generator
 ) -> Array:
-    own, protocol = problem.parameters(theta, sample), question.protocol
+    own, protocol = problem.parameters(theta, sample), request.protocol
     shape = (*protocol.time_s.shape, len(theta))
     error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution_N
     if problem.likelihood == "hold":
-        return _hold_by_hold(own, sample.model, question, error)
-    course = chain_course(own, sample, question, rng)
-    return np.where(question.asked[:, None, None], course + error, 0.0)
+        return _hold_by_hold(own, sample.model, request, error)
+    course = chain_course(own, sample, request, rng)
+    return np.where(request.requested[:, None, None], course + error, 0.0)
 
 
-def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: np.random.Generator) -> Array:
+def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np.random.Generator) -> Array:
     """Readings without sensor error along the chain of holds; trained holds appear as replicates.
 
     A replicate has a setting error of its own, while the creep carried on from a trained hold is the one that its
@@ -99,7 +99,7 @@ def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: n
         Posterior draws of the sample's parameters.
     sample : Sample
         What was trained on.
-    question : PredictionRequest
+    request : PredictionRequest
         The protocol, trained holds first, and which of its holds are to be predicted.
     rng : numpy.random.Generator
         Draws the setting errors.
@@ -109,9 +109,9 @@ def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: n
     (H, R, n) array
         Tensions of all holds of the protocol, N.
     """
-    protocol, trained = question.protocol, question.trained
+    protocol, trained = request.protocol, request.trained
     n = len(own["k1"])
-    setting = rng.normal(size=(len(question.asked), n)) * own["setting_sd"]
+    setting = rng.normal(size=(len(request.requested), n)) * own["setting_sd"]
     again = setting.copy()
     if trained:
         setting[:trained] = settings_given_readings(own, sample, rng)
@@ -119,8 +119,8 @@ def chain_course(own: Theta, sample: Sample, question: PredictionRequest, rng: n
     creep: Array = np.zeros(n)
     beside: dict[str, Array] = {}
     out = []
-    for j in range(len(question.asked)):
-        if j < trained and question.asked[j]:
+    for j in range(len(request.requested)):
+        if j < trained and request.requested[j]:
             past = list(walk.past)
             out.append(walk.hold(j, walk.stretched(j) + again[j], creep, beside)[0])
             walk.past = past
@@ -168,29 +168,29 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
     return drawn
 
 
-def _hold_by_hold(own: Theta, model: Model, question: PredictionRequest, error: Array) -> Array:
+def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: Array) -> Array:
     """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
-    given = question.first_N[:, None] - error[:, 0]
+    given = request.first_N[:, None] - error[:, 0]
     out = np.zeros_like(error)
-    for j, course in enumerate(likelihoods.hold_courses(question.protocol, own, model, given)):
-        if course is not None and question.asked[j]:
+    for j, course in enumerate(likelihoods.hold_courses(request.protocol, own, model, given)):
+        if course is not None and request.requested[j]:
             tension, _, valid = course
             out[j] = np.where(valid, tension, 0.0) + error[j]
-            out[j, 0] = question.first_N[j]
+            out[j, 0] = request.first_N[j]
     return out
 
 
-def _given_first(drawn: Array, question: PredictionRequest) -> Array:
+def _given_first(drawn: Array, request: PredictionRequest) -> Array:
     """Condition a hold's readings on the first readings given up to it; a replicate on its own alone."""
-    given = question.asked & np.isfinite(question.first_N)
-    for j in np.flatnonzero(question.asked)[::-1]:
+    given = request.requested & np.isfinite(request.first_N)
+    for j in np.flatnonzero(request.requested)[::-1]:
         known = np.array([j] if given[j] else [], int)
-        if j >= question.trained:
-            known = np.flatnonzero(given[question.trained : j + 1]) + question.trained
+        if j >= request.trained:
+            known = np.flatnonzero(given[request.trained : j + 1]) + request.trained
         if len(known):
-            drawn[j] = _regressed(drawn[j], drawn[known, 0], question.first_N[known])
+            drawn[j] = _regressed(drawn[j], drawn[known, 0], request.first_N[known])
         if given[j]:
-            drawn[j, 0] = question.first_N[j]  # not only to the last digit
+            drawn[j, 0] = request.first_N[j]  # not only to the last digit
     return drawn
 
 

@@ -27,20 +27,20 @@ class ProtocolRequest:
     ----------
     stored : Stored
         The posterior; for a fresh sample without the one-off events, which happened to the tested one.
-    question : PredictionRequest
+    prediction : PredictionRequest
     holds : tuple of Hold
-        As the file has them; the asked holds of the question in the same order.
+        As the file has them; the requested holds of `prediction` in the same order.
     sentence : str
         Which sample is predicted, given what.
     """
 
     stored: Stored
-    question: PredictionRequest
+    prediction: PredictionRequest
     holds: tuple[Hold, ...]
     sentence: str
 
 
-def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
+def read_request(path: Path, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
     """Read a protocol file and check it against what was trained on.
 
     Parameters
@@ -62,10 +62,10 @@ def read_question(path: Path, stored: Stored, *, fresh: bool = False) -> Protoco
     InputError
         With the file, line, column, what was found and what was expected.
     """
-    return asked_of(protocol_table(path), stored, fresh=fresh)
+    return request_of(protocol_table(path), stored, fresh=fresh)
 
 
-def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
+def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
     """Check the table of a protocol against what was trained on.
 
     Parameters
@@ -75,7 +75,7 @@ def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRe
     stored : Stored
         The posterior.
     fresh : bool
-        The table is the whole history of another sample (see `read_question`).
+        The table is the whole history of another sample (see `read_request`).
 
     Returns
     -------
@@ -95,22 +95,22 @@ def asked_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRe
     if fresh:
         began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
         alone = protocol_of(file.holds, trained.length_mm, began_at)
-        question = PredictionRequest(alone, 0, np.ones(len(first), bool), first)
-        return ProtocolRequest(_without_events(stored), question, file.holds, _FRESH)
+        prediction = PredictionRequest(alone, 0, np.ones(len(first), bool), first)
+        return ProtocolRequest(_without_events(stored), prediction, file.holds, _FRESH)
     row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     file.check_repeats(trained, row_of)
     repeated = np.array([hold.number in row_of for hold in file.holds])
     rows = np.array([row_of[int(h.number or 0)] for h, known in zip(file.holds, repeated, strict=True) if known], int)
-    asked = np.zeros(len(trained.number), bool)
-    asked[rows] = True
+    requested = np.zeros(len(trained.number), bool)
+    requested[rows] = True
     given = np.full(len(trained.number), np.nan)
     given[rows] = first[repeated]
     after = tuple(h for h, known in zip(file.holds, repeated, strict=True) if not known)
     whole = _joined(trained, protocol_of(after, trained.length_mm, trained.reference_C)) if after else trained
-    everything = np.append(asked, np.ones(len(after), bool))
-    question = PredictionRequest(whole, len(trained.number), everything, np.append(given, first[~repeated]))
+    everything = np.append(requested, np.ones(len(after), bool))
+    prediction = PredictionRequest(whole, len(trained.number), everything, np.append(given, first[~repeated]))
     sentence = _tested(tuple(trained.number[rows]), [int(h.number or 0) for h in after], max(row_of), stored.likelihood)
-    return ProtocolRequest(stored, question, file.holds, sentence)
+    return ProtocolRequest(stored, prediction, file.holds, sentence)
 
 
 _FRESH = "predicted as a fresh sample with no history: the protocol is all that ever happened to it"

@@ -14,17 +14,17 @@ HEADER = ("experiment", "hold", "displacement_mm", "time_s", "mean_N", "sd_N", "
 DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
 
-def table(asked: ProtocolRequest, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
-    """Mean, sd and quantiles of the asked readings, in the file's order.
+def table(request: ProtocolRequest, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
+    """Mean, sd and quantiles of the requested readings, in the file's order.
 
     Parameters
     ----------
-    asked : ProtocolRequest
+    request : ProtocolRequest
     seed : int
     draws : int
         Posterior draws used, evenly spread over the stored ones.
     """
-    return mixture_table([(1.0, asked)], seed, draws)
+    return mixture_table([(1.0, request)], seed, draws)
 
 
 def mixture_table(
@@ -35,23 +35,23 @@ def mixture_table(
     Parameters
     ----------
     members : sequence of (probability, ProtocolRequest)
-        One protocol asked of each model; the probabilities sum to one.
+        One protocol requested of each model; the probabilities sum to one.
     seed : int
     draws : int
         In all.
     """
     rng = np.random.default_rng(seed_of(seed, "predict", members[0][1].stored.sample.name))
     parts = []
-    for probability, asked in members:
-        stored, n = asked.stored, max(round(probability * draws), 2)
+    for probability, request in members:
+        stored, n = request.stored, max(round(probability * draws), 2)
         theta = stored.theta
         theta = theta[np.unique(np.linspace(0, len(theta) - 1, n).round().astype(int))]
-        parts.append(predict(stored.problem, theta, stored.sample, asked.question, rng))
+        parts.append(predict(stored.problem, theta, stored.sample, request.prediction, rng))
     drawn = np.concatenate(parts, axis=-1)
-    asked = members[0][1]
-    stored, question = asked.stored, asked.question
+    request = members[0][1]
+    stored, prediction = request.stored, request.prediction
     rows: list[list[Any]] = []
-    for hold, at in zip(asked.holds, np.flatnonzero(question.asked), strict=True):
+    for hold, at in zip(request.holds, np.flatnonzero(prediction.requested), strict=True):
         here = drawn[at, : len(hold.time_s)]
         quantiles = np.quantile(here, [0.05, 0.5, 0.95], axis=1)
         for k, time in enumerate(hold.time_s):

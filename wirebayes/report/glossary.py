@@ -87,8 +87,8 @@ def meaning(
     known = {**CATALOGUE, Discrepancy.name: Discrepancy, **{n: type(e) for n, e in (own or {}).items()}}
     said = [(spoken(name), _effect(known[name])) for name in names if name in known]
     blocks += [Definitions("Effects named here", said)] if said else []
-    told = [(term, TERMS[term]) for term in terms]
-    blocks += [Definitions("Other words", told)] if told else []
+    defined = [(term, TERMS[term]) for term in terms]
+    blocks += [Definitions("Other words", defined)] if defined else []
     return Section("What the words and symbols mean", blocks)
 
 

@@ -74,8 +74,8 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
     trained = len(stored.sample.protocol.displacement_mm)
     alone = stored.likelihood == "hold"
     unused = protocol.recorded & (np.arange(len(protocol.displacement_mm)) >= trained)
-    question = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
-    drawn = predict(stored.problem, some(stored.theta), stored.sample, question, rng)
+    request = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
+    drawn = predict(stored.problem, some(stored.theta), stored.sample, request, rng)
     wanted = protocol.mask & unused[:, None]
     if alone:
         wanted[:, 0] = False
@@ -101,8 +101,8 @@ def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng:
         N.
     """
     protocol, first = _last_alone(experiment, time_s)
-    question = PredictionRequest(protocol, 0, np.array([True]), first)
-    drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, question, rng)[0]
+    request = PredictionRequest(protocol, 0, np.array([True]), first)
+    drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, request, rng)[0]
     return drawn
 
 
@@ -141,7 +141,7 @@ def _first(measured: Array, given: bool) -> Array:
 
 
 def _last_alone(experiment: Experiment, time_s: Array) -> tuple[Protocol, Array]:
-    """The last hold as a test of its own, asked at other times, and its first reading."""
+    """The last hold as a test of its own, predicted at other times, and its first reading."""
     hold = experiment.recorded_holds[-1]
     whole = experiment.protocol()
     times = np.concatenate([[0.0], time_s[time_s > 0]])[None]

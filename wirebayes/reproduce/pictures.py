@@ -108,7 +108,7 @@ class Gallery:
             self.add(f"unused-{likelihood}", e.name, figure, alt, caption)
 
     def ridges(self, e: Experiment, published: Mapping[str, float], full: Mapping[str, Stored]) -> None:
-        """What hold by hold cannot tell apart: stiffness and amount, amount and rate.
+        """What hold by hold cannot distinguish: stiffness and amount, amount and rate.
 
         Parameters
         ----------

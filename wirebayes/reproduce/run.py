@@ -47,7 +47,7 @@ def reproduce(
     report : callable
         ``report(name, done, total)``, for a progress bar.
     policy : Policy
-        When a fit is believed.
+        When a fit counts as converged.
 
     Returns
     -------

@@ -123,19 +123,19 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
     gallery.add("robot", "budget", figure, alt, f"Of the drift after {_TIMES_S[-1]:g} s.")
 
 
-def draw(gallery: Gallery, told: Sequence[Row], limit_mm: float) -> None:
+def draw(gallery: Gallery, claims: Sequence[Row], limit_mm: float) -> None:
     """One picture a robot.
 
     Parameters
     ----------
     gallery : Gallery
-    told : sequence of rows
+    claims : sequence of rows
         Those of ``robot_claim.csv``.
     limit_mm : float
         The paper's claim, drawn as a line.
     """
     for name in ROBOTS:
-        mine = [row for row in told if row["robot"] == name]
+        mine = [row for row in claims if row["robot"] == name]
         best = max(row["probability"] for row in mine if not row["loaded_before_s"])
         alt = f"Drift of the platform of {name} within a minute, for each wire, new and after an hour under load."
         caption = f"Highest probability that the claim holds on new wires: {best:.2f}."

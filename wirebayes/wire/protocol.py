@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 class Protocol:
     """Holds of one test, in order, unrecorded ones included.
 
-    Ragged reading times are padded with zeros to ``R`` columns; `mask` tells real readings.
+    Ragged reading times are padded with zeros to ``R`` columns; `mask` marks real readings.
 
     Attributes
     ----------

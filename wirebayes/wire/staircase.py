@@ -30,7 +30,7 @@ class Model:
     law : {"hooke", "modified"}
         Eq (1) or eq (3).
     history : {"saturating", "additive"}
-        Whether eq (4) is the total creep a tension leads to, or is added anew in every hold.
+        Whether eq (4) is the total creep a tension leads to, or is added again in every hold.
     effects : tuple of Effect
     tension_ref_N : float
         Geometric mean of the training tensions.

@@ -41,7 +41,8 @@ def calibrate(
     ----------
     robot : Robot, name of a shipped robot, or path
     readings : path of a CSV, DataFrame, or mapping of name to (r,) array
-        A row a hold, in order: pose asked for, duration, joint values or motor angles, and tensions at its end or NaN.
+        A row per hold, in order: requested pose, duration, joint values or motor angles, and tensions at its
+        end or NaN.
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
     tension_sd : float
         Standard error of a tension, N.

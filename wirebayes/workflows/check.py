@@ -24,7 +24,7 @@ def check(
     output: PathLike | None = None,
     progress: Progress | None = None,
 ) -> Check:
-    """Say what was understood of an experiment, what is suspicious, and what such a test can and cannot tell.
+    """Say what was understood of an experiment, what is suspicious, and what such a test can and cannot determine.
 
     The plain model is fitted roughly, in a few seconds an experiment; `fit` and `discover` give the numbers to rely on.
 
@@ -79,10 +79,10 @@ def check(
             found = {}
             for done, e in enumerate(experiments):
                 report("check", done, len(experiments))
-                told = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
-                warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *told.warnings]
+                previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
+                warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *previewed.warnings]
                 found[e.name] = _understood(e) | {
-                    "warnings": warnings, "parameters": told.parameters, "effects": told.effects,
+                    "warnings": warnings, "parameters": previewed.parameters, "effects": previewed.effects,
                 }  # fmt: skip
                 understood(e, place.path / f"{e.name}.svg")
             report("check", len(experiments), len(experiments))

@@ -52,7 +52,7 @@ Aim = Literal["parameters", "creep"] | Sequence[str]
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """What is to be judged."""
 
     tests: list[tuple[Experiment, str]]
@@ -133,20 +133,22 @@ def plan(
         above_zero(("--budget-min", budget_min))
     kinds = catalogue(own)
     rng = np.random.default_rng(seed_of(seed, "guess"))
-    asked = _asked(source, experiment, tests, list(kinds), elastic_law, history, own, rng)
-    asked = replace(
-        asked,
-        aim=asked.aim if aim is None else _checked_aim(aim, list(kinds)),
-        budget_min=asked.budget_min if budget_min is None else float(budget_min),
-        robot=asked.robot if robot is None else robot,
+    request = _request(source, experiment, tests, list(kinds), elastic_law, history, own, rng)
+    request = replace(
+        request,
+        aim=request.aim if aim is None else _checked_aim(aim, list(kinds)),
+        budget_min=request.budget_min if budget_min is None else float(budget_min),
+        robot=request.robot if robot is None else robot,
     )
-    machine = None if asked.robot is None else robot_of(asked.robot)
-    told = None if asked.robot is None else asked.robot
+    machine = None if request.robot is None else robot_of(request.robot)
+    of_robot = None
+    if request.robot is not None:
+        of_robot = hash_of(asdict(request.robot)) if isinstance(request.robot, Robot) else content(Path(request.robot))
     configuration = {
         "command": "plan", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
-        "own_effects": source_of(own), "tests": tests, "aim": list(asked.aim), "budget_min": asked.budget_min,
-        "robot": None if told is None else hash_of(asdict(told)) if isinstance(told, Robot) else content(Path(told)),
-    } | asked.about  # fmt: skip
+        "own_effects": source_of(own), "tests": tests, "aim": list(request.aim), "budget_min": request.budget_min,
+        "robot": of_robot,
+    } | request.about  # fmt: skip
     place = Place.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":
@@ -155,28 +157,28 @@ def plan(
         judged: list[Judged] = []
         tension: float | None = None  # of the first test: all state their creep for it
         with without_script():
-            for done, (test, words) in enumerate(asked.tests):
-                report("protocols", done, len(asked.tests))
-                guess = asked.guess.at(test.length_mm)
+            for done, (test, words) in enumerate(request.tests):
+                report("protocols", done, len(request.tests))
+                guess = request.guess.at(test.length_mm)
                 test = at_centre(test, guess, elastic_law, history)
                 tension = typical_tension(test) if tension is None else tension
                 one = np.random.default_rng(seed_of(seed, "plan", test.name))
                 try:
                     expected = expected_widths(
                         test, guess, one, law=elastic_law, history=history, tension_N=tension,
-                        length_mm=asked.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
+                        length_mm=request.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
                     )  # fmt: skip
                 except ValueError as error:
                     raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
                 seen = sensitivity(test, guess, kinds, one, law=elastic_law, history=history, simulations=SIMULATIONS)
                 judged.append(Judged(test, words, expected, seen))
-        report("protocols", len(asked.tests), len(asked.tests))
-        order = ranked(judged, asked.aim, asked.budget_min)
-        rows = [_row(j, asked, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
+        report("protocols", len(request.tests), len(request.tests))
+        order = ranked(judged, request.aim, request.budget_min)
+        rows = [_row(j, request, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
         summary = {
-            "version": 1, "aim": list(asked.aim), "budget_min": asked.budget_min, "best": rows[0]["name"],
-            "guess": {"source": asked.guess.source, "length_mm": asked.guess.length_mm,
-                      "parameters": {n: _statistics(v) for n, v in asked.guess.draws.items()}},
+            "version": 1, "aim": list(request.aim), "budget_min": request.budget_min, "best": rows[0]["name"],
+            "guess": {"source": request.guess.source, "length_mm": request.guess.length_mm,
+                      "parameters": {n: _statistics(v) for n, v in request.guess.draws.items()}},
             "robot": None if machine is None else machine.name, "protocols": rows,
         }  # fmt: skip
         write_json(opened.directory / "plan.json", summary)
@@ -187,10 +189,10 @@ def plan(
     return Plan(place, own)
 
 
-def _asked(
+def _request(
     source: PathLike | Experiment, name: str | None, n: int, effects: list[str], law: ElasticLaw, history: History,
     own: Path | None, rng: np.random.Generator,
-) -> _Asked:  # fmt: skip
+) -> _Request:  # fmt: skip
     """Tests and guess of whatever was given."""
     if not isinstance(source, str | os.PathLike | Experiment):
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
@@ -206,10 +208,10 @@ def _asked(
     build([measured], law=law, history=history)  # checks priors
     guess = from_readings(measured, n, rng, law, history)
     about = {"data_sha256": measured.data_hash, "priors": measured.priors}
-    return _Asked(_like(measured), guess, ("parameters",), None, None, about)
+    return _Request(_like(measured), guess, ("parameters",), None, None, about)
 
 
-def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np.random.Generator) -> _Asked:
+def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np.random.Generator) -> _Request:
     tests = [(_experiment(test, file), "") for test in file.tests]
     for test, _ in tests:
         build([test])  # checks priors
@@ -222,10 +224,10 @@ def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np
         "guess": file.guess, "priors": file.priors, "material": file.material,
         "protocols": [vars(test) for test in file.tests],
     }  # fmt: skip
-    return _Asked(tests, guess, file.aim, file.budget_min, file.robot, about)
+    return _Request(tests, guess, file.aim, file.budget_min, file.robot, about)
 
 
-def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> _Asked:
+def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> _Request:
     """The folder of a fit or discover: the same test again, and others like it."""
     guess, about, sample = _posterior(folder, name, n, own)
     aim: tuple[str, ...] = ("parameters",)
@@ -235,7 +237,7 @@ def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: 
         rivals = [e for e in (*found.get("set", ()), *found.get("group", ())) if e in effects]
         rivals = list(dict.fromkeys(rivals))
         aim = tuple(rivals[:2]) if len(rivals) > 1 else aim
-    return _Asked(_like(_measured(sample, folder)), guess, aim, None, None, about)
+    return _Request(_like(_measured(sample, folder)), guess, aim, None, None, about)
 
 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
@@ -292,7 +294,7 @@ def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
 
 
 def _row(
-    judged: Judged, asked: _Asked, rank: int, machine: Robot | None, law: ElasticLaw, history: History
+    judged: Judged, request: _Request, rank: int, machine: Robot | None, law: ElasticLaw, history: History
 ) -> dict[str, Any]:
     """A protocol as it stands in ``plan.json``."""
     test, expected, seen = judged.test, judged.expected, judged.sensitivity
@@ -302,14 +304,14 @@ def _row(
     return {
         "rank": rank, "name": test.name, "words": judged.words, "length_mm": test.length_mm, "holds": len(recorded),
         "readings": sum(hold.time_s.size for hold in recorded), "duration_min": judged.duration_min,
-        "within_budget": not too_long(judged, asked.budget_min), "score": judged.score(asked.aim),
+        "within_budget": not too_long(judged, request.budget_min), "score": judged.score(request.aim),
         "information_bits": expected.information_bits, "simulated_tests": expected.tests,
         "parameters": {n: q for n, q in quantities.items() if n in (*MATERIAL, *SAMPLE)},
         "creep": {n: getattr(expected, n) for n in ("tension_N", "length_mm", "longest_hold_s")}
                  | {n: q for n, q in quantities.items() if n not in (*MATERIAL, *SAMPLE)},
         "effects": {name: vars(effect) for name, effect in seen.effects.items()},
         "cosines": cosines, "not_identifiable": list(seen.hidden),
-        "robot": None if machine is None else _drift(judged, asked.guess, machine, law, history),
+        "robot": None if machine is None else _drift(judged, request.guess, machine, law, history),
     }  # fmt: skip
 
 

@@ -65,8 +65,8 @@ def pose(
 ) -> Pose:
     """Kinematics of a robot on creeping wires; drift and pose error with uncertainty bands.
 
-    Of one pose; of measured joint values over time (`joints`), which tell where the platform was; or of commanded poses
-    and loads over time (`trajectory`). Over time it also writes ``poses.csv`` and ``corrections.csv``.
+    Of one pose; of measured joint values over time (`joints`), for where the platform was; or of commanded poses and
+    loads over time (`trajectory`). Over time it also writes ``poses.csv`` and ``corrections.csv``.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def pose(
                             Place.at(output), own, progress)  # fmt: skip
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_of(other_fit, draws, experiment, own)
-    asked = PoseRequest(
+    request = PoseRequest(
         where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed, slices
     )
     limits = (tolerance, tolerance_tilt, specimen_spread)
@@ -172,13 +172,13 @@ def pose(
     with open_run(place.path, decides) as run:
         if run.state == "done":
             return Pose(place, own, computed=False)
-        found = answer(machine, line, asked, other)
+        found = answer(machine, line, request, other)
         write_json(run.directory / "pose.json", found.content)
         if found.maps:
             write_csv(run.directory / "workspace.csv", TABLE, rows(found.maps))
         from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
 
-        pictures.save_pose(run.directory, machine, asked, found)
+        pictures.save_pose(run.directory, machine, request, found)
         run.finish()
     return Pose(place, own)
 
@@ -196,7 +196,7 @@ def _refuse_beside_history(options: str, given: bool) -> None:
 
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
-    """The slices asked for; refused where the robot has only one height or one orientation."""
+    """The requested slices; refused where the robot has only one height or one orientation."""
     if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
         raise InputError("--map-heights: found heights for a workspace in a vertical plane; expected none")
     if rotations is not None and robot.degrees == 3:

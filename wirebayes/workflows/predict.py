@@ -9,7 +9,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.arrays import is_table, protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
-from wirebayes.prediction.request import asked_of
+from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import HEADER, dataset, mixture_table
 from wirebayes.results import store
 from wirebayes.results.mixture import members_of
@@ -85,16 +85,18 @@ def predict(
         cells = protocol_table(Path(protocol))
     else:
         raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
-    asked = [(probability, asked_of(cells, stored, fresh=fresh)) for probability, stored in members]
+    requests = [(probability, request_of(cells, stored, fresh=fresh)) for probability, stored in members]
     seed = check_seed(seed)
     if output is not None:
         check_file(Path(output))
-    rows = mixture_table(asked, seed)
+    rows = mixture_table(requests, seed)
     if output is not None:
         write_csv(Path(output), HEADER, rows)
-    sentence = asked[0][1].sentence
-    if len(asked) > 1:
-        sentence += f"; averaged over the {len(asked)} models that the readings leave undecided, by their probability"
+    sentence = requests[0][1].sentence
+    if len(requests) > 1:
+        sentence += (
+            f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
+        )
     return dataset(rows, {"prediction": sentence, "seed": seed})
 
 

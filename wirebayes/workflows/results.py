@@ -679,7 +679,7 @@ class ImportedTests(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(Result):
-    """What was understood of experiments, what is suspicious, and what such tests can tell.
+    """What was understood of experiments, what is suspicious, and what such tests can determine.
 
     Examples
     --------

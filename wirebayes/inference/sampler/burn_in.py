@@ -68,7 +68,7 @@ def init(
     if seen is not None:
         state = _fitted(target, state, policy, *seen, proposal.ROUGH_SHARES)
         if state.learned.proposal is not known:
-            state = replace(state.knowing(acceptance=1.0), seen=None)  # to be believed until draws tell better
+            state = replace(state.knowing(acceptance=1.0), seen=None)  # assumed good until draws show otherwise
     return state
 
 
@@ -264,7 +264,7 @@ _HOT = 0.4  # power of the density that the wide part of the proposal is fitted 
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
 _GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, independent draws are some 7 steps apart
 _PASSING = 5000  # points for a proposal that only the next round draws from
-_IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are as many draws as asked for; the fewest before
+_IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are the full number of draws; the fewest before
 _TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where the last proposal overlooked places
 # steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
 _LONGEST_SETTLING = 8

@@ -18,7 +18,7 @@ from wirebayes.io.run_folder import differences, plain, stored_results, write_by
 
 FORMAT = 2  # raise it whenever what is stored changes its meaning
 _VALUES = "state.json"
-INSTEAD = "remove this file to start the fit anew"
+INSTEAD = "remove this file to restart the fit"
 
 
 def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
@@ -28,7 +28,7 @@ def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays:
     ----------
     path : Path
     fit : mapping
-        What tells this fit from others.
+        What distinguishes this fit from others.
     values : mapping
         Of JSON's own types.
     arrays : mapping

@@ -149,7 +149,7 @@ def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
         mass = heavy.sum(axis=1)
         centres = (heavy @ x) / mass[:, None]
         scale = (heavy @ squares).reshape(k, d, d) - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
-        # a walker that stayed repeats its point: without some of the whole heap, a component shrinks onto that
+        # a walker that stayed repeats its point: without a share of all points, a component shrinks onto that
         scale += _OF_THE_WHOLE * np.eye(d)
         factors = np.linalg.cholesky(scale / (share.sum(axis=1) + _OF_THE_WHOLE)[:, None, None])
         mixture = Mixture(share.sum(axis=1) / n, centres, factors, degrees)

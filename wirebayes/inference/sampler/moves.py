@@ -36,7 +36,7 @@ class PoolMove(Move):  # type: ignore[misc]
     proposal : Mixture or Proposal
     between : emcee Move
     steps : int
-        As many as will be asked for; they are cut into pools of the same size.
+        As many as will be needed; they are cut into pools of the same size.
     most : int
         The most steps of a pool, the one of the other move included.
 

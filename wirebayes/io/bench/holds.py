@@ -161,7 +161,7 @@ def _in_groups(readings: Readings, groups: list[NDArray[np.int64]], time_since: 
         levels = [_level(x[rows]) for rows in groups]
     number = [int(readings.hold[rows[0]]) if readings.hold is not None else i + 1 for i, rows in enumerate(groups)]
     if readings.hold is None:
-        notes.append(f"{len(groups)} holds: a new one wherever the displacement changes or the time starts anew")
+        notes.append(f"{len(groups)} holds: a new one wherever the displacement changes or the time starts again")
     return Cut(groups, number, levels, times, of_test, notes)
 
 

@@ -68,7 +68,7 @@ class Unit:
 def unit_of(text: str, role: Role) -> Unit | None:
     """A unit of a quantity, or None where the text is none.
 
-    A minus before it turns the sign. Where a force is asked for, a mass stands for its weight (kg, g, lb).
+    A minus before it changes the sign. Where a force is needed, a mass stands for its weight (kg, g, lb).
     """
     text = text.strip()
     if role == "hold":

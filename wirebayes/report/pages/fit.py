@@ -236,9 +236,9 @@ def _residuals(stored: Stored) -> Any:
     protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
     alone = stored.likelihood == "hold"
     first = readings[:, 0] if alone else np.full(len(readings), np.nan)
-    question = PredictionRequest(protocol, 0 if alone else len(readings), protocol.recorded, first)
+    request = PredictionRequest(protocol, 0 if alone else len(readings), protocol.recorded, first)
     rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), _DRAWS)).astype(int)
-    replicates = predict(stored.problem, stored.theta[rows], stored.sample, question, np.random.default_rng(0))
+    replicates = predict(stored.problem, stored.theta[rows], stored.sample, request, np.random.default_rng(0))
     wanted = protocol.mask.copy()
     if alone:
         wanted[:, 0] = False

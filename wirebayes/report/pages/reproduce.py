@@ -111,7 +111,7 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
 
 def _table_4_otherwise(tables: Tables, gallery: Gallery) -> Section:
     readings = (
-        ("chain", "additive", "hooke", "One history, creep added anew in every hold, law (1)."),
+        ("chain", "additive", "hooke", "One history, creep added again in every hold, law (1)."),
         ("hold", "", "modified", "Hold by hold, modified law (3)."),
         ("chain", "saturating", "modified", "One history, saturating, modified law (3)."),
         ("chain", "additive", "modified", "One history, additive, modified law (3)."),

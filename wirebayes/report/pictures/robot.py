@@ -24,20 +24,20 @@ Floats = NDArray[np.float64]
 CONTROLLERS = {
     "hooke_only": "ignores creep",
     "creep_aware": "compensates for creep",
-    "creep_aware_told_otherwise": "compensates for creep by the other fit",
+    "creep_aware_other_fit": "compensates for creep by the other fit",
     "held_still": "does not move",
 }
 _COLOURS = (HOLD, CHAIN, "#5d8c4a")
 
 
-def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> None:
+def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
     """Write the pictures that go with ``pose.json``; none when the pose cannot be held.
 
     Parameters
     ----------
     folder : Path
     robot : Robot
-    asked : PoseRequest
+    request : PoseRequest
         The pose, its load and the times.
     found : Answer
         What was computed for it.
@@ -45,7 +45,7 @@ def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> 
     if not found.courses or not found.courses[0.0].found.any():
         return
     content, pictures = found.content, {}
-    pictures["robot"] = scene(robot, asked.position_m, asked.rotation, found.courses[0.0])
+    pictures["robot"] = scene(robot, request.position_m, request.rotation, found.courses[0.0])
     pictures["drift"] = in_time(content["drift"], "distance_mm", "distance from the pose, mm", "Drift")
     if robot.degrees == 6:
         turned = "rotation, degrees", "Drift of the orientation"
@@ -59,7 +59,7 @@ def save_pose(folder: Path, robot: Robot, asked: PoseRequest, found: Answer) -> 
         pictures |= {f"{key}-{name}": figure for name, figure in mapped.items()}
     for name, figure in pictures.items():
         save(figure, folder / f"{name}.svg")
-    write_json(folder / "scene.json", scene_points(robot, asked.position_m, asked.rotation, found.courses[0.0]))
+    write_json(folder / "scene.json", scene_points(robot, request.position_m, request.rotation, found.courses[0.0]))
 
 
 def scene(
@@ -76,9 +76,9 @@ def scene(
     exaggeration : float, optional
         Default: a round factor that makes the drift a twentieth of the robot.
     """
-    told = scene_points(robot, position_m, rotation, course, exaggeration)
-    exaggeration, here = told["exaggeration"], told["platform"]
-    there = here + exaggeration * (told["drifted"][-1] - here)
+    view = scene_points(robot, position_m, rotation, course, exaggeration)
+    exaggeration, here = view["exaggeration"], view["platform"]
+    there = here + exaggeration * (view["drifted"][-1] - here)
     size = np.ptp(robot.exit_m, axis=0).max()
     figure = Figure(figsize=(6.0, 5.2))
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")

@@ -1,6 +1,6 @@
 """A fitted wire for people who run such robots: firmware settings with intervals, and a table of creep.
 
-Hangprinter firmware thinks of a line as a spring of ``constant / length`` with the length in mm, so its constant is k1
+Hangprinter firmware models a line as a spring of ``constant / length`` with the length in mm, so its constant is k1
 in newtons. It knows no creep: the table beside it says how much each line will have grown. Where the line's stiffness
 changes with its tension, firmware and simulator get the tangent at the tensions the robot works at.
 """
@@ -29,7 +29,7 @@ TABLE = ("tension_N", "time_s", "mean_mm_per_m", "sd_mm_per_m", "q05_mm_per_m", 
 
 
 def is_hangprinter(robot: Robot) -> bool:
-    """Whether Hangprinter firmware can be told of it: four or five drums, orientation held by parallel lines."""
+    """Whether Hangprinter firmware can describe it: four or five drums, orientation held by parallel lines."""
     return robot.freedom == "position" and not robot.is_linear.any() and 4 <= robot.legs <= 5
 
 
@@ -200,19 +200,19 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
     """
     wires = for_robot(robot, line.centre())
     x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
-    told = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
-    if not told.feasible.all():
+    commands = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
+    if not commands.feasible.all():
         return None
-    zero, tau = told.zero_m.T, told.tension_N.T
+    zero, tau = commands.zero_m.T, commands.tension_N.T
     k1 = np.broadcast_to(wires.theta["k1"], zero.shape)
     if wires.law == "hooke" and not wires.at("strain"):
-        return mjcf(robot, k1[:, 0], zero[:, 0], told.offset_m[0])
+        return mjcf(robot, k1[:, 0], zero[:, 0], commands.offset_m[0])
     stretched = stretched_length(wires, zero, tau)
     slope = tension(wires, stretched, zero)[1]
     rest = stretched - tau / slope
     pulls = ", ".join(f"{value:.4g}" for value in tau[:, 0])
     remark = f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
-    return mjcf(robot, (slope * rest)[:, 0], rest[:, 0], told.offset_m[0], remark=remark)
+    return mjcf(robot, (slope * rest)[:, 0], rest[:, 0], commands.offset_m[0], remark=remark)
 
 
 def _sample(robot: Robot, wires: Wires) -> FreshSample:

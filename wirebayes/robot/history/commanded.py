@@ -47,7 +47,7 @@ def drift(
     Estimate
         At the rows of the history.
     joint_m : (n, t, w) array
-        What each draw's actuators were told.
+        The commands of each draw's actuators.
 
     Raises
     ------

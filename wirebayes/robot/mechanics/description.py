@@ -110,7 +110,7 @@ class Robot:
     given : dict of str to GivenWire
     rule : TensionRule
     home_m, home_rotation_rad : (3,) arrays
-        The pose shown when none is asked for.
+        The pose shown when none is requested.
     lower_m, upper_m : (3,) arrays
         Box in which workspace figures are computed.
     pulleys : Pulleys or None

@@ -29,7 +29,7 @@ class WireDraws:
     ----------
     parameters : mapping of name to (n,) array
         ``k1`` (N), ``B`` (mm N^-U), ``U``, ``k2`` (s^-N), ``N`` and ``effect_name.parameter``; ``length_exponent``
-        where samples of two lengths told it.
+        where samples of two lengths determined it.
     length_mm : float
         Zero-tension length of the tested sample; `B` refers to it.
     law : {"hooke", "modified"}
@@ -64,7 +64,7 @@ class WireDraws:
         return replace(self, parameters={k: v[index] for k, v in self.parameters.items()})
 
     def centre(self) -> "WireDraws":
-        """One wire with the posterior mean of every parameter: what a controller would be told."""
+        """One wire with the posterior mean of every parameter: what a controller would use."""
         return replace(self, parameters={k: np.array([v.mean()]) for k, v in self.parameters.items()})
 
 

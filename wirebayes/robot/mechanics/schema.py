@@ -81,7 +81,7 @@ def _text(name: str) -> tuple[str, str]:
 
 
 class _Table:
-    """One table of the file; remembers which keys were asked for, so that the others can be refused."""
+    """One table of the file; remembers which keys were read, so that the others can be refused."""
 
     def __init__(self, content: Any, where: str, path: str) -> None:
         self.where, self.path = where, path

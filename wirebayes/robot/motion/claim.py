@@ -23,9 +23,9 @@ class WorkspaceDrift:
     Attributes
     ----------
     position_m : (p, 3) array
-        Positions asked for; those that no tensions hold are left out.
+        Requested positions; those that no tensions hold are left out.
     distance_m, tilt_rad : (p, n) arrays
-        Displacement of the reference point; angle between the normal and the one asked for.
+        Displacement of the reference point; angle between the normal and the requested one.
     tension_N : (p, w) array
         When the hold begins.
     feasible : float
@@ -56,7 +56,7 @@ class WorkspaceDrift:
         return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
 
     def part(self, rows: NDArray[np.bool_], feasible: float) -> "WorkspaceDrift":
-        """Some of the positions ``(p,)``, and the share of those asked for there that tensions hold."""
+        """Some of the positions ``(p,)``, and the share of the requested ones that tensions hold."""
         found = float(np.isfinite(self.distance_m[rows]).all(1).mean()) if rows.any() else 0.0
         return WorkspaceDrift(
             self.position_m[rows], self.distance_m[rows], self.tilt_rad[rows], self.tension_N[rows], feasible, found
@@ -118,9 +118,11 @@ def over_workspace(
     state = fresh(robot.legs, n * p)
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
-    told = inverse.commands(robot, many, where, R, pull, state.strain(many))
-    held = drift.stably(robot, many, told, where, R)
-    course = drift.hold(robot, many, np.where(held[:, None], told.joint_m, np.nan), np.array([time_s]), where, R, state)
+    commands = inverse.commands(robot, many, where, R, pull, state.strain(many))
+    held = drift.stably(robot, many, commands, where, R)
+    course = drift.hold(
+        robot, many, np.where(held[:, None], commands.joint_m, np.nan), np.array([time_s]), where, R, state
+    )
     shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
     tilt = turning.tilt(course.rotation[:, 0], rotation)
     return WorkspaceDrift(

@@ -1,4 +1,4 @@
-"""Acting on creep: commands that foresee it, the error that is left, and how long a calibration lasts."""
+"""Control under creep: commands that compensate for it, the remaining error, and how long a calibration lasts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,18 +17,18 @@ Schedule = Callable[[float], Floats]
 
 
 def known(wires: Wires) -> Wires:
-    """One wire without creep, the mean of every other parameter: what statics is told of uncertain wires."""
+    """One wire without creep, the mean of every other parameter: what statics uses for uncertain wires."""
     plain = without_creep(wires)
     return replace(plain, theta={k: v.mean(axis=-1, keepdims=True) for k, v in plain.theta.items()})
 
 
-def hooke_only(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
+def hooke_only(robot: Robot, model: Wires, position_m: Floats, rotation: Floats) -> Schedule:
     """Commands of a controller that knows the mean stiffness and nothing of creep.
 
     Parameters
     ----------
     robot : Robot
-    told : Wires
+    model : Wires
         Draws of the wires that the controller knows; it uses their mean stiffness.
     position_m : (3,) array
     rotation : (3, 3) array
@@ -40,19 +40,19 @@ def hooke_only(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) 
         Of a time, s, to the joint values (1, w): here the same at all times.
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    joint = inverse.commands(robot, known(told), position_m[None], rotation[None], tau).joint_m
+    joint = inverse.commands(robot, known(model), position_m[None], rotation[None], tau).joint_m
     return lambda time_s: joint
 
 
-def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats) -> Schedule:
-    """Commands that take off, at every time, the creep expected under the tensions wanted there.
+def creep_aware(robot: Robot, model: Wires, position_m: Floats, rotation: Floats) -> Schedule:
+    """Commands that compensate, at every time, for the creep expected under the tensions required there.
 
-    The expectation is over the draws of `told`: parameters of creep are too entangled for their means to mean a wire.
+    The expectation is over the draws of `model`: parameters of creep are too entangled for their means to mean a wire.
 
     Parameters
     ----------
     robot : Robot
-    told : Wires
+    model : Wires
         Draws of the wires that the controller knows.
     position_m : (3,) array
     rotation : (3, 3) array
@@ -64,12 +64,12 @@ def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats)
         Of a time, s, to the joint values (1, w).
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    draws = max(v.shape[-1] for v in told.theta.values())
-    ahead = HoldCreep(told, fresh(robot.legs, draws), np.repeat(tau.T, draws, 1), "start")
-    plain = known(told)
+    draws = max(v.shape[-1] for v in model.theta.values())
+    ahead = HoldCreep(model, fresh(robot.legs, draws), np.repeat(tau.T, draws, 1), "start")
+    plain = known(model)
 
     def joint(time_s: float) -> Floats:
-        strain = ahead.advance(time_s, tau.T).strain(told).mean(1, keepdims=True)
+        strain = ahead.advance(time_s, tau.T).strain(model).mean(1, keepdims=True)
         return inverse.commands(robot, plain, position_m[None], rotation[None], tau, strain).joint_m
 
     return joint
@@ -77,7 +77,7 @@ def creep_aware(robot: Robot, told: Wires, position_m: Floats, rotation: Floats)
 
 @dataclass(frozen=True)
 class PoseError:
-    """How far the platform is from where it was told to be.
+    """How far the platform is from its commanded pose.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ def error(
     schedule : function
         From `hooke_only` or `creep_aware`.
     position_m, rotation : (3,), (3, 3) arrays
-        The pose asked for.
+        The requested pose.
     times_s : (t,) array
     """
     course = drift.hold(robot, wires, schedule, times_s, position_m, rotation)
@@ -150,7 +150,7 @@ def longest_interval(
 def after_calibration(
     robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats, times_s: Floats
 ) -> tuple[PoseError, PoseError]:
-    """Error that grows from a perfect calibration on, after a load history: held still, and with creep foreseen.
+    """Error that grows from a perfect calibration on, after a load history: held still, and with the creep compensated.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def after_calibration(
     Returns
     -------
     still, foreseen : PoseError
-        `foreseen`: the controller takes off the creep expected over the draws, given the same history.
+        `foreseen`: the controller compensates for the mean creep of the draws, given the same history.
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
     draws = max(v.shape[-1] for v in wires.theta.values())

@@ -112,7 +112,7 @@ class HoldCreep:
 
     @property
     def _open_ended(self) -> bool:
-        """Whether a law of time without a plateau reigns: what each step adds is that step's share of the amount."""
+        """Whether a time law without a plateau applies: what each step adds is that step's share of the amount."""
         return "fraction" in self.law.effects.at
 
     def progress(self, time_s: float) -> Floats:
@@ -132,7 +132,7 @@ class HoldCreep:
         self.hold.time_s, self.hold.duration_s = np.full((1, 1), time_s), time_s
 
     def advance(self, time_s: float, tension_N: Floats) -> CreepState:
-        """Creep to a later time of the hold; `tension_N` reigns where the last step ended, and is followed onward."""
+        """Creep to a later time of the hold; `tension_N` ended the last step and is followed onward."""
         hold, law = self.hold, self.law
         self.time_s = time_s
         self._look(time_s)

@@ -207,7 +207,7 @@ class Walk:
             refused = error > self.tolerance and length > 1e-9 * end
             if refused or not whole or factor < 1:
                 self.step = factor * length
-            else:  # cut short by the time that was asked for: no reason to go on so cautiously
+            else:  # cut short by the requested time: no reason to go on so cautiously
                 self.step = max(self.step, factor * length)
 
     def load(self, robot: Robot) -> None:
@@ -327,16 +327,16 @@ def from_command(
         NaN poses when no tensions hold the pose, or not stably (status `forward.NOT_HELD`).
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    told = inverse.commands(robot, wires, position_m[None], rotation[None], tau)
-    stable = stably(robot, wires, told, position_m, rotation)
-    joint = np.where(stable[:, None], told.joint_m, np.nan)
+    commands = inverse.commands(robot, wires, position_m[None], rotation[None], tau)
+    stable = stably(robot, wires, commands, position_m, rotation)
+    joint = np.where(stable[:, None], commands.joint_m, np.nan)
     course = hold(robot, wires, joint, times_s, position_m, rotation, follow=follow)
-    course.status[told.feasible & ~stable] = forward.NOT_HELD
+    course.status[commands.feasible & ~stable] = forward.NOT_HELD
     return course
 
 
 def stably(
-    robot: Robot, wires: Wires, told: inverse.Commands, position_m: Floats, rotation: Floats
+    robot: Robot, wires: Wires, commands: inverse.Commands, position_m: Floats, rotation: Floats
 ) -> NDArray[np.bool_]:
     """Whether commands hold their own poses stably: not every balance is stable.
 
@@ -344,7 +344,7 @@ def stably(
     ----------
     robot : Robot
     wires : Wires
-    told : Commands
+    commands : Commands
         What `inverse.commands` returned for the poses.
     position_m : (3,) or (n, 3) array
     rotation : (3, 3) or (n, 3, 3) array
@@ -353,10 +353,10 @@ def stably(
     -------
     (n,) bool array
     """
-    n = len(told.zero_m)
+    n = len(commands.zero_m)
     pose = np.broadcast_to(position_m, (n, 3)), np.broadcast_to(rotation, (n, 3, 3))
-    zero = np.where(told.feasible[:, None], told.zero_m, 1.0)
-    return told.feasible & (path.lowest_stiffness(robot, wires, pose, (zero, told.offset_m)) > 0)
+    zero = np.where(commands.feasible[:, None], commands.zero_m, 1.0)
+    return commands.feasible & (path.lowest_stiffness(robot, wires, pose, (zero, commands.offset_m)) > 0)
 
 
 def moved(course: Course, origin_m: Floats, origin_rotation: Floats) -> tuple[Floats, Floats]:

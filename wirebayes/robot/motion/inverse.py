@@ -15,14 +15,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Commands:
-    """What the actuators are told.
+    """The commands of the actuators.
 
     Attributes
     ----------
     zero_m : (n, w) array
         Zero-tension length between exit (and beyond) and platform, creep included.
     joint_m : (n, w) array
-        Drum: the zero-tension length paid out, creep taken off. Linear actuator: its displacement q.
+        Drum: the zero-tension length paid out, creep subtracted. Linear actuator: its displacement q.
     offset_m : (n, w) array
         Stretched length that is not between exit and platform point.
     tension_N : (n, w) array

@@ -1,7 +1,7 @@
-"""Following an equilibrium while lengths change: where a stable pose goes, and where it stops to exist.
+"""Following an equilibrium while lengths change: where a stable pose goes, and where it ceases to exist.
 
 A solver finds some equilibrium of the new lengths; the platform stays on the one that continues its own. A step is
-believed when it ends where the stiffness at its start says it will; otherwise it is divided until it does, or until a
+accepted when it ends where the stiffness at its start predicts; otherwise it is divided until it does, or until a
 jump is left that no division removes: there the platform falls.
 """
 

@@ -40,24 +40,24 @@ class Answer:
     maps: tuple[Map, ...] = ()
 
 
-def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws | None = None) -> Answer:
+def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws | None = None) -> Answer:
     """Inverse and forward kinematics, drift, pose error and where it comes from.
 
     Parameters
     ----------
     robot : Robot
     line : WireDraws
-    asked : PoseRequest
+    request : PoseRequest
     other : WireDraws, optional
-        Another fit of the same line, told to one more controller.
+        Another fit of the same line, used by one more controller.
 
     Returns
     -------
     Answer
     """
-    rng = np.random.default_rng(asked.seed)
+    rng = np.random.default_rng(request.seed)
     shared = draws.for_robot(robot, line)
-    x, R = asked.position_m, asked.rotation
+    x, R = request.position_m, request.rotation
     tau = inverse.tensions(robot, x[None], R[None])
     content: dict[str, Any] = {
         "version": 1,
@@ -83,46 +83,46 @@ def answer(robot: Robot, line: WireDraws, asked: PoseRequest, other: WireDraws |
         if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
             said = "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
         return Answer(content | {"sentence": said}, {})
-    told = inverse.commands(robot, shared, x[None], R[None], tau)
-    content["feasible_draws"] = float(told.feasible.mean())
-    if not told.feasible.any():
+    commands = inverse.commands(robot, shared, x[None], R[None], tau)
+    content["feasible_draws"] = float(commands.feasible.mean())
+    if not commands.feasible.any():
         content["feasible"] = False
-        said = "These wires cannot pull as hard as the pose asks, however far stretched."
+        said = "These wires cannot pull as hard as the pose requires, however far stretched."
         return Answer(content | {"sentence": said}, {})
     content["inverse"] = {
         "tension_N": tau[0],
-        "zero_tension_length_m": band(told.zero_m),
-        "joint_value_m": band(told.joint_m),
+        "zero_tension_length_m": band(commands.zero_m),
+        "joint_value_m": band(commands.joint_m),
     }
     if robot.drums is not None:
-        content["inverse"] |= _motors(robot.drums, told.joint_m)
-    content["forward"] = _round_trip(robot, shared, told, x, R)
+        content["inverse"] |= _motors(robot.drums, commands.joint_m)
+    content["forward"] = _round_trip(robot, shared, commands, x, R)
     content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
     stable = content["equilibria"]["commanded_stable"]
     content["certificate"] = proofs.alone(robot, shared, x, R)
     courses = {}
     content["drift"], losses = [], []
-    for spread in asked.spreads:
+    for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
-        courses[spread] = drift.from_command(robot, wires, x, R, asked.times_s)
+        courses[spread] = drift.from_command(robot, wires, x, R, request.times_s)
         content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))
         losses += stability.warnings(courses[spread], spread, stable)
     content["stability"] = [{"specimen_spread": s} | stability.summary(c) for s, c in courses.items()]
     content["certificate"] |= proofs.enclosed(robot, shared, courses[0.0], x, R)
-    content["claim"] = _claim(courses, x, R, asked)
-    content["pose_error"] = controllers.errors(robot, line, asked, rng, other)
-    content["between_calibrations"] = controllers.between_calibrations(robot, line, asked, rng)
+    content["claim"] = _claim(courses, x, R, request)
+    content["pose_error"] = controllers.errors(robot, line, request, rng, other)
+    content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(line, courses, x, R)
     if content["feasible_draws"] < 1:
         weak = 100 * (1 - content["feasible_draws"])
-        losses.insert(0, f"{weak:.2g} % of the draws cannot pull as hard as the pose asks, however far stretched")
-    content["warnings"] = losses + draws.warnings(line, tau, float(asked.times_s[-1]), told.zero_m)
+        losses.insert(0, f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched")
+    content["warnings"] = losses + draws.warnings(line, tau, float(request.times_s[-1]), commands.zero_m)
     if robot.drums is not None:
         content["warnings"] += [
             f"wire {i + 1} is longer here than its drum's wire_length_m, {robot.drums.wire_m[i]:g} m"
-            for i in drums.emptied(robot.drums, told.joint_m[told.feasible])
+            for i in drums.emptied(robot.drums, commands.joint_m[commands.feasible])
         ]
-    spaces = map_slices(robot, line, asked.slices)
+    spaces = map_slices(robot, line, request.slices)
     content["workspace"] = None
     held = [one for one in spaces if len(one.drift.position_m)]
     if held:  # the first orientation as a whole, then every slice of each
@@ -142,17 +142,17 @@ def _by_leg(values: Floats) -> dict[str, Any]:
     return {key: [None if b[key] is None else b[key][0] for b in bands] for key in bands[0]}
 
 
-def _round_trip(robot: Robot, wires: Wires, told: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:
+def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:
     """Forward kinematics of the commands, from a start beside the pose, must return to it."""
-    back = forward.solve(robot, wires, told.zero_m, told.offset_m, x + 0.01 * robot.size_m, R)
-    n = len(told.zero_m)
+    back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, x + 0.01 * robot.size_m, R)
+    n = len(commands.zero_m)
     pose = np.repeat(x[None], n, 0), np.repeat(R[None], n, 0)
-    stiff = path.lowest_stiffness(robot, wires, pose, (told.zero_m, told.offset_m))[told.feasible]
+    stiff = path.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
     return {
         "solved": float(back.found.mean()),
         "statuses": {text: int((back.status == code).sum()) for code, text in forward.STATUS.items()},
         "largest_round_trip_error_m": float(np.abs(back.position_m - x)[back.found].max(initial=0.0)),
-        "slack_wires": int((told.tension_N[0] <= 0).sum()),
+        "slack_wires": int((commands.tension_N[0] <= 0).sum()),
         "lowest_stiffness_N_m": band(stiff),
     }
 
@@ -161,11 +161,11 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     """The commanded pose, and every stable pose that the same lengths of the mean wire allow, from many starts."""
     mean = control.known(wires)
     tau = inverse.tensions(robot, x[None], R[None])
-    told = inverse.commands(robot, mean, x[None], R[None], tau)
-    lengths = told.zero_m[0], told.offset_m[0]
-    if not told.feasible[0]:  # some draws are strong enough, their mean is not
+    commands = inverse.commands(robot, mean, x[None], R[None], tau)
+    lengths = commands.zero_m[0], commands.offset_m[0]
+    if not commands.feasible[0]:  # some draws are strong enough, their mean is not
         return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
-    here = forward.solve(robot, mean, told.zero_m, told.offset_m, x, R)
+    here = forward.solve(robot, mean, commands.zero_m, commands.offset_m, x, R)
     near_m = 1e-6 * robot.span_m
     stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
     found = forward.equilibria(robot, mean, *lengths, rng, known=(x, R))
@@ -203,7 +203,7 @@ def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
     }
 
 
-def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, asked: PoseRequest) -> dict[str, Any]:
+def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, request: PoseRequest) -> dict[str, Any]:
     """Probability, at this pose, of the paper's figures."""
     out: dict[str, Any] = {"time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD))}
     probability = []

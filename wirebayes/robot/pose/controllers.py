@@ -1,4 +1,4 @@
-"""Pose error under controllers told different things of the wires, and how long a calibration lasts, as numbers."""
+"""Pose error under controllers with different models of the wires, and how long a calibration lasts."""
 
 from typing import Any
 
@@ -20,33 +20,33 @@ _DRAWS = 300  # each drifts through all of these times; a 95 % probability is th
 
 
 def errors(
-    robot: Robot, line: WireDraws, asked: PoseRequest, rng: np.random.Generator, other: WireDraws | None = None
+    robot: Robot, line: WireDraws, request: PoseRequest, rng: np.random.Generator, other: WireDraws | None = None
 ) -> list[dict[str, Any]]:
-    """Pose error under controllers told the posterior, and how long each stays within tolerance.
+    """Pose error under controllers that know the posterior, and how long each stays within tolerance.
 
     Parameters
     ----------
     robot : Robot
     line : WireDraws
         What the wires may really be.
-    asked : PoseRequest
+    request : PoseRequest
     rng : numpy Generator
     other : WireDraws, optional
-        Another fit of the same line (the plain model beside one with effects), told to a third controller.
+        Another fit of the same line (the plain model beside one with effects), used by a third controller.
     """
-    told = draws.for_robot(robot, line)
+    known = draws.for_robot(robot, line)
     schedules = {
-        "hooke_only": control.hooke_only(robot, told, asked.position_m, asked.rotation),
-        "creep_aware": control.creep_aware(robot, told, asked.position_m, asked.rotation),
+        "hooke_only": control.hooke_only(robot, known, request.position_m, request.rotation),
+        "creep_aware": control.creep_aware(robot, known, request.position_m, request.rotation),
     }
     if other is not None:
         less = draws.for_robot(robot, other)
-        schedules["creep_aware_told_otherwise"] = control.creep_aware(robot, less, asked.position_m, asked.rotation)
+        schedules["creep_aware_other_fit"] = control.creep_aware(robot, less, request.position_m, request.rotation)
     out = []
-    for spread in asked.spreads:
+    for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for name, schedule in schedules.items():
-            error = control.error(robot, wires, schedule, asked.position_m, asked.rotation, asked.times_s)
+            error = control.error(robot, wires, schedule, request.position_m, request.rotation, request.times_s)
             out.append({
                 "specimen_spread": spread,
                 "controller": name,
@@ -54,14 +54,14 @@ def errors(
                 "solved": float(error.found.mean()),
                 "distance_mm": band(1e3 * error.distance_m[error.found]),
                 "rotation_deg": band(np.degrees(error.angle_rad[error.found])),
-                **_tolerances(asked),
-                **_lasts(error, asked),
+                **_tolerances(request),
+                **_lasts(error, request),
             })  # fmt: skip
     return out
 
 
 def between_calibrations(
-    robot: Robot, line: WireDraws, asked: PoseRequest, rng: np.random.Generator
+    robot: Robot, line: WireDraws, request: PoseRequest, rng: np.random.Generator
 ) -> list[dict[str, Any]]:
     """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
 
@@ -71,7 +71,7 @@ def between_calibrations(
     ----------
     robot : Robot
     line : WireDraws
-    asked : PoseRequest
+    request : PoseRequest
         The pose, the tolerances and the specimen spreads.
     rng : numpy.random.Generator
         Draws the specimens.
@@ -79,13 +79,13 @@ def between_calibrations(
     Returns
     -------
     list of dict
-        For each spread, load history and controller: joints held still, or commands that foresee the creep.
+        For each spread, load history and controller: joints held still, or commands that compensate for the creep.
     """
-    x, R = asked.position_m, asked.rotation
+    x, R = request.position_m, request.rotation
     line = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
     load = np.repeat(inverse.tensions(robot, x[None], R[None]).T, line.count, 1)
     out: list[dict[str, Any]] = []
-    for spread in asked.spreads:
+    for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for loaded_s in HISTORIES_S:
             state = fresh(robot.legs, line.count)
@@ -98,16 +98,16 @@ def between_calibrations(
             ):
                 row: dict[str, Any] = {"specimen_spread": spread, "loaded_before_s": loaded_s, "controller": name}
                 row["solved"] = float(error.found.mean())
-                out.append(row | _tolerances(asked) | _lasts(error, asked))
+                out.append(row | _tolerances(request) | _lasts(error, request))
     return out
 
 
-def _tolerances(asked: PoseRequest) -> dict[str, float]:
-    return {"tolerance_mm": 1e3 * asked.tolerance_m, "tolerance_deg": float(np.degrees(asked.tolerance_rad))}
+def _tolerances(request: PoseRequest) -> dict[str, float]:
+    return {"tolerance_mm": 1e3 * request.tolerance_m, "tolerance_deg": float(np.degrees(request.tolerance_rad))}
 
 
-def _lasts(error: control.PoseError, asked: PoseRequest) -> dict[str, Any]:
-    within = control.longest_interval(error, asked.tolerance_m, asked.tolerance_rad)
+def _lasts(error: control.PoseError, request: PoseRequest) -> dict[str, Any]:
+    within = control.longest_interval(error, request.tolerance_m, request.tolerance_rad)
     at_end = not np.isfinite(within)
     return {
         "longest_time_within_s": float(error.times_s[-1]) if at_end else within,

@@ -64,14 +64,14 @@ class Map:
         return 2 if not flat.size or 2 in flat else int(flat[0])
 
 
-def map_slices(robot: Robot, line: WireDraws, asked: Slices) -> tuple[Map, ...]:
+def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]:
     """A minute's drift over the slices, one draw for all wires of the line, an orientation after the other.
 
     Parameters
     ----------
     robot : Robot
     line : WireDraws
-    asked : Slices
+    slices : Slices
 
     Returns
     -------
@@ -80,12 +80,12 @@ def map_slices(robot: Robot, line: WireDraws, asked: Slices) -> tuple[Map, ...]:
     few = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
     wires = draws.for_robot(robot, few)
     where = claim.grid(robot, _GRID if (robot.upper_m > robot.lower_m).all() else _FLAT)
-    if asked.heights_m is not None:
+    if slices.heights_m is not None:
         level = where[where[:, 2] == where[0, 2]]
-        where = np.concatenate([np.column_stack([level[:, :2], np.full(len(level), z)]) for z in asked.heights_m])
+        where = np.concatenate([np.column_stack([level[:, :2], np.full(len(level), z)]) for z in slices.heights_m])
     return tuple(
         Map(turn, where, claim.over_workspace(robot, wires, where, rotation=matrix(turn)))
-        for turn in asked.rotations_rad
+        for turn in slices.rotations_rad
     )
 
 

@@ -1,4 +1,4 @@
-"""What is asked of a robot and a line, and how draws become a band."""
+"""What is requested of a robot and a line, and how draws become a band."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}  # the median and the 90 % in
 
 @dataclass(frozen=True)
 class PoseRequest:
-    """What is asked.
+    """A request.
 
     Attributes
     ----------

@@ -68,33 +68,34 @@ def warnings(course: Course, spread: float, stable: bool = True) -> list[str]:
     stable : bool
         Whether the commanded pose is a stable equilibrium at all.
     """
-    told, out = summary(course), []
+    found, out = summary(course), []
     who = f"specimens differing by {100 * spread:g} %" if spread else "specimens alike"
     last = course.times_s[-1]
-    if told["began"] < 1:
+    if found["began"] < 1:
         reason = "the pose is balanced but not stable" if not stable else "no stable equilibrium is found there"
-        out.append(f"{_percent(1 - told['began'])} of the draws cannot begin at the pose ({who}): {reason}")
-    if not told["began"]:
+        out.append(f"{_percent(1 - found['began'])} of the draws cannot begin at the pose ({who}): {reason}")
+    if not found["began"]:
         return out
-    if told["fall_probability"]:
-        times, drop = told["fall_time_s"], told["fall_distance_mm"]
-        wire = int(np.argmax(told["fall_wires"])) + 1
+    if found["fall_probability"]:
+        times, drop = found["fall_time_s"], found["fall_distance_mm"]
+        wire = int(np.argmax(found["fall_wires"])) + 1
         fall = f"; it drops {drop['median']:.3g} mm" if drop else "; nothing catches it nearby"
         out.append(
-            f"the platform falls in {_percent(told['fall_probability'])} of the draws within {last:g} s ({who}), first "
-            f"after {times['first']:.3g} s, in the median after {times['median']:.3g} s, wire {wire} giving way{fall}"
+            f"the platform falls in {_percent(found['fall_probability'])} of the draws within {last:g} s ({who}), "
+            f"first after {times['first']:.3g} s, in the median after {times['median']:.3g} s, wire {wire} giving "
+            f"way{fall}"
         )
     slack = [
         f"wire {i + 1} in {_percent(p)} of the draws, first after {t['first']:.3g} s"
-        for i, (p, t) in enumerate(zip(told["slack_probability"], told["slack_time_s"], strict=True))
+        for i, (p, t) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True))
         if t is not None
     ]
     if slack:
         out.append(f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}")
-    elif (tension := told["least_tension_share"]["q05"]) is not None and tension < NEAR_SLACK:
+    elif (tension := found["least_tension_share"]["q05"]) is not None and tension < NEAR_SLACK:
         left = _percent(float(tension))
-        out.append(f"wire {told['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})")
-    if (stiffness := told["stiffness_share"]["q05"]) is not None and stiffness < NEAR_LOOSE:
+        out.append(f"wire {found['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})")
+    if (stiffness := found["stiffness_share"]["q05"]) is not None and stiffness < NEAR_LOOSE:
         left = _percent(max(float(stiffness), 0.0))
         out.append(f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})")
     return out

@@ -84,8 +84,8 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
         return nothing
     mean = control.known(wires)
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    told = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
-    bare, offset = inverse.lengths(robot, told.joint_m[0])
+    commands = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
+    bare, offset = inverse.lengths(robot, commands.joint_m[0])
     strain = np.broadcast_to(course.end.strain(wires), (robot.legs, len(course.found)))[:, course.found]
     k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, len(course.found)))[:, course.found]
     known = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)

@@ -133,8 +133,8 @@ def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats
     """
     wires, error = prior.wires(robot, known.unknowns)
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    told = inverse.commands(robot, wires, position_m[None], rotation[None], tau, known.creep.T, error.T)
-    return told.joint_m
+    commands = inverse.commands(robot, wires, position_m[None], rotation[None], tau, known.creep.T, error.T)
+    return commands.joint_m
 
 
 def derivatives(

@@ -27,7 +27,7 @@ class Session:
     Attributes
     ----------
     position_m, rotation : (p, 3), (p, 3, 3) arrays
-        Poses asked for. The robot went there in small steps, so it is at the equilibrium next to them.
+        Requested poses. The robot went there in small steps, so it is at the equilibrium next to them.
     joint_m : (p, w) array
     duration_s : (p,) array
     read : (p,) bool array
@@ -168,7 +168,7 @@ def predict(
     longest_step : float
         Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
     near : (n, p, 3), (n, p, 3, 3) arrays, optional
-        Where the holds are known to begin, about; default: the poses asked for.
+        Where the holds are known to begin, about; default: the requested poses.
     """
     wires, error = prior.wires(robot, unknowns)
     n, legs = len(unknowns), robot.legs

@@ -21,7 +21,7 @@ NORMAL = ("normal_x", "normal_y")
 
 
 def columns(robot: Robot, tilted: bool, motors: bool = False, moved: bool = False) -> list[str]:
-    """The file's header: pose asked for, duration, joint values, tensions at the end, and the normal's components.
+    """The file's header: requested pose, duration, joint values, tensions at the end, and the normal's components.
 
     With `motors` the legs with a drum of known radius have their motor's angle in place of the joint value; with
     `moved` the directions in which the wires moved last follow the tensions.
