@@ -183,7 +183,7 @@ def test_command_finds_that_a_creeping_wire_is_no_spring(tmp_path: Path, monkeyp
     assert table["plain"]["leave_one_hold_out"]["holds"] == [1, 2, 3, 4, 5, 6]
     assert table["plain"]["held_out"]["holds"] == [7, 8, 9, 10, 11, 12]
     assert table["hold_by_hold"]["held_out"]["free"] is None
-    assert (out / "roc-line-1.71m" / "differences.svg").stat().st_size > 5000
+    assert (out / "roc-line-1.71m" / "differences.svg").stat().st_size > 2000
     # cut off before one model was done, the run goes on to the same bytes
     (out / "complete.json").unlink()
     (out / "comparison.json").unlink()

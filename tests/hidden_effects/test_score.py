@@ -71,10 +71,10 @@ def test_rates_of_named_missed_and_wrong():
     }
     result = score(truths, dict.fromkeys("abcd", judged(("toe", "ageing"))), answers)
     assert found(result, "detected at delta 10")["found"]["value"] == 0.75
-    assert found(result, "best in the true group, delta 10")["found"]["value"] == pytest.approx(2 / 3)
-    assert found(result, "90 % set holds the truth, delta 10")["found"]["value"] == pytest.approx(2 / 3)
-    assert found(result, "best right, separable")["found"]["value"] == pytest.approx(1 / 3)
-    assert found(result, "best right, over Bayes")["found"]["value"] == pytest.approx(1 / 2.4)
+    assert found(result, "top-ranked effect in the true group, delta 10")["found"]["value"] == pytest.approx(2 / 3)
+    assert found(result, "90 % set contains the true effect, delta 10")["found"]["value"] == pytest.approx(2 / 3)
+    assert found(result, "top-ranked effect correct, separable")["found"]["value"] == pytest.approx(1 / 3)
+    assert found(result, "top-ranked effect correct, relative to Bayes")["found"]["value"] == pytest.approx(1 / 2.4)
     assert found(result, "size of the 90 % set")["found"]["value"] == pytest.approx(5 / 3 - 1.5)
     assert result["confusion"]["toe"] == {"toe": 1, "memory": 1, "nothing-missing": 1, "ageing": 1}
     assert not found(result, "detected at delta 10")["passed"]
@@ -89,7 +89,7 @@ def test_runs_pooled_count_together_and_what_is_missed_is_bold(tmp_path, capsys,
     cells = capsys.readouterr().out.split("\n   * - ")
     (detected,) = (c for c in cells if c.startswith("detected at δ = 10"))
     assert "≥ 99 %" in detected and "**50 %**" in detected and "of 2" in detected
-    (named,) = (c for c in cells if c.startswith("best in the true group, δ = 10"))
+    (named,) = (c for c in cells if c.startswith("top-ranked effect in the true group, δ = 10"))
     assert "100 %" in named and "**" not in named and "of 1" in named
     assert not any("delta" in c or "clean" in c for c in cells)  # nothing was asked of clean files
 
@@ -119,7 +119,7 @@ def test_unknown_counts_where_the_form_is_in_no_catalogue():
     truths = {k: truth(k, "foreign", "screw_thread") for k in "abc"}
     answers = {"a": said("unknown"), "b": said("memory", ["memory"]), "c": said("toe", ["toe"])}
     result = score(truths, dict.fromkeys("abc", judged(("screw_thread", "toe"))), answers)
-    assert found(result, "form in no catalogue")["found"]["value"] == pytest.approx(2 / 3)
+    assert found(result, "effect in no catalogue")["found"]["value"] == pytest.approx(2 / 3)
 
 
 def test_cases_the_refitted_plain_model_swallows_are_also_shown_apart():
@@ -129,7 +129,7 @@ def test_cases_the_refitted_plain_model_swallows_are_also_shown_apart():
     result = score(truths, {"a": judged(), "b": swallowed}, answers)
     assert found(result, "detected at delta 10")["found"]["value"] == 0.5
     assert found(result, "detected at delta 10", "targets_visible")["found"]["value"] == 1.0
-    told = "a test told the name would detect, delta 10"
+    told = "a test that knew the effect would detect, delta 10"
     power = norm.sf(norm.isf(0.02) - 2.0)
     assert found(result, told)["found"]["value"] == pytest.approx(0.5 * (1.0 + power), abs=1e-4)
 

@@ -141,13 +141,10 @@ def plan(
         robot=request.robot if robot is None else robot,
     )
     machine = None if request.robot is None else robot_of(request.robot)
-    of_robot = None
-    if request.robot is not None:
-        of_robot = hash_of(asdict(request.robot)) if isinstance(request.robot, Robot) else content(Path(request.robot))
     configuration = {
         "command": "plan", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
         "own_effects": source_of(own), "tests": tests, "aim": list(request.aim), "budget_min": request.budget_min,
-        "robot": of_robot,
+        "robot": _identity(request.robot),
     } | request.about  # fmt: skip
     place = Place.at(output)
     with open_run(place.path, configuration) as opened:
@@ -187,6 +184,13 @@ def plan(
         widths_and_effects(plain(summary), opened.directory / "plan.svg")
         opened.finish()
     return Plan(place, own)
+
+
+def _identity(robot: RobotLike | None) -> str | None:
+    """What decides a robot's part in the results: a hash of its content."""
+    if robot is None:
+        return None
+    return hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot))
 
 
 def _request(
