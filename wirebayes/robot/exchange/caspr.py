@@ -5,6 +5,7 @@ centre of mass of its link, that of link 0 from the origin. CASPR's pulley is th
 where the cable enters, and turns about the direction in which it does.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -60,8 +61,8 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
         link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
         f"Imported from CASPR's {names}, cable set {chosen.attribute('id')!r}.",
         freedom, physical.one("mass").number(), centre,
-        np.array([leg[0] for leg in legs]), np.array([leg[1] for leg in legs]),
-        np.array([leg[2] for leg in legs]), np.array([leg[3] for leg in legs]),
+        np.array([leg.exit_m for leg in legs]), np.array([leg.platform_m for leg in legs]),
+        np.array([leg.pulley_radius_m for leg in legs]), np.array([leg.swivel_axis for leg in legs]),
         (float(low.max()), float(high.min())), home, turn, tuple(notes),
     )  # fmt: skip
 
@@ -102,8 +103,17 @@ def _set(cables: Element, name: str | None) -> Element:
     return sets[known.index(wanted)]
 
 
-def _leg(cable: Element, centre: Floats) -> tuple[Floats, Floats, float, Floats]:
-    """Exit point, platform point, pulley radius and swivel axis of a cable."""
+@dataclass(frozen=True)
+class _Leg:
+    """The ends of a cable, and the pulley at its exit point; radius 0 where there is none."""
+
+    exit_m: Floats
+    platform_m: Floats
+    pulley_radius_m: float
+    swivel_axis: Floats
+
+
+def _leg(cable: Element, centre: Floats) -> _Leg:
     reference = cable.attribute("attachment_reference")
     if reference not in ("joint", "com"):
         raise cable.fail(f"attachment_reference {reference!r}", "joint or com")
@@ -126,7 +136,7 @@ def _leg(cable: Element, centre: Floats) -> tuple[Floats, Floats, float, Floats]
         exit_m = first.one("location").vector()
     if _link(last) != 1:
         raise last.fail(f"link {_link(last)}", "link 1, the platform")
-    return exit_m, last.one("location").vector() + (centre if reference == "com" else 0.0), radius, axis
+    return _Leg(exit_m, last.one("location").vector() + (centre if reference == "com" else 0.0), radius, axis)
 
 
 def _link(attachment: Element) -> int:

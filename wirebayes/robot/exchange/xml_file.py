@@ -127,4 +127,4 @@ def read(path: Path) -> Element:
     return root[0]
 
 
-_DEEPEST = 100
+_DEEPEST = 100  # no robot's file is nested so deeply, and Python's stack is not exhausted
