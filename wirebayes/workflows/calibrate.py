@@ -10,6 +10,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration import session_file
 from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.session import Prior
@@ -109,6 +110,11 @@ def calibrate(
             with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
                 found = answer(machine, prior, session, values, seed)
             write_json(run.directory / "calibrate.json", found)
+            if found["pose_now"] is not None:
+                from wirebayes.report.pictures.robot import still_points  # matplotlib only where it is needed
+
+                here, turn = (np.asarray(found["pose_now"][key]) for key in ("position_m", "rotation_vector_rad"))
+                write_json(run.directory / "scene.json", still_points(machine, here, matrix(turn)))
             run.finish()
     return Calibration(place, own, computed=run.state != "done")
 

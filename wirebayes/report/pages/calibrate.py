@@ -6,6 +6,7 @@ from typing import Any
 from wirebayes.io.run_folder import read_json
 from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, files_beside, number, span
 from wirebayes.report.glossary import meaning
+from wirebayes.report.pages.robot_view import robot_view
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -20,6 +21,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
         Section("What to do", _next(found)),
     ]
+    sections += [Section("Where the platform is", view)] if (view := robot_view(folder)) else []
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(("90 % interval", "zero-tension length", "specimen spread"), model=False))
     lead = "Zero-tension lengths of a robot's wires from its own joint values and tensions."
@@ -28,6 +30,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 _FILES = (
     ("calibrate.json", "every number of this page as JSON"),
+    ("scene.json", "points of the view that can be turned"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
 

@@ -13,6 +13,8 @@ _FILES = (
     ("reprapfirmware.g", "lines for config.g of RepRapFirmware"),
     ("klipper.cfg", "sections for printer.cfg of Klipper"),
     ("robot.xml", "the robot for MuJoCo"),
+    ("robot.urdf", "the robot for ROS and other simulators"),
+    ("robot.sdf", "the robot for Gazebo"),
     ("robot.urdf", "its bodies and frames for ROS and others, without wires"),
     ("robot.sdf", "the same for Gazebo"),
     ("configuration.json", "the options of this run, with version and seed"),

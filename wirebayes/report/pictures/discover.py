@@ -40,8 +40,8 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
     """
     figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
     unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
-    added = " + ".join([e.replace("_", " ") for e in verdict["accepted"]] + unknown) or "nothing"
-    titles = {"plain": "plain model", "final": f"with {added}"}
+    added = " + ".join([e.replace("_", " ") for e in verdict["accepted"]] + unknown)
+    titles = {"plain": "plain model", "final": f"with {added}" if added else "nothing had to be added"}
     for axis, model in zip(axes, titles, strict=True):
         _residuals(axis, store.load(folder / model, own_effects=own_effects), verdict["held_out"]["holds"])
         axis.set_title(f"{folder.name}: {titles[model]}", loc="left", fontsize=10)
@@ -111,7 +111,11 @@ def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Pat
         left = (residual - level if within else residual)[mask]
         figure, axis = plt.subplots(figsize=_PANEL, layout="constrained")
         axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
-        groups = np.array_split(np.argsort(x, kind="stable"), min(len(np.unique(x)), _GROUPS))
+        values = np.unique(x)
+        few = len(values) <= _GROUPS  # then a mean of each value
+        groups = (
+            [np.flatnonzero(x == v) for v in values] if few else np.array_split(np.argsort(x, kind="stable"), _GROUPS)
+        )
         middles = [(x[g].mean(), left[g].mean()) for g in groups]
         axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
         axis.axhline(0.0, color="0.5", lw=0.6)

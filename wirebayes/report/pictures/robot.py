@@ -125,23 +125,39 @@ def scene_points(
         ``name``, ``exits``, ``platform`` (w, 3), ``drifted`` (t, w, 3), ``wires`` (w lines, about their pulleys), all
         in m and in the world; ``edges``, ``times``, ``exaggeration``, ``tensions_N`` (t, w), medians, at nine times.
     """
-    here = position_m + robot.platform_m @ rotation.T
     position, turned = course.position_m[course.found].mean(0), course.rotation[course.found].mean(0)
     shown = np.unique(np.linspace(0, len(position) - 1, min(len(position), _MOST_TIMES)).round().astype(int))
     drifted = position[shown, None] + np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
     if exaggeration is None:
         size = np.ptp(robot.exit_m, axis=0).max()
         exaggeration = round_factor(0.05 * size / max(float(np.linalg.norm(position[-1] - position_m)), 1e-12))
+    return still_points(robot, position_m, rotation) | {
+        "drifted": drifted,
+        "times": [f"{t:.3g} s" if t < 1000 else f"{t:.0f} s" for t in course.times_s[shown]],
+        "tensions_N": np.median(course.tension_N[course.found][:, shown], axis=0),
+        "exaggeration": exaggeration,
+    }
+
+
+def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> dict[str, Any]:
+    """What `scene_points` returns, for a robot that stays where it is.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m, rotation : (3,), (3, 3) arrays
+    """
+    here = position_m + robot.platform_m @ rotation.T
     return {
         "name": robot.name,
         "exits": robot.exit_m,
         "platform": here,
         "wires": [a + traced(robot.pulleys, i, p - a) for i, (a, p) in enumerate(zip(robot.exit_m, here, strict=True))],
         "edges": list(platform_edges(robot.platform_m)),
-        "drifted": drifted,
-        "times": [f"{t:.3g} s" if t < 1000 else f"{t:.0f} s" for t in course.times_s[shown]],
-        "tensions_N": np.median(course.tension_N[course.found][:, shown], axis=0),
-        "exaggeration": exaggeration,
+        "drifted": [],
+        "times": [],
+        "tensions_N": [],
+        "exaggeration": 1.0,
     }
 
 
