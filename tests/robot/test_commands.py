@@ -307,7 +307,8 @@ def test_a_bias_is_estimated_when_asked_for_and_its_sign_may_follow_the_motion(f
     bias = said["with_creep_model"]["tension_bias_N"]
     assert abs(bias["mean"][0] - 0.3) < 2 * bias["sd"][0] < 0.4
     assert main(["report", str(out)]) == 0
-    assert "What each tension sensor reads too much" in (out / "report.html").read_text()
+    assert "By how much each tension sensor reads too high." in (out / "report.html").read_text()
+    assert np.shape(json.loads((out / "scene.json").read_text())["platform"]) == (7, 3)
     lines[2][-1] = "2"
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(tmp_path / "o")]) == 2
