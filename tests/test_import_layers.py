@@ -7,7 +7,8 @@ import wirebayes
 
 ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
-    {"errors", "linear_algebra"},
+    {"errors", "typing"},
+    {"linear_algebra"},
     {"units", "interrupt", "user_files"},
     {"workers"},
     {"wire"},
@@ -23,7 +24,7 @@ LAYERS: list[set[str]] = [
     {"workflows"},
     {"cli"},
 ]
-ROBOT_MAY_USE = {"errors", "linear_algebra", "units", "user_files", "wire", "robot"}
+ROBOT_MAY_USE = {"errors", "typing", "linear_algebra", "units", "user_files", "wire", "robot"}
 MAY_USE_ROBOT = {"report", "reproduce", "workflows", "cli", "__init__"}
 
 

@@ -6,12 +6,11 @@ have none.
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 def solve(matrices: Array, right: Array) -> Array:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.comparison.candidates import Candidate, effects_of, problem_of
 from wirebayes.effects import catalogue
@@ -18,9 +17,9 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out, standard_error
+from wirebayes.typing import Floats
 from wirebayes.workers import workers
 
-Array = NDArray[np.float64]
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
 POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=1200)
 MEANINGFUL_ELPD, MEANINGFUL_SE = 4.0, 2.0  # below either, the difference may be chance (Sivula et al. 2020)
@@ -259,7 +258,7 @@ def _meaning(row: dict[str, Any], base: str) -> str:
     return f"{size}: predicts {'better' if gain['elpd'] > 0 else 'worse'}"
 
 
-def stacking(log_density: Array, iterations: int = 2000) -> Array:
+def stacking(log_density: Floats, iterations: int = 2000) -> Floats:
     """Weights (models,) of the mixture that predicts best, from (holds, models) log densities of holds left out.
 
     Expectation-maximisation of the concave ``sum over holds of log sum over models of w p``.

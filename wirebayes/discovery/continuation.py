@@ -34,10 +34,10 @@ from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import cholesky, solve
 from wirebayes.model import likelihoods
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
 
-Array = NDArray[Any]
 _FIRST, _LAST = 1.5, 24.0  # δ of the rungs
 _RAW = 10.0  # δ of the first one before the parameters take their part, if that is less
 _APART, _MOST = 2.0, 8  # largest ratio of neighbours, unless they would be more than that many

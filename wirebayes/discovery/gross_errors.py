@@ -5,14 +5,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.linear_scan import Scan, expand, scan
 from wirebayes.discovery.refit import occam
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 MOST = 0.05  # share of readings that may be called gross errors
 
 

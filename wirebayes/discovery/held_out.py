@@ -2,10 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference import rough_draws
@@ -14,10 +12,9 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.model.linear_amplitudes import completed
 from wirebayes.model.problem import Problem, build
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import linearise
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

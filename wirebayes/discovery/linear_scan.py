@@ -8,10 +8,9 @@ model has estimated.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.discovery import smooth_reference
@@ -19,10 +18,10 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import cholesky
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import linearise, simulate
 
-Array = NDArray[Any]
 # of setting to sensor error, squared: from one that does not matter to one beside which the sensor's does not; steps of
 # half a decade, as the evidence is smooth in log ρ
 RATIOS = np.logspace(-2.0, 6.0, 13)

@@ -6,16 +6,13 @@ probability of a remainder is part of the answer.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
 from wirebayes.discovery.settings import IN_SET, MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
 from wirebayes.discovery.subsets import over_subsets
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.discovery.linear_scan import Probe, Scan
@@ -14,10 +12,10 @@ from wirebayes.discovery.refit import Refit, refit
 from wirebayes.discovery.screening import Candidate, log_bayes
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
-Array = NDArray[Any]
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
 Correction = Callable[[Refit], float]
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
@@ -15,10 +14,10 @@ from wirebayes.discovery.settings import ALPHA, NEARLY_ONE
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
-Array = NDArray[Any]
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
 _POWER_ROWS = 300  # simulations behind an 80 % amplitude
 _WORTH = 1.1  # times as far apart as now, for a measurement to be proposed

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery import power, screening
 from wirebayes.discovery.linear_scan import expand
@@ -18,9 +17,8 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, taught
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
-
-Array = NDArray[Any]
 
 SIMULATIONS = 199  # the level that one in twenty-five passes by chance is then the eighth largest
 UNUSUAL = 2.0  # standard deviations of an effect's prior: few wires show it as large

@@ -7,15 +7,13 @@ density plus a constant.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
-Array = NDArray[Any]
 # δ; end of the amplitudes' uniform prior. Hardly matters: twice as much takes ln 2 from every name alike
 LARGEST = 40.0
 _OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.linear_scan import Scan
 from wirebayes.model.problem import Problem, Sample
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
 
 

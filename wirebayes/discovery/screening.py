@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, probes, scan
@@ -17,9 +16,9 @@ from wirebayes.discovery.refit import occam
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import climb, rowwise
 from wirebayes.model.replicate import readings as replicate
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
 
-Array = NDArray[Any]
 _ROWS = 100  # replicates linearised at once
 _FLEXIBLE = "unknown"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude

@@ -11,7 +11,6 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery import power, residual_patterns, shrinking
 from wirebayes.discovery.global_test import Gate, examine
@@ -20,16 +19,16 @@ from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.discovery.stepwise import Accepted, Explored, explore
-from wirebayes.discovery.verdict import Alternative, Decision, Verdict, alternatives, decide, verdict_of
+from wirebayes.discovery.verdict import Alternative, Decision, alternatives, decide, verdict_of
 from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
+from wirebayes.typing import Amplitude, Answer, ExperimentFindings, HeldOutReport, Outlook, Remainder, Verdict
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
 
-Array = NDArray[Any]
 _VISIBLE = 0.05  # p of a residual pattern that is told of the remainder
 
 
@@ -133,12 +132,13 @@ def investigate(
     final = [a.stages[-1] if a.stages else block for a, block in zip(answers, gate.blocks, strict=True)]
     ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
     alike = power.similarity(expansions, gate.trials, ratios)
-    out: dict[str, Any] = {}
+    out: dict[str, ExperimentFindings] = {}
     for i, block in enumerate(gate.blocks):
         report("held-out holds", i, len(gate.blocks))
         common = _common(answers, i, gate.blocks, gate.test.p, where[i], alike)
-        common |= _outlook(gate, i, settings, answers[i], alike)
-        out |= {name: common | own for name, own in _own_reports(gate, block, answers[i], rng, parallel_map).items()}
+        outlook = _outlook(gate, i, settings, answers[i], alike)
+        for name, own in _own_reports(gate, block, answers[i], rng, parallel_map).items():
+            out[name] = {**common, **outlook, **own}
     report("held-out holds", len(gate.blocks), len(gate.blocks))
     undecided = [
         alternatives(decision, explored, i, last, answer.verdict)
@@ -165,7 +165,7 @@ def _named(
 
 def _own_reports(
     gate: Gate, block: LaplaceFit, answer: "_Answer", rng: np.random.Generator, parallel_map: ParallelMap
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, HeldOutReport]:
     """What the report says of each experiment of a block apart from the others."""
     remains = answer.verdict in ("partial", "unknown")
     names = [a.name for a in answer.accepted]
@@ -244,7 +244,7 @@ class _Answer:
     stages: list[LaplaceFit]
     shares: dict[str, float]
     inclusion: dict[str, float]
-    remainder: dict[str, Any]
+    remainder: Remainder
     nothing: float | None
 
     @property
@@ -271,7 +271,7 @@ def _answer(
     # beside the effects where some are accepted, else what the plain model leaves over
     beside = retest.where[i] if retest is not None else []
     patterns = {"partial": beside, "unknown": where}.get(verdict, [])
-    remainder = {
+    remainder: Remainder = {
         "probability": float(found.remainder[i]),
         "where": [w["covariate"] for w in patterns if w["p"] <= _VISIBLE],
         "p": None if retest is None else retest.p,
@@ -287,7 +287,7 @@ def _answer(
     return _Answer(verdict, accepted, stages, shares, inclusion, remainder, float(found.nothing[i]))
 
 
-def _amplitude(final: LaplaceFit, effect: Effect) -> dict[str, Any]:
+def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
     main = effect.amplitudes[0]
     low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
@@ -298,7 +298,7 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> dict[str, Any]:
 def _common(
     answers: Sequence[_Answer], i: int, plain: list[LaplaceFit], p: float, where: list[dict[str, Any]],
     alike: dict[tuple[str, str], float],
-) -> dict[str, Any]:  # fmt: skip
+) -> Answer:  # fmt: skip
     """What the experiments of one block share in the report."""
     answer = answers[i]
     names, members = [a.name for a in answer.accepted], answer.set
@@ -322,9 +322,7 @@ def _common(
     }
 
 
-def _outlook(
-    gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float]
-) -> dict[str, Any]:
+def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float]) -> Outlook:
     """What could have been seen in block `i`, what cannot be, and what to measure next."""
     block, trials, candidates = gate.blocks[i], gate.trials, gate.candidates
     found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)

@@ -1,15 +1,11 @@
 """What an effect explains of the smooth remainder: its log Bayes factor with the remainder in the model, linearised."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.discovery.linear_scan import ABSORBED, RATIOS, SIZES, Expansion, damp
 from wirebayes.linear_algebra import eigh, solve
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 def beside_smooth(x: Expansion) -> Array:

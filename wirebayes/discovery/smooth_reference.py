@@ -1,13 +1,10 @@
 """The reference for something unknown: a smooth discrepancy over hold and time, as a few functions of the readings."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 
-Array = NDArray[Any]
 FUNCTIONS = 16  # they hold 99 % of the process's variance on the paper's protocols
 
 

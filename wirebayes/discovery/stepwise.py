@@ -7,10 +7,8 @@ amplitude is fixed once, on the plain fit, so the order of the chain does not ma
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import repeat
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery import screening
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
@@ -34,10 +32,10 @@ from wirebayes.discovery.settings import (
 from wirebayes.discovery.sharing import informed
 from wirebayes.discovery.smooth_credit import beside_smooth
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of, fitted
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
-Array = NDArray[Any]
 Key = frozenset[str]
 _Units = Mapping[tuple[str, tuple[int, ...]], float]
 

@@ -4,13 +4,10 @@ The proportion of materials that have it is unknown and uniform, so the material
 it is expected in the next.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 def over_subsets(values: Array) -> tuple[float, Array, list[int]]:

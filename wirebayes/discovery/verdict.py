@@ -3,10 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery import held_out, model_space, residual_patterns, screening
 from wirebayes.discovery.global_test import simulated_with_patterns
@@ -28,10 +27,8 @@ from wirebayes.discovery.settings import (
 from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet, Key
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.typing import Array, Verdict
 from wirebayes.workers import ParallelMap
-
-Array = NDArray[Any]
-Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 
 
 @dataclass(frozen=True)

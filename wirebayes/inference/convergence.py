@@ -1,11 +1,9 @@
 """Autocorrelation, effective sample size, and whether independent ensembles agree."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
+
 ENOUGH = 5.0  # autocorrelation times that steps must span, lest the time itself be cut short by them
 
 

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
 from wirebayes.model.prior import fast_logpdf
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
 _log_normal = fast_logpdf(stats.norm())
 

@@ -4,10 +4,8 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
@@ -15,8 +13,8 @@ from wirebayes.inference.sampler.ensemble import Chains
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 STORED_DRAWS = 5000  # per ensemble: beyond that, quantiles no longer move
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.inference.modes import Optimum, climb, modes
@@ -13,11 +12,11 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem, build
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Protocol
 
-Array = NDArray[Any]
 _FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
 # its log density in those units, taken out again: the amplitude's own prior is not in the evidence
 _LOG_FLAT = float(stats.norm.logpdf(0.0))

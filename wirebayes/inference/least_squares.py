@@ -7,7 +7,6 @@ published parameters, and with the posterior.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,10 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.prior import wire_defaults
 from wirebayes.model.problem import MATERIAL, Likelihood
+from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import Model, simulate
 
-Array = NDArray[Any]
 _FAR = 1e-6  # the search stays between these quantiles of the prior: along a ridge it would never end
 _LEAST_STIFFNESS = 10.0  # times the largest tension: a thin line does not stretch by a tenth
 _DRAWS, _STARTS = 2000, 6

@@ -6,15 +6,14 @@ Every row is an optimisation of its own; rows may also have their own readings (
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.mixture import rows_by_weight, spread_rows
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
 _LOOKED = 400  # places at which it is tested whether a mode explains them

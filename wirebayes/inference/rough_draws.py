@@ -3,17 +3,14 @@
 For numbers that are reported, sample with `wirebayes.inference.fit`, which requires convergence.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 # 4096 draws, no test of tails: enough for means and widths, a fraction of a second
 _SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, block=32, most_steps=32)
 

@@ -10,7 +10,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.inference.fit import Fit, fit, seed_of
@@ -18,8 +17,8 @@ from wirebayes.inference.policy import Policy
 from wirebayes.inference.transform import Transformation
 from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 JOINT = "log_likelihood"
 # every percentile: the ranks of some hundred data sets say no more between them
 _GRID = np.linspace(0.0, 1.0, 101)[1:-1]

@@ -18,7 +18,6 @@ Statistical Science 22 (2007).
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,7 @@ from numpy.typing import NDArray
 from wirebayes.model.linear_amplitudes import MarginalisedProblem, integrated
 from wirebayes.model.prior import PooledPrior, Prior
 from wirebayes.model.problem import Problem
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from wirebayes.inference.edges import edge
 from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
 _STEEPEST = 1.6  # a larger U of a pool is of no ridge that data see; to follow it would only bend the prior's tail

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import times_run_on
+from wirebayes.typing import Floats
 from wirebayes.wire.protocol import Protocol
-
-Floats = NDArray[np.float64]
 
 RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
 NEGATIVE = 0.05  # share of the largest tension; sensors drift by less

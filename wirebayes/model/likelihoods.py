@@ -6,16 +6,15 @@ factors hold by hold in linear time: a Kalman filter whose state is that number.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.linear_algebra import inv, log_determinant, solve
+from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
 
-Array = NDArray[Any]
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
+from wirebayes.typing import Array
 from wirebayes.wire.staircase import simulate
 
-Array = NDArray[Any]
 _ROWS = 2048  # draws completed at once
 # relative; far more than rounding errors of parameters that fit, far less than a log-likelihood has to resolve
 _ROUNDING = 1e-6

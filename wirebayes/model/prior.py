@@ -20,13 +20,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.errors import InputError
 from wirebayes.io.readings import shown
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
 
 

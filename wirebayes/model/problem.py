@@ -9,19 +9,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.model.prior import Prior, from_table, wire_defaults
+from wirebayes.typing import Array
 from wirebayes.units import nearest
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, Model, linearise, tension_reference
 
-Array = NDArray[Any]
 Likelihood = Literal["chain", "hold"]
 
 MATERIAL = ("k1", "B", "U", "k2", "N")

@@ -1,15 +1,11 @@
 """Readings drawn from the model: replicates with setting, sensor and rounding error, entering exactly."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.problem import Problem, Sample
+from wirebayes.typing import Array
 from wirebayes.wire.staircase import simulate
-
-Array = NDArray[Any]
 
 
 def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Generator) -> Array:

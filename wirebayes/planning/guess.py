@@ -6,16 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws as rough_draws
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.prior import from_table, wire_defaults
 from wirebayes.model.problem import MATERIAL, SAMPLE
+from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

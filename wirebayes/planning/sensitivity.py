@@ -6,10 +6,8 @@ test of `wirebayes.discovery` under chance; an effect is detected where its evid
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery import power, screening
 from wirebayes.discovery.linear_scan import expand
@@ -22,7 +20,6 @@ from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
-Array = NDArray[Any]
 SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
 
 

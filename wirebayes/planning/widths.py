@@ -7,10 +7,8 @@ include the curvature of the posterior and the priors of a fit; a second mode fa
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.modes import Density, climb, rowwise
 from wirebayes.inference.transform import LogPosterior
@@ -18,11 +16,11 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import frozen
 from wirebayes.model.problem import MATERIAL, Problem, build
 from wirebayes.model.replicate import readings
+from wirebayes.typing import Array
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import simulate
 
-Array = NDArray[Any]
 Guess = Mapping[str, Array]
 HOUR_S = 3600.0
 _DRAWS = (500, 500, 3000)  # of each posterior, round by round: the last give its width to some 5 %, tails included

@@ -5,7 +5,6 @@ were made. The same code serves a single hold left out in the middle and the las
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,9 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.prediction.leave_one_hold_out import thinned
 from wirebayes.prediction.predictive import PredictionRequest, predict
+from wirebayes.typing import Array
 from wirebayes.wire.staircase import linearise
 
-Array = NDArray[Any]
 LEVELS = (0.5, 0.9, 0.99)  # half, the usual nine in ten, and nearly all: intervals whose coverage is counted
 QUANTILES = (0.005, 0.05, 0.25, 0.5, 0.75, 0.95, 0.995)  # the ends of those intervals, and the median
 

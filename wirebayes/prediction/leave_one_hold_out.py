@@ -21,8 +21,8 @@ from scipy.special import expit, logsumexp
 from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.model.problem import Problem
+from wirebayes.typing import Floats
 
-Array = NDArray[np.float64]
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
 # a posterior without a hold may have a second mode that the one with it never visits, and k says little of that.
 LARGEST_K = 0.5
@@ -54,8 +54,8 @@ class LeftOut:
 
     sample: tuple[str, ...]
     hold: NDArray[np.int64]
-    elpd: Array
-    pareto_k: Array
+    elpd: Floats
+    pareto_k: Floats
     refitted: NDArray[np.bool_]
     converged: bool = True
 
@@ -132,7 +132,7 @@ def leave_each_hold_out(
     return LeftOut(names, numbers, elpd, k, refitted, bool(converged))
 
 
-def log_mean(log_p: Array, log_p_weighted: Array) -> float:
+def log_mean(log_p: Floats, log_p_weighted: Floats) -> float:
     """Logarithm of the mean of p under a density q, from draws of q and of the density proportional to q p.
 
     The bridge between the two with the least variance: it is where draws of the one, weighed by how likely they belong
@@ -183,13 +183,13 @@ def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
     return replace(problem, samples=(*problem.samples[:sample], kept, *problem.samples[sample + 1 :]))
 
 
-def thinned(theta: Array, draws: int = _DRAWS) -> Array:
+def thinned(theta: Floats, draws: int = _DRAWS) -> Floats:
     """At most so many rows, evenly spread."""
     rows = np.linspace(0, len(theta) - 1, min(draws, len(theta))).round().astype(int)
-    kept: Array = theta[rows]
+    kept: Floats = theta[rows]
     return kept
 
 
-def standard_error(values: Array) -> float:
+def standard_error(values: Floats) -> float:
     """Of the sum of (holds,) values, from their spread; NaN of a single one."""
     return float(np.sqrt(len(values) * values.var(ddof=1))) if len(values) > 1 else float("nan")

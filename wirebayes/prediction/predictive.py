@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from wirebayes.linear_algebra import eigh, solve
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem, Sample
+from wirebayes.typing import Floats
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model, Theta, Walk, linearise
 
-Array = NDArray[np.float64]
 _CHUNK = 500  # draws at a time: bounds the memory of the normal equations
 
 
@@ -42,12 +42,12 @@ class PredictionRequest:
     protocol: Protocol
     trained: int
     requested: NDArray[np.bool_]
-    first_N: Array
+    first_N: Floats
 
 
 def predict(
-    problem: Problem, theta: Array, sample: Sample, request: PredictionRequest, rng: np.random.Generator
-) -> Array:
+    problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: np.random.Generator
+) -> Floats:
     """Draws of the requested readings.
 
     Parameters
@@ -75,8 +75,8 @@ def predict(
 
 
 def _readings(
-    problem: Problem, theta: Array, sample: Sample, request: PredictionRequest, rng: np.random.Generator
-) -> Array:
+    problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: np.random.Generator
+) -> Floats:
     own, protocol = problem.parameters(theta, sample), request.protocol
     shape = (*protocol.time_s.shape, len(theta))
     error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution_N
@@ -86,7 +86,7 @@ def _readings(
     return np.where(request.requested[:, None, None], course + error, 0.0)
 
 
-def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np.random.Generator) -> Array:
+def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np.random.Generator) -> Floats:
     """Readings without sensor error along the chain of holds; trained holds appear as replicates.
 
     A replicate has a setting error of its own, while the creep carried on from a trained hold is the one that its
@@ -116,8 +116,8 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
     if trained:
         setting[:trained] = settings_given_readings(own, sample, rng)
     walk = Walk(protocol, own, sample.model)
-    creep: Array = np.zeros(n)
-    beside: dict[str, Array] = {}
+    creep: Floats = np.zeros(n)
+    beside: dict[str, Floats] = {}
     out = []
     for j in range(len(request.requested)):
         if j < trained and request.requested[j]:
@@ -131,7 +131,7 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
     return np.array(out)
 
 
-def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator) -> Array:
+def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator) -> Floats:
     """A draw of the setting errors of a sample's holds, unrecorded ones included, given all its readings.
 
     Parameters
@@ -164,11 +164,11 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
     eigen, vectors = eigh(square)
     precision = 1.0 + np.maximum(eigen, 0.0)
     along = np.einsum("nij,ni->nj", vectors, right) / precision + rng.normal(size=(n, holds)) / np.sqrt(precision)
-    drawn: Array = np.einsum("nij,nj->in", vectors, along) * own["setting_sd"]
+    drawn: Floats = np.einsum("nij,nj->in", vectors, along) * own["setting_sd"]
     return drawn
 
 
-def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: Array) -> Array:
+def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: Floats) -> Floats:
     """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
     given = request.first_N[:, None] - error[:, 0]
     out = np.zeros_like(error)
@@ -180,7 +180,7 @@ def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: A
     return out
 
 
-def _given_first(drawn: Array, request: PredictionRequest) -> Array:
+def _given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     """Condition a hold's readings on the first readings given up to it; a replicate on its own alone."""
     given = request.requested & np.isfinite(request.first_N)
     for j in np.flatnonzero(request.requested)[::-1]:
@@ -194,7 +194,7 @@ def _given_first(drawn: Array, request: PredictionRequest) -> Array:
     return drawn
 
 
-def _regressed(drawn: Array, first: Array, observed_N: Array) -> Array:
+def _regressed(drawn: Floats, first: Floats, observed_N: Floats) -> Floats:
     """Joint draws (R, n) moved to where `first` (m, n) takes its observed values (m,)."""
     centred = first - first.mean(axis=1, keepdims=True)
     square, across = centred @ centred.T, centred @ (drawn - drawn.mean(axis=1, keepdims=True)).T

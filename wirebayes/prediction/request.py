@@ -13,10 +13,9 @@ from wirebayes.io.experiment import protocol_of
 from wirebayes.io.readings import Hold, Table, protocol_holds, protocol_table, shown
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.store import Stored
+from wirebayes.typing import Floats
 from wirebayes.wire.effect import EventEffect
 from wirebayes.wire.protocol import Protocol
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -218,7 +217,7 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
     """One protocol after another, padded to the same width."""
     width = max(before.time_s.shape[1], after.time_s.shape[1])
 
-    def padded(array: NDArray[Any]) -> Array:
+    def padded(array: NDArray[Any]) -> Floats:
         return np.pad(array.astype(float), [(0, 0), (0, width - array.shape[1])])
 
     warming = None

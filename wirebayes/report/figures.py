@@ -7,14 +7,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from wirebayes.report.blocks import unit_text
 from wirebayes.results.store import unit_of
+from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 
-Array = NDArray[Any]
 CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
 COLOURS = {"chain": CHAIN, "hold": HOLD}
 WORDS = {"chain": "holds as one chain", "hold": "hold by hold"}

@@ -1,7 +1,6 @@
 """The unused holds predicted from the first ones, and how far the measurement lies from the prediction."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +9,10 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.likelihoods import hold_courses
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.results.store import Stored
+from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 
-Array = NDArray[Any]
 _DRAWS = 2000  # a 5 % quantile is then one between 4 % and 6 %
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wirebayes.inference.least_squares import Variant, at, residuals
 from wirebayes.io.experiment import Experiment
@@ -18,9 +17,9 @@ from wirebayes.report.blocks import number, svg
 from wirebayes.report.pictures import paper_figures
 from wirebayes.reproduce.held_out import HeldOut, last_hold_course, published_course, some
 from wirebayes.results.store import Stored
+from wirebayes.typing import Array
 from wirebayes.wire.laws import creep_fraction
 
-Array = NDArray[Any]
 INDEX = "index.json"
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes import __version__
 from wirebayes.inference.fit import seed_of
@@ -21,9 +20,9 @@ from wirebayes.reproduce.held_out import HeldOut, held_out
 from wirebayes.results.jobs import Job
 from wirebayes.results.jobs import run as run_jobs
 from wirebayes.results.store import Stored, load
+from wirebayes.typing import Array
 from wirebayes.workers import workers
 
-Array = NDArray[Any]
 Row = dict[str, Any]
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
 POLICY = Policy()

@@ -8,15 +8,14 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.model.problem import MATERIAL
 from wirebayes.results.contraction import MOST, contraction, interval
 from wirebayes.results.store import CREEP_TIMES_S, unit_of
+from wirebayes.typing import Array
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model
 
-Array = NDArray[Any]
 Verdict = Literal["inside", "outside", "not determined"]
 PRODUCT = "k1*B"  # the only combination that one hold alone determines
 

@@ -1,11 +1,11 @@
 """How much the readings taught about a quantity: posterior contraction, and the words for it."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
+
 Source = Literal["prior", "data and prior", "data"]
 LEAST, MOST = (
     0.3,

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 from arviz_stats.base import array_stats
-from numpy.typing import NDArray
 
 from wirebayes.inference.fit import Fit
 from wirebayes.model.prior import fast_logpdf
 from wirebayes.results.contraction import contraction, source
+from wirebayes.typing import Array
 from wirebayes.wire.fresh import FreshSample
 
-Array = NDArray[Any]
 SENSITIVE = 0.05  # the threshold that the authors of the method propose
 RIDGE = 0.9  # correlation above which two parameters are known in combination only
 _POWERS = (1.0 / 1.1, 1.1)  # so small that weights stay even, so large that the change exceeds the chance of 4000 draws

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
+
 FALSE_ALARMS = 0.05  # of materials whose specimens are all alike, the usual one in twenty has an outlier
 LEAST_SPECIMENS = 6  # with fewer, one would have to lie more than twelve spreads away to be called far
 MAD_TO_SD = 1.4826  # of a normal distribution

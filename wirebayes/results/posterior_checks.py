@@ -6,13 +6,11 @@ Before the fit `wirebayes.io.data_checks` looks at the readings alone.
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
 from wirebayes.model.problem import FINEST, Sample
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 LOOSE_STEPS = 0.5  # setting error over the typical step: the displacements hardly order the holds then
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise

@@ -13,7 +13,6 @@ import arviz_base
 import arviz_stats
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from wirebayes import __version__
 from wirebayes.effects import catalogue, named
@@ -26,12 +25,12 @@ from wirebayes.model.replicate import readings as replicate
 from wirebayes.results import posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability, to_dict
 from wirebayes.results.stored_check import check
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 
-Array = NDArray[Any]
 UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", "sensor_sd": "N",
          "setting_sd": "mm", LENGTH_EXPONENT: "1"}  # fmt: skip
 # a hold of the paper, and what a robot on the wire works through

@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.model.problem import Likelihood, Sample
+from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 
-Array = NDArray[Any]
 _LARGEST = 1e30  # no parameter, time or tension comes near, and its square does not overflow
 _ABOVE_ZERO, _NOT_BELOW = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
@@ -20,12 +19,12 @@ from wirebayes.io.readings import Hold, frozen
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
+from wirebayes.typing import Array
 from wirebayes.units import nearest
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import simulate, tension_reference
 
-Array = NDArray[Any]
 FILE, TRUTH = "experiments.toml", "truth.json"
 PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)  # when the paper read its holds
 

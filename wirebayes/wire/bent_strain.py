@@ -1,13 +1,10 @@
 """Elasticity with effects: the strain whose product with k1 is the tension, its slope, and the inverse."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.typing import Array
 from wirebayes.wire.effect import HoldContext, Placed
 
-Array = NDArray[Any]
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 
 

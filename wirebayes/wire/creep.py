@@ -4,15 +4,12 @@ The caller says under which tension the wire creeps and how time passes; this mo
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.typing import Array
 from wirebayes.wire import laws
 from wirebayes.wire.effect import HoldContext, Placed
-
-Array = NDArray[Any]
 
 
 class Creep:

@@ -12,17 +12,15 @@ Every material effect takes part, at whatever place of the model it acts. What b
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.typing import Array
 from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import HoldContext, Placed, steady_hold
 from wirebayes.wire.staircase import Model, Theta
 
-Array = NDArray[Any]
 _LOG_TIMES = -50.0, 700.0  # logarithms of the times between which the median creep time is looked for
 _HALVINGS = 60  # 750 over two to the 60th is less than rounding
 

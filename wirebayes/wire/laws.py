@@ -3,12 +3,12 @@
 Equation numbers are those of the paper the toolkit reproduces (see ``docs``).
 """
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
+
 ElasticLaw = Literal["hooke", "modified"]
 History = Literal["saturating", "additive"]
 

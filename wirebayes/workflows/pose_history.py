@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
@@ -14,12 +13,11 @@ from wirebayes.robot.history.answer import answer
 from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.typing import Floats
 from wirebayes.workflows.options import Progress, above_zero
 from wirebayes.workflows.results import Place, Pose
 from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import content, hash_of
-
-Floats = NDArray[np.float64]
 
 
 def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:

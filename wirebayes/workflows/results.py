@@ -10,20 +10,17 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
 from wirebayes.results import store
 from wirebayes.results.store import Stored
+from wirebayes.typing import Floats
 from wirebayes.workflows.options import PathLike
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
 IMPORTED, CHECKED = "import.json", "check.json"
 _MESSAGES = 20  # lines on standard error: what a terminal shows at once
@@ -160,7 +157,7 @@ class Posterior(Result):
         """Names of the experiments whose parameters it holds."""
         return store.experiments_in(self.folder / POSTERIOR)
 
-    def draws(self, experiment: str | None = None) -> dict[str, Array]:
+    def draws(self, experiment: str | None = None) -> dict[str, Floats]:
         """Draws of one experiment's parameters.
 
         Parameters

@@ -23,8 +23,7 @@ from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Learned, Pair, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 def init(

@@ -16,17 +16,13 @@ proposal would need fewer evaluations in total, they count as burn-in, and the p
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import DEFAULT, Policy, describe
 from wirebayes.inference.sampler import burn_in, kept, resume
 from wirebayes.inference.sampler.state import BurnIn, State
 from wirebayes.inference.transform import LogPosterior
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
 from wirebayes.inference.sampler.state import POOL, BurnIn, Diagnostics, Kept, Sampling, advance, move_of
 from wirebayes.inference.transform import LogPosterior
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:

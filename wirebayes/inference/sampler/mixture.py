@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
+
 DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.transport_map import Straight
-
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 class PoolMove(Move):  # type: ignore[misc]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.transport_map import Straight
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 SHARES = (0.72, 0.12, 0.12, 0.04)  # of the close part, the wide one, the plain one and the start's
 EXPLORING = (0.55, 0.2, 0.2, 0.05)  # while it learns: draws of the wide parts teach what lies far out
 ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time

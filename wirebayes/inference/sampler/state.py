@@ -10,14 +10,13 @@ from typing import Any
 import emcee
 import numpy as np
 from emcee.moves.move import Move
-from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 Pair = tuple[Array, Array]
 POOL = 64  # steps of which one does not trust the proposal; more gain little
 _EXPLORING = 3  # the same in burn-in, which looks for what the proposal leaves out

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-Array = NDArray[Any]
+from wirebayes.typing import Array
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ from wirebayes.io.bench.undecided import Choices, Decimal, Undecided, listed
 from wirebayes.io.experiment import Experiment, experiment_of
 from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
 from wirebayes.io.toml_keys import Keys
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _COLUMN_ROLES: dict[str, Role] = {
     "hold": "hold", "displacement_mm": "displacement", "time_s": "time", "tension_N": "tension",
     "temperature_C": "temperature",

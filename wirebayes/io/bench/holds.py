@@ -13,8 +13,8 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.plateaus import Plateau, noise_of, plateaus
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expected
 
 CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand

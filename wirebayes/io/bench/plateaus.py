@@ -7,9 +7,8 @@ more than noise would. Neighbours at one level are joined; segments that are sho
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 PENALTY = 4.0  # times the log of the readings: noise alone is then split less often than once in a hundred recordings
 SAME_LEVEL = 2.0  # noise levels between neighbours that are one hold

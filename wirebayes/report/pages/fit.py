@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.prediction.predictive import PredictionRequest, predict
@@ -29,9 +28,9 @@ from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pages.paper_summary import listed
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.store import Stored, experiments_in, load, prior_draws, unit_of
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
-Array = NDArray[Any]
 _DRAWS = 1000  # for bands in pictures: a 5 % quantile is then one between 3.6 % and 6.4 %
 _FILES = (
     ("*/summary.json", "intervals, convergence and the model check as JSON"),

@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wirebayes.io.bench.convert import Recording
 from wirebayes.io.experiment import Experiment
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim
 
-Array = NDArray[Any]
 _MOST_NUMBERS = 40  # holds that can all be numbered in a picture
 _MINUTES = 600.0  # s from which on an axis in minutes reads better
 

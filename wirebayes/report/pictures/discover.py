@@ -12,15 +12,14 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.model import likelihoods
 from wirebayes.report.blocks import save
 from wirebayes.results import store
+from wirebayes.typing import Array
 from wirebayes.wire.staircase import Linearised, linearise
 
-Array = NDArray[Any]
 _MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
 
 

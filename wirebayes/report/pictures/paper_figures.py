@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
 from wirebayes.report.figures import CHAIN, COLOURS, HOLD, INK, QUIET, WORDS, legend_below, logarithmic, panel
+from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
-
-Array = NDArray[Any]
 
 
 def intervals(rows: Sequence[Mapping[str, Any]], title: str) -> Figure:

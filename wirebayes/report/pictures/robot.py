@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from wirebayes.io.run_folder import write_json
@@ -19,8 +18,8 @@ from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.answer import Answer
 from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 CONTROLLERS = {
     "hooke_only": "ignores creep",
     "creep_aware": "compensates for creep",

@@ -14,8 +14,8 @@ from wirebayes.report.pictures.robot import platform_edges, round_factor
 from wirebayes.robot.history.answer import HistoryAnswer
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#8a6d5c", "#b0708e", "#6b7780")
 _PANELS, _FRAMES, _SECONDS = 5, 60, 12
 _OBLIQUE = np.array([[1.0, 0.45, 0.0], [0.0, 0.3, 1.0]])  # depth runs up to the right

@@ -1,15 +1,13 @@
 """Pictures that put several lines on one robot: drift against time, and where its uncertainty comes from."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wirebayes.report.figures import CHAIN, HOLD, INK, legend_below, panel
+from wirebayes.typing import Array
 
-Array = NDArray[Any]
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#b9bec4")
 
 

@@ -4,13 +4,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wirebayes.report.figures import INK, QUIET
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S, WorkspaceDrift
 from wirebayes.robot.pose.maps import Map
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]:

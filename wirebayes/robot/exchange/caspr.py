@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.exchange.imported import ImportedRobot
 from wirebayes.robot.exchange.xml_file import Element
 from wirebayes.robot.mechanics.description import Freedom
 from wirebayes.robot.mechanics.rotation import matrix, vector
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _JOINTS: dict[str, tuple[Freedom, tuple[int, ...]]] = {  # freedom, and the axes that the first coordinates move along
     "SPATIAL_EULER_XYZ": ("pose", (0, 1, 2)),
     "T_XYZ": ("position", (0, 1, 2)),

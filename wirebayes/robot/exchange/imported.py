@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Freedom
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _SHARE = 0.15  # of the exit points' extent, to each side of the home pose: the box of workspace figures
 
 

@@ -7,13 +7,12 @@ pulley's radius: the pulley of `mechanics.pulleys`. The file has neither bounds 
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.exchange.imported import ImportedRobot
 from wirebayes.robot.exchange.xml_file import Element
 from wirebayes.robot.mechanics.description import Freedom
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _PATTERNS: dict[str, Freedom] = {"3R3T": "pose", "3T": "position"}
 
 

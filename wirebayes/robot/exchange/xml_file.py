@@ -7,12 +7,10 @@ from typing import Any
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.typing import Floats
 from wirebayes.user_files import read_bytes
-
-Floats = NDArray[np.float64]
 
 
 @dataclass

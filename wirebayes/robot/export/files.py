@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.robot.export.mujoco_model import mjcf
@@ -21,9 +20,9 @@ from wirebayes.robot.mechanics.drums import motor_angle, paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.robot.motion import inverse
+from wirebayes.typing import Floats
 from wirebayes.wire.fresh import FreshSample
 
-Floats = NDArray[np.float64]
 LETTERS = "ABCDEFGHI"
 TABLE = ("tension_N", "time_s", "mean_mm_per_m", "sd_mm_per_m", "q05_mm_per_m", "q50_mm_per_m", "q95_mm_per_m")
 

@@ -12,12 +12,11 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.rotation import matrix, vector
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _STILL = "pulleys do not swivel: they look towards the home pose; lengths and forces are the robot's there"
 
 

@@ -8,12 +8,10 @@ comment.
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 def urdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:

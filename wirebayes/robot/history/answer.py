@@ -24,8 +24,8 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.request import band
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model

@@ -13,8 +13,8 @@ from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _STRAIGHT = 0.02  # of the robot's span: over so short a way, even joint values make an even motion
 
 

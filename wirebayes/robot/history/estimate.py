@@ -13,8 +13,8 @@ from wirebayes.robot.history.unknowns import Uncertain, Unknowns, slopes, unknow
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, float, float], None]
 _MOST = 8  # Gauss-Newton passes to the mode
 _ASTRAY = 3.0  # posterior sd: a draw that would still have to move so far is none of the posterior

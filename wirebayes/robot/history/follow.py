@@ -11,8 +11,8 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.motion.drift import Walk
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 # Share of the mean tension by which a command must change a wire's tension to start the clocks anew. On the paper's
 # bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.
 RESTART = 0.1

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

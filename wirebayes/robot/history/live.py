@@ -22,8 +22,8 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, path
 from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _LONG = 5e-2  # of the platform's size: a longer Newton step is followed with care instead
 _AGAIN = 5e-3  # of the platform's size: after a shorter one, less than a micrometre is left
 _SHARE, _SHORT_S = 0.2, 1.0  # a step may last so much of its hold's age, and so long in any case

@@ -15,10 +15,10 @@ from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.typing import Floats
 from wirebayes.units import nearest
 from wirebayes.user_files import read_text
 
-Floats = NDArray[np.float64]
 POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
 TILT = ("roll_deg", "pitch_deg")

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from wirebayes.robot.history.follow import uncreeping
@@ -11,8 +10,8 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import CORE, WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.self_calibration.session import OWN, Prior
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _STEP = 0.05  # of a prior sd: far above the solver's error, and poses are straight over it
 _EXACT_M = 1e-6  # a length that is said to be exact is known to a micrometre
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 def solve(H: list[list[Floats]], right: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
+
 Actuator = Literal["drum", "linear"]
 Freedom = Literal["pose", "position"]
 GRAVITY = 9.80665  # m/s^2, standard

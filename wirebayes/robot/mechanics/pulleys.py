@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Pulleys
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _LEAST = 1e-3  # of the radius: a point nearer to the rim has no tangent worth the name, and nearer to the axis no plane
 
 

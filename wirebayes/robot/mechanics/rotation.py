@@ -1,9 +1,8 @@
 """Rotations as matrices and rotation vectors, batched along the leading axes."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 def matrix(rotation_vector_rad: Floats) -> Floats:

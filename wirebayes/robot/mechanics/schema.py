@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics.description import Drums, GivenWire, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.tensions import CHOICES
+from wirebayes.typing import Floats
 from wirebayes.user_files import read_text
 
-Floats = NDArray[np.float64]
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
 
 

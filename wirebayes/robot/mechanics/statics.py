@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.pulleys import WireRun, run
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ A choice takes wrench matrix, wrench, lowest and highest tension and returns ten
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
+
 Choice = Callable[[Floats, Floats, float, float], Floats | None]
 
 

@@ -11,8 +11,8 @@ from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
 
 

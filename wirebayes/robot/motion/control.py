@@ -11,8 +11,8 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, inverse
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 Schedule = Callable[[float], Floats]
 
 

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.wires import Wires, hold_context
+from wirebayes.typing import Floats
 from wirebayes.wire.creep import Creep
 
-Floats = NDArray[np.float64]
 Follow = Literal["current", "start"]
 
 

@@ -10,8 +10,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, path
 from wirebayes.robot.motion.creep import CreepState, Follow, HoldCreep, fresh
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

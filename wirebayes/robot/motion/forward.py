@@ -14,8 +14,8 @@ from wirebayes.robot.mechanics import cholesky, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
 _GOING_ON = -1  # of a case that is still being solved
 STATUS = {

@@ -9,8 +9,7 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import CHOICES, Choice
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, zero_tension_length
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

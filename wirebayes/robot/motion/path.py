@@ -15,8 +15,8 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
 _TRUST = 0.5  # a step that ends further from its prediction, relative to its length, is divided
 _SMALL = 1e-7  # of the platform's size: so short a Newton step leaves only rounding

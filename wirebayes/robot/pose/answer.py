@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics import draws, drums, statics
 from wirebayes.robot.mechanics import rotation as turning
@@ -17,8 +16,7 @@ from wirebayes.robot.pose import controllers, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
 from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.description import Robot
@@ -12,7 +11,6 @@ from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.robot.pose.request import PoseRequest, band
 
-Floats = NDArray[np.float64]
 HISTORIES_S = (0.0, 3600.0)  # under load before the calibration: new wires, and an hour
 # to 28 h, eight a decade: the time within tolerance is a point of this grid, at most a quarter too short
 _SINCE_S = np.concatenate([[0.0], np.geomspace(1.0, 1e5, 41)])

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.description import Robot
@@ -12,8 +11,8 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim
 from wirebayes.robot.motion.claim import WorkspaceDrift
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 _GRID, _FLAT, _DRAWS = (7, 7, 3), (9, 9, 9), 60  # points of the map; of a workspace in one plane
 TABLE = (
     "rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m", "held", "q05_drift_mm", "q50_drift_mm", "q95_drift_mm",

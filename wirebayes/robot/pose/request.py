@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
 from wirebayes.robot.pose.maps import LEVEL, Slices
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}  # the median and the 90 % interval, as everywhere
 
 

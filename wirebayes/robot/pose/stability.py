@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from wirebayes.robot.motion.drift import Course, Falls
 from wirebayes.robot.pose.request import band
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these
 
 

@@ -10,9 +10,8 @@ from itertools import combinations
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 def shares(parameters: Mapping[str, Floats], output: Floats) -> dict[str, float]:

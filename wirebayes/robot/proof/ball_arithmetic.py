@@ -7,12 +7,11 @@ edge. Where a wire may go slack its slope is the hull of both sides: the mean va
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
-Floats = NDArray[np.float64]
 Bounds = tuple[Floats, Floats]  # lower and upper, (w,) each
 
 

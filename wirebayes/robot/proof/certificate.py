@@ -6,13 +6,11 @@ Krawczyk's operator on the balance of forces and moments (`balance`). For parame
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.proof.ball_arithmetic import Balance, Bounds
+from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

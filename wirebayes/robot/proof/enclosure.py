@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward
 from wirebayes.robot.proof.certificate import Certificate, certify
 from wirebayes.robot.proof.reach import Reach
+from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -11,9 +10,9 @@ from wirebayes.robot.motion import control, forward, inverse
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.proof.certificate import certify
 from wirebayes.robot.proof.reach import Reach, apart, reach
+from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
-Floats = NDArray[np.float64]
 _Pose = tuple[Floats, Floats, Floats]  # position, rotation, and how exactly they are known
 _STEP = 0.1  # how far, of the whole creep, wires may be out of step
 SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of the bands, the largest that can be proved

@@ -7,14 +7,13 @@ line: tensions then stay apart from slackness where a plain box of poses and len
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.proof.ball_arithmetic import Balance
+from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
-Floats = NDArray[np.float64]
 _UP = 1.0 + 1e-12  # more than the few roundings of a sum
 
 

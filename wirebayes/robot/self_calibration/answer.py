@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from wirebayes.robot.mechanics import drums, rotation
@@ -13,8 +12,8 @@ from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
 from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 CANDIDATES, NEXT = 200, 5
 
 

@@ -16,8 +16,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
 from wirebayes.robot.self_calibration.start import start
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

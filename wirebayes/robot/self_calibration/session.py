@@ -15,8 +15,8 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 OWN = ("k1", "B", "k2")  # what differs from specimen to specimen
 
 

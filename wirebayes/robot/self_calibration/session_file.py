@@ -13,9 +13,9 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration.session import Session
+from wirebayes.typing import Floats
 from wirebayes.user_files import read_text
 
-Floats = NDArray[np.float64]
 POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
 

@@ -5,7 +5,6 @@ almost linear in pose and lengths, and every pose must balance the measured tens
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.linear_algebra import solve
 from wirebayes.robot.mechanics import rotation, statics
@@ -13,8 +12,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import stretched_length
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Prior, Session, predict
-
-Floats = NDArray[np.float64]
+from wirebayes.typing import Floats
 
 
 def start(robot: Robot, prior: Prior, session: Session, readings: Floats, iterations: int = 12) -> Floats:
