@@ -1,8 +1,8 @@
 """A fitted wire for people who run such robots: firmware settings with intervals, and a table of creep.
 
-Hangprinter firmware models a line as a spring of ``constant / length`` with the length in mm, so its constant is k1
-in newtons. It knows no creep: the table beside it says how much each line will have grown. Where the line's stiffness
-changes with its tension, firmware and simulator get the tangent at the tensions the robot works at.
+Hangprinter firmware models a line as a spring of ``constant / length`` with the length in mm, so its constant is k1 in
+newtons. It ignores creep: the table beside it says how much each line will have grown. Where the line's stiffness
+changes with its tension, firmware and simulator get the tangent at the tensions at which the robot works.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Reads a robot's TOML file, strictly: every key known, every number finite, every complaint one line."""
+"""Reads a robot's TOML file, strictly: every key known, every number finite, every error one line."""
 
 import math
 import os

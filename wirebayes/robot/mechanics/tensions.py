@@ -1,6 +1,6 @@
-"""Which tensions a redundant robot is meant to have: choices with one face, swapped by name or by a user's function.
+"""The tensions that a redundant robot is meant to have: rules with one interface, by name or as a user's function.
 
-A choice takes wrench matrix, wrench, lowest and highest tension and returns tensions, or None where none fit.
+A rule takes wrench matrix, wrench, lowest and highest tension and returns tensions, or None where none fit.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The wires of a robot: elastic law with whatever effects bend it, and what creep needs, one value a leg and draw.
+"""The wires of a robot: elastic law with its effects, and what creep needs, one value per leg and draw.
 
 Arrays are batch-last: ``(w, n)`` or anything that broadcasts to it. Lengths in metres, tensions in newtons.
 """

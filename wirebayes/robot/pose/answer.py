@@ -1,4 +1,4 @@
-"""Everything `pose` answers about one robot, one line and one pose, as plain numbers with bands."""
+"""Everything that `pose` reports about one robot, one line and one pose, as plain numbers with bands."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""What to say of falls: how probable, when, by which wire, and how near a platform that holds comes to one."""
+"""Reports of falls: how probable, when, by which wire, and how close a platform that holds comes to one."""
 
 from typing import Any
 

@@ -1,7 +1,8 @@
 """Forces and moments on a platform in ball arithmetic by FLINT (extra ``certificate``), for proofs.
 
-A pose is a displacement and Cayley's three numbers of a turn from the pose in question, all in metres at the platform's
-edge. Where a wire may go slack its slope is the hull of both sides: the mean value theorem holds, and so do proofs.
+A pose is a displacement and the three Cayley parameters of a rotation from the commanded pose, all in metres at the
+platform's edge. Where a wire may go slack its slope is the hull of both sides: the mean value theorem holds, and so do
+proofs.
 """
 
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""What interval arithmetic proves of a robot at a pose: one equilibrium, and a box that holds it for all wires."""
+"""What interval arithmetic proves about a robot at a pose: a single equilibrium, and a box of it for all wires."""
 
 from typing import Any
 

@@ -1,7 +1,7 @@
 """A guaranteed box for the pose while stiffness and lengths vary, each wire on its own or several together.
 
-The pose follows the parameters almost linearly, so Krawczyk's operator is applied only to what is left beside that
-line: tensions then stay apart from slackness where a plain box of poses and lengths would mix up all of them.
+The pose depends on the parameters almost linearly, so Krawczyk's operator is applied only to the remainder of that
+linear map: tensions then stay apart from slackness where a plain box of poses and lengths would mix up all of them.
 """
 
 from dataclasses import dataclass

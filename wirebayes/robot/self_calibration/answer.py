@@ -1,4 +1,4 @@
-"""Everything `calibrate` answers: lengths with intervals, what Hooke alone says, what cannot be seen, what next."""
+"""Everything that `calibrate` reports: lengths with intervals, Hooke alone, what cannot be observed, what next."""
 
 from dataclasses import replace
 from typing import Any

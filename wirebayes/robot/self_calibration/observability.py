@@ -1,4 +1,4 @@
-"""What tension readings can say about zero-tension lengths: sensitivities, rank, a sentence, and better poses."""
+"""What tension readings determine about zero-tension lengths: sensitivities, rank, a sentence, and better poses."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Reads a calibration session from CSV, strictly: a row a hold, complaints with line and column."""
+"""Reads a calibration session from CSV, strictly: one row per hold, errors with line and column."""
 
 import csv
 import io

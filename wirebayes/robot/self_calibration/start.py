@@ -1,7 +1,7 @@
-"""A first guess of reference lengths that no slack wire can mislead.
+"""A first guess of reference lengths that slack wires cannot mislead.
 
-A measured tension tells how far a wire is stretched; so every reading closes a loop "stretched length = distance",
-almost linear in pose and lengths, and every pose must balance the measured tensions.
+A measured tension says how far a wire is stretched; so every reading closes a loop "stretched length = distance",
+almost linear in pose and lengths, and the measured tensions must balance at every pose.
 """
 
 import numpy as np
