@@ -62,8 +62,8 @@ def test_the_same_effect_under_two_names_makes_it_no_likelier() -> None:
 
 
 def test_materials_are_judged_each_by_what_acts_there() -> None:
-    acting = {"a": np.array([1.0, 0.0])}
-    sets = [EffectSet((), 0.0, {}, np.array([-20.0, 6.0])), EffectSet(("a",), 30.0, acting, np.array([-20.0, 6.0]))]
+    presence = {"a": np.array([1.0, 0.0])}
+    sets = [EffectSet((), 0.0, {}, np.array([-20.0, 6.0])), EffectSet(("a",), 30.0, presence, np.array([-20.0, 6.0]))]
     found = posterior(sets, *log_weights(sets, 20, {}), blocks=2)
     assert found.inclusion["a"] == pytest.approx([1.0, 0.0])
     # a remainder in the second of two materials: half of the weight for one of them, a quarter for this one

@@ -103,7 +103,7 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     )  # fmt: skip
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["grip_slip"] == pytest.approx(9.0 - np.log(12.0), abs=1e-3)
-    assert found.winners["grip_slip"][0].effect.hold == 7 and found.acting["grip_slip"] == pytest.approx([1.0])
+    assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
 
 
 @pytest.mark.parametrize("one_sided", [True, False])

@@ -52,7 +52,7 @@ _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the
 _LARGE = 1e200  # above any sum of squares, and its square root finite
 _PIECE = 64  # rows weighed at once: what stays in the cache
 _FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
-_ENOUGH = 6  # simulations as high at which no more are asked for
+_ENOUGH = 6  # simulations as high at which no more are made
 _TRIED = 3  # names
 _LEVEL = 0.95  # of chance, above which a name is worth a try
 
@@ -389,7 +389,7 @@ def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: i
     gram = whole[:, None] - gram
     # Not less what a further step promises: far out, steps promise more than they keep.
     rss, mm = gram[..., -1, -1].copy(), gram[..., p, p].copy()
-    # One Cholesky factor tells the volume, and of signature and residual what the parameters leave. Its last two pivots
+    # One Cholesky factor gives the volume, and what the parameters leave of signature and residual. Its last two pivots
     # need only be positive: the one is taken back, the other not used.
     added = np.where(mm > 0, mm, 1.0)
     gram[..., p, p] += added
@@ -471,7 +471,7 @@ def strengths(ways: Sequence[AmplitudePath], climbed: Sequence[Mapping[int, Clim
 class Continuation:
     """The global test with every effect led up its ladder, in the data and in the simulations alike.
 
-    The test may be asked again with more simulations: what has been climbed is kept.
+    The test may be repeated with more simulations: paths already computed are kept.
 
     Parameters
     ----------

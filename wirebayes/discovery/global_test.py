@@ -27,7 +27,7 @@ PLAIN_TO_SEE = 0.002  # p of the linear scan at which no test from larger effect
 # Risk on either side that a p on the level itself gives so few, or so many, exceedances: three standard errors, as the
 # ranks of names add some error to the binomial one.
 CLOSE = 0.00135
-MOST_TIMES = 4  # as many simulations at the most, in units of those asked for
+MOST_TIMES = 4  # as many simulations at most, in units of the requested number
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def examine(
     kinds : mapping of name to effect class
         Which effects the test looks for, beside a smooth discrepancy.
     simulations : int
-        Refitted data sets behind the p-value; up to `MOST_TIMES` as many where p is too close to `alpha` to tell.
+        Refitted data sets behind the p-value; up to `MOST_TIMES` as many where p is too close to `alpha` to decide.
     rng : numpy Generator
     alpha : float
         The level p will be compared with.

@@ -109,7 +109,7 @@ class Tangent:
 
     @property
     def least(self) -> Array:
-        """(n,) below which no sum of squares is believed."""
+        """(n,) below which a sum of squares counts as rounding error."""
         return np.asarray(self.degrees * np.maximum(self.floor, _LEAST_NOISE))
 
     @property
@@ -417,7 +417,7 @@ class _Projected:
     Attributes
     ----------
     shared : (n, k)
-        Log volume of setting errors and parameters; -inf where the parameters cannot be told apart.
+        Log volume of setting errors and parameters; -inf where the parameters cannot be distinguished.
     rss : (n, k)
         Of the residual with itself, the prior's square included.
     along, square : (n, k, m)
@@ -447,7 +447,7 @@ def _project(x: Expansion) -> _Projected:
     gram[..., :p] += x.prior_precision[:, None]
     gram[..., p] += x.prior_gradient[:, None]
     factor = cholesky(gram[..., :p])
-    # There may be a ratio at which the parameters cannot be told apart: it is left out.
+    # There may be a ratio at which the parameters cannot be distinguished: it is left out.
     regular = np.isfinite(factor).all(axis=(2, 3))
     factor[~regular] = np.eye(p)
     # What the parameters take of each column, in coordinates in which it is a sum of squares.

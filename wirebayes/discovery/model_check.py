@@ -119,7 +119,7 @@ def check_model(
     alpha : float
         See `level`.
     simulations : int
-        Refitted data sets behind p; more where p is too close to `alpha` to tell.
+        Refitted data sets behind p; more where p is too close to `alpha` to decide.
     parallel_map : function, optional
         The built-in `map`, or one over processes.
     """

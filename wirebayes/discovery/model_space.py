@@ -25,15 +25,15 @@ class EffectSet:
         Largest share of the disagreement first; empty for the plain model.
     log_bayes : float
         Against the plain model, without remainder.
-    acting : dict of name to (b,) array
-        Probability that the effect acts on each material, given the set.
+    presence : dict of name to (b,) array
+        Probability that the effect is present in each material, given the set.
     remainder : (b,) array or None
         Log Bayes factor of a remainder in each material, beside the set; None where it was not looked for.
     """
 
     names: tuple[str, ...]
     log_bayes: float
-    acting: Mapping[str, Array]
+    presence: Mapping[str, Array]
     remainder: Array | None
 
     @property
@@ -146,7 +146,7 @@ def posterior(sets: Sequence[EffectSet], without: Array, beside: Array, blocks: 
         remainder += more * remains
         idle = np.ones(blocks)  # no effect before acts here
         for name in s.names:
-            acts = s.acting[name]
+            acts = s.presence[name]
             inclusion[name] = inclusion.get(name, np.zeros(blocks)) + (bare + more) * acts
             for b in range(blocks):
                 shares[b][name] = shares[b].get(name, 0.0) + float((bare + more) * idle[b] * acts[b])

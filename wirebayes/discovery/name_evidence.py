@@ -44,13 +44,13 @@ class NameEvidence:
     winners : dict of name to list of Refit
         Of its best form: one refit, or one for each block that has an amplitude of its own. Only names that were
         refitted.
-    acting : dict of name to (b,) array
-        Probability that the effect acts on each block, given that it is there.
+    presence : dict of name to (b,) array
+        Probability that the effect is present in each block, given that it is missing at all.
     """
 
     log_bayes: dict[str, float]
     winners: dict[str, list[Refit]]
-    acting: dict[str, Array]
+    presence: dict[str, Array]
 
     def amplitudes(self, name: str) -> dict[int, Refit]:
         """Refit of a name by block."""
@@ -139,19 +139,19 @@ def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int, 
         pairs = zip(refits, form.linear, strict=True)
         values = np.array([linear if r is None else r.log_bayes + correction(r) for r, linear in pairs])
         total, each, chosen = over_subsets(values)
-        acting = np.zeros(blocks)
+        presence = np.zeros(blocks)
         for share, (_, on) in zip(each, form.places, strict=True):
-            acting[list(on)] = share
+            presence[list(on)] = share
         winners = [refits[i] for i in chosen]
         kept = [r for r in winners if r is not None] if all(r is not None for r in winners) else []
-        parts.setdefault(form.effect.name, []).append((total, acting, kept))
-    log_bayes, winners_, acting_ = {}, {}, {}
+        parts.setdefault(form.effect.name, []).append((total, presence, kept))
+    log_bayes, winners_, presence_ = {}, {}, {}
     for name, options in parts.items():
         totals = np.array([total for total, _, _ in options])
         log_bayes[name] = float(logsumexp(totals) - np.log(len(totals)))
         share = np.exp(totals - logsumexp(totals))
-        acting_[name] = np.sum([s * acting for s, (_, acting, _) in zip(share, options, strict=True)], axis=0)
+        presence_[name] = np.sum([s * presence for s, (_, presence, _) in zip(share, options, strict=True)], axis=0)
         refitted = [option for option in options if option[2]]
         if refitted:
             winners_[name] = max(refitted, key=lambda option: option[0])[2]
-    return NameEvidence(log_bayes, winners_, acting_)
+    return NameEvidence(log_bayes, winners_, presence_)

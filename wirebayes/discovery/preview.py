@@ -26,7 +26,7 @@ UNUSUAL = 2.0  # standard deviations of an effect's prior: few wires show it as 
 
 @dataclass(frozen=True)
 class Preview:
-    """What a test can tell.
+    """What a test can determine.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Preview:
 
 
 def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> Preview:
-    """Fit the plain model roughly and see what the test would tell.
+    """Fit the plain model roughly and see what the test would determine.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from wirebayes.typing import Amplitude, Answer, ExperimentFindings, HeldOutRepor
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
 
-_VISIBLE = 0.05  # p of a residual pattern that is told of the remainder
+_VISIBLE = 0.05  # p of a residual pattern that is reported of the remainder
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def investigate(
     settings : Settings
     seed : int
     report : function of (what, done, total)
-        Told as the work goes on.
+        Called as the work proceeds.
     parallel_map : function, optional
         The built-in `map`, or one over processes (`wirebayes.workers`); the findings are the same.
 
@@ -236,7 +236,7 @@ class _Answer:
     inclusion : dict
     remainder : dict
     nothing : float or None
-        Probability that nothing is missing; None where only the global test was asked.
+        Probability that nothing is missing; None where only the global test was requested.
     """
 
     verdict: Verdict

@@ -47,7 +47,7 @@ MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 3, 0.05  # undecided models sampled besid
 
 @dataclass(frozen=True)
 class Settings:
-    """What is asked.
+    """The settings of a search.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Settings:
     kinds : mapping of name to effect class
         The catalogue searched.
     simulations : int
-        Refitted data sets behind the p-value; more where it lies too close to the level to tell.
+        Refitted data sets behind the p-value; more where it is too close to the level to decide.
     """
 
     law: ElasticLaw = "hooke"

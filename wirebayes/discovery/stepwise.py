@@ -127,8 +127,8 @@ class _Frontier:
         key = frozenset(names)
         value = parent.log_bayes + found.log_bayes[name]
         if key not in self.known or (key not in self.fitted and self.known[key].log_bayes < value):
-            acting = {**parent.acting, name: found.acting[name]}
-            self.known[key] = EffectSet(names, value, acting, None)
+            presence = {**parent.presence, name: found.presence[name]}
+            self.known[key] = EffectSet(names, value, presence, None)
             self.parents[key] = parent.key, name
         self.credit[key] = max(self.credit.get(key, -np.inf), credit)
 
@@ -190,7 +190,7 @@ def explore(
             known = frontier.known[key]
             beside = float(np.maximum(new.effects.remainder, 0.0).sum())
             done[key] = FittedSet(
-                EffectSet(known.names, known.log_bayes, known.acting, new.effects.remainder),
+                EffectSet(known.names, known.log_bayes, known.presence, new.effects.remainder),
                 new.blocks, new.accepted, new.further, new.scanned,
             )  # fmt: skip
             frontier.known[key] = done[key].effects

@@ -220,7 +220,7 @@ def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, par
 def _more_beside(sets: Sequence[EffectSet], beside: Array, i: int, extra: float) -> Array:
     """Log weights with more for a remainder beside set `i`, or for a remainder alone.
 
-    What is left beside a name may mean that it is the wrong name: the smooth remainder tells whether the name is needed
+    What is left beside a name may mean that it is the wrong name: the smooth remainder shows whether the name is needed
     where one is in the model anyway, so the two share in proportion to their weights there.
     """
     alone = next(k for k, s in enumerate(sets) if not s.names)
@@ -252,10 +252,10 @@ def verdict_of(decision: Decision, block: int) -> tuple[Verdict, list[Accepted]]
     if found.remainder[block] > REMAINS:
         sure = established(decision, block)
         return ("partial", sure) if sure else ("unknown", [])
-    acting = [] if decision.best is None else [a for a in decision.best.accepted if block in a.blocks]
-    if not acting:
+    present = [] if decision.best is None else [a for a in decision.best.accepted if block in a.blocks]
+    if not present:
         return "unknown", []
-    return "named" if len(smallest_set(shares)) == 1 else "ambiguous", acting
+    return "named" if len(smallest_set(shares)) == 1 else "ambiguous", present
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
 from wirebayes.report.blocks import Page, View
 
-# who knows how to tell a command's results; each module has ``page(folder, configuration)``
+# who can show a command's results; each module has ``page(folder, configuration)``
 _TELLERS = {
     "reproduce": "wirebayes.report.pages.reproduce",
     "import": "wirebayes.report.pages.check",
