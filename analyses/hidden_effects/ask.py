@@ -15,37 +15,43 @@ from typing import Any
 from .cases import Spec, build
 
 BASELINES = ("bic", "sparse", "flexible")
-ANSWERERS = ("api", "cli", *BASELINES)
+ANSWERERS = ("api", "apart", "cli", *BASELINES)
 
 
-def ask(spec: Spec, cases: Path, how: str) -> dict[str, Any]:
+def ask(spec: Spec, cases: Path, how: str, simulations: int | None = None) -> dict[str, Any]:
     """The answer to a case: `key`, `seconds`, `answer` (as discovery.json) or `error`.
 
     Parameters
     ----------
     cases : folder of the experiment files.
-    how : `api` (Python), `cli` (command line) or a baseline.
+    how : `api` (Python), `apart` (Python, each experiment of a file alone), `cli` (command line) or a baseline.
+    simulations : refitted data sets behind the p-value, if not as many as usual; not for `cli` and baselines.
     """
     begin = time.perf_counter()
     record: dict[str, Any] = {"key": spec.key, "answer": None, "error": None}
     try:
         without = spec.names if spec.kind == "without" else ()
-        record["answer"] = _answer(spec, cases / spec.key / "experiment.toml", how, without)
+        record["answer"] = _answer(spec, cases / spec.key / "experiment.toml", how, without, simulations)
     except Exception:  # a judged program that falls over is a result, not the end of the benchmark
         record["error"] = traceback.format_exc()[-2000:]
     record["seconds"] = round(time.perf_counter() - begin, 2)
     return record
 
 
-def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...]) -> dict[str, Any]:
+def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...], simulations: int | None) -> dict[str, Any]:
     seed = int(spec.key, 16) % 2**31
-    if how == "api":
+    if how in ("api", "apart"):
         from wirebayes.discovery.search import discover
         from wirebayes.io.experiment import read_experiments
 
         # posteriors are not judged here and cost minutes: left out where the function offers to
-        options = {"posterior": False} if "posterior" in inspect.signature(discover).parameters else {}
-        return dict(discover(read_experiments(file), without=without, seed=seed, **options))
+        options: dict[str, Any] = {"posterior": False} if "posterior" in inspect.signature(discover).parameters else {}
+        options |= {} if simulations is None else {"simulations": simulations}
+        experiments = read_experiments(file)
+        materials = {e.material: [x for x in experiments if x.material == e.material] for e in experiments}
+        asked = [experiments] if how == "api" else list(materials.values())
+        answers = [discover(members, without=without, seed=seed, **options) for members in asked]
+        return answers[0] | {"experiments": {k: v for a in answers for k, v in a["experiments"].items()}}
     if how == "cli":
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-m", "wirebayes", "discover", str(file), "--output", f"{folder}/out"]

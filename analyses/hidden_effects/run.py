@@ -23,7 +23,7 @@ from .fitting import held_out_mask, last_third, oracle
 from .optimal import judge
 from .truth import PROTOCOLS
 
-Job = tuple[Spec, str, str]
+Job = tuple[Spec, str, str, int | None]
 
 
 def read_lines(path: Path) -> dict[str, dict[str, Any]]:
@@ -52,17 +52,17 @@ def append_line(path: Path, record: dict[str, Any]) -> None:
 
 
 def _seal(job: Job) -> dict[str, Any]:
-    spec, folder, _ = job
+    spec, folder, *_ = job
     return {"key": spec.key, "within_reach": seal(spec, Path(folder) / "cases", Path(folder) / "sealed")}
 
 
 def _ask(job: Job) -> dict[str, Any]:
-    spec, folder, how = job
-    return ask(spec, Path(folder) / "cases", how)
+    spec, folder, how, simulations = job
+    return ask(spec, Path(folder) / "cases", how, simulations)
 
 
 def _judge(job: Job) -> dict[str, Any]:
-    spec, _, _ = job
+    spec, *_ = job
     case = build(spec)
     assert case is not None
     result = judge(case)
@@ -118,6 +118,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--stage", choices=("cases", "ask", "score", "all"), default="all", help="stop after this stage")
     p.add_argument("--output", type=Path, default=Path("out/hidden_effects"))
     p.add_argument("--workers", type=int, default=2)
+    p.add_argument("--simulations", type=int, help="refitted data sets behind a p-value instead of the usual number")
     p.add_argument("--scheduler", help="address of a Dask scheduler; its workers share this checkout and --output")
     p.add_argument("--seed", type=int, default=0, help="another seed makes other cases of the same plan")
     return p
@@ -147,7 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     folder: Path = options.output
     wanted = chosen_specs(options)
-    jobs = [(spec, str(folder), "") for spec in wanted]
+    jobs: list[Job] = [(spec, str(folder), "", None) for spec in wanted]
     reach = folder / "reach.jsonl"
     work("cases", jobs, read_lines(reach), reach, _seal, options.workers, options.scheduler)
     within = {key for key, record in read_lines(reach).items() if record["within_reach"]}
@@ -158,12 +159,20 @@ def main(arguments: list[str] | None = None) -> int:
     for how in options.answer:
         path = folder / "answers" / f"{how}.jsonl"
         answered = [key for key, record in read_lines(path).items() if record["error"] is None]
-        work(how, [(s, f, how) for s, f, _ in jobs], answered, path, _ask, options.workers, options.scheduler)
+        work(
+            how,
+            [(s, f, how, options.simulations) for s, f, *_ in jobs],
+            answered,
+            path,
+            _ask,
+            options.workers,
+            options.scheduler,
+        )
     if options.stage == "ask":
         return 0
     judged = folder / "judged.jsonl"
     work("judge", jobs, read_lines(judged), judged, _judge, options.workers, options.scheduler)
-    keys = [spec.key for spec, _, _ in jobs]
+    keys = [spec.key for spec, *_ in jobs]
     truths = {key: json.loads((folder / "sealed" / f"{key}.json").read_text(encoding="utf-8")) for key in keys}
     lost = [spec for spec in wanted if spec.key not in within]
     results = {
