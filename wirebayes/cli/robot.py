@@ -8,7 +8,12 @@ import typer
 from wirebayes.cli.options import AsJson, ExperimentName, Output, OwnEffects, Quiet, Seed
 
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
-Wires = Annotated[Path, typer.Option("--wires", metavar="FOLDER", help="A folder with a posterior.nc.")]
+Wires = Annotated[
+    list[str],
+    typer.Option(
+        "--wires", metavar="FOLDER", help="A folder with a posterior.nc; NAME=FOLDER for each of several wires."
+    ),
+]
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]
 TensionError = Annotated[
     float, typer.Option("--tension-sd", metavar="N", help="Standard error of a tension, in newtons.")
@@ -74,10 +79,11 @@ def pose(
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.pose import pose as run
+    from wirebayes.workflows.wires import named_lines
 
     with progress() as report:
         found = run(
-            robot, wires, position=position, rotation=rotation, times=times, tolerance=tolerance,
+            robot, named_lines(wires), position=position, rotation=rotation, times=times, tolerance=tolerance,
             tolerance_tilt=tolerance_tilt, specimen_spread=spread, map_heights=map_heights,
             map_rotations=map_rotation, other_fit=other_fit, joints=joints, trajectory=trajectory, payload=payload,
             payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd, draws=draws,
@@ -117,9 +123,10 @@ def calibrate(
     """Estimate every wire's current zero-tension length from joint values and tensions, without external sensors."""
     from wirebayes.cli.answer import conclude
     from wirebayes.workflows.calibrate import calibrate as run
+    from wirebayes.workflows.wires import named_lines
 
     found = run(
-        robot, readings, wires, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
+        robot, readings, named_lines(wires), tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
         tension_bias=tension_bias, specimen_spread=spread, draws=draws, experiment=experiment, own_effects=own_effects,
         seed=seed, output=output,
     )  # fmt: skip
@@ -141,10 +148,11 @@ def export(
 ) -> None:
     """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
     from wirebayes.workflows.export import export as run
+    from wirebayes.workflows.wires import named_lines
 
     exported = run(
-        robot, wires, tensions=tensions, times=times, draws=draws, experiment=experiment, own_effects=own_effects,
-        seed=seed, output=output,
+        robot, named_lines(wires), tensions=tensions, times=times, draws=draws, experiment=experiment,
+        own_effects=own_effects, seed=seed, output=output,
     )  # fmt: skip
     for line in exported.messages if exported.computed else ():
         typer.echo(line, err=True)

@@ -15,9 +15,18 @@ from wirebayes.robot.self_calibration import session_file
 from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.session import Prior
 from wirebayes.workflows.options import PathLike, above_zero, check_seed, path_of
-from wirebayes.workflows.results import POSTERIOR, Calibration, Place
+from wirebayes.workflows.results import Calibration, Place
 from wirebayes.workflows.tables import as_csv, row_place
-from wirebayes.workflows.wires import RobotLike, Wires, configuration, content, draws_of, folder_of, hash_of, robot_of
+from wirebayes.workflows.wires import (
+    RobotLike,
+    Wires,
+    configuration,
+    content,
+    draws_for,
+    hash_of,
+    posterior_of,
+    robot_of,
+)
 
 
 def calibrate(
@@ -44,7 +53,7 @@ def calibrate(
     readings : path of a CSV, DataFrame, or mapping of name to (r,) array
         A row per hold, in order: requested pose, duration, joint values or motor angles, and tensions at its
         end or NaN.
-    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
     tension_sd : float
         Standard error of a tension, N.
     tilt_sd : float
@@ -100,10 +109,10 @@ def calibrate(
         text = _as_csv(readings, machine)
         session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, row_place, bias > 0)
         read = hash_of({"readings": text})
-    line = draws_of(wires, draws, experiment, own)
+    line = draws_for(machine, wires, draws, experiment, own)
     options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read, *((bias,) if bias else ()))
     place = Place.at(output)
-    decides = configuration("calibrate", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, *options)
+    decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, *options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
             prior = Prior(line, 1e-3 * reference_sd, specimen_spread, bias_sd_N=bias)

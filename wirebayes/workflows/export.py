@@ -4,8 +4,8 @@ from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_text
 from wirebayes.robot.export import files
 from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, path_of, rising_times, text_of
-from wirebayes.workflows.results import POSTERIOR, Export, Place
-from wirebayes.workflows.wires import RobotLike, Wires, configuration, draws_of, folder_of, robot_of
+from wirebayes.workflows.results import Export, Place
+from wirebayes.workflows.wires import RobotLike, Wires, configuration, draws_for, posterior_of, robot_of
 
 TENSIONS_N = (1.0, 2.0, 4.0, 8.0)  # an option; doubling, because creep goes as a power of the tension
 # an option; a minute to a day, because creep goes as a power of the time at first
@@ -29,7 +29,7 @@ def export(
     Parameters
     ----------
     robot : Robot, name of a shipped robot, or path
-    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
     tensions : sequence of float
         Tensions of the creep table, N.
     times : sequence of float
@@ -65,7 +65,7 @@ def export(
     loads, moments = numbers("--tensions", tensions), rising_times(times)
     if loads.min() <= 0:
         raise InputError(f"--tensions: found {text_of(tensions)!r}; expected numbers above 0")
-    line = draws_of(wires, draws, experiment, own)
+    line = draws_for(machine, wires, draws, experiment, own)
     contents: dict[str, str] = {}
     if files.is_hangprinter(machine):
         contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
@@ -74,7 +74,7 @@ def export(
     table = files.creep_table(machine, line, loads, moments)
     place = Place.at(output)
     options = (experiment, text_of(tensions), text_of(times))
-    posterior = folder_of(wires, experiment) / POSTERIOR
+    posterior = posterior_of(wires, experiment)
     with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, *options)) as run:
         if run.state != "done":
             write_csv(run.directory / "creep-table.csv", files.TABLE, table)

@@ -4,7 +4,7 @@ from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, path_of
 from wirebayes.workflows.pose_history import checked_errors
-from wirebayes.workflows.wires import RobotLike, Wires, draws_of, robot_of
+from wirebayes.workflows.wires import RobotLike, Wires, draws_for, robot_of
 
 
 def live(
@@ -28,7 +28,7 @@ def live(
     Parameters
     ----------
     robot : Robot, name of a shipped robot, or path
-    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
     position, rotation : (3,) arrays, optional
         About where the platform is at the first step, m, and its rotation vector, rad; the home pose when left out.
     reads : bool
@@ -67,5 +67,5 @@ def live(
     where = machine.home_m if position is None else numbers("position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("rotation", rotation, 3)
     errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
-    line = draws_of(wires, draws, experiment, path_of(own_effects))
+    line = draws_for(machine, wires, draws, experiment, path_of(own_effects))
     return LiveEstimator(machine, line, errors, (where, matrix(turn)), reads, check_seed(seed))

@@ -29,7 +29,16 @@ from wirebayes.workflows.options import (
 )
 from wirebayes.workflows.pose_history import checked_errors, pose_history
 from wirebayes.workflows.results import POSTERIOR, Place, Pose
-from wirebayes.workflows.wires import RobotLike, Wires, configuration, content, draws_of, folder_of, robot_of
+from wirebayes.workflows.wires import (
+    RobotLike,
+    Wires,
+    configuration,
+    content,
+    draws_for,
+    folder_of,
+    posterior_of,
+    robot_of,
+)
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
@@ -71,7 +80,7 @@ def pose(
     Parameters
     ----------
     robot : Robot, name of a shipped robot, or path
-    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
         The line that the wires are cut from; of findings the final model.
     position : (3,) array, optional
         Of the platform in m; the robot's home pose when left out. With `joints`: about where it starts.
@@ -139,7 +148,7 @@ def pose(
     draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
     payload = float(payload)
     machine = _loaded(robot_of(robot), payload, payload_at)
-    line = draws_of(wires, draws, experiment, own)
+    line = draws_for(machine, wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
     moments = rising_times(times)
@@ -151,13 +160,13 @@ def pose(
         _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
         decides = configuration(
-            "pose", robot, folder_of(wires, experiment) / POSTERIOR, draws, seed, own, experiment, *carried,
+            "pose", robot, posterior_of(wires, experiment), draws, seed, own, experiment, *carried,
             None if position is None else text_of(position), None if rotation is None else text_of(rotation),
         )  # fmt: skip
         return pose_history(machine, line, joints, trajectory, errors, (where, matrix(turn)), seed, decides,
                             Place.at(output), own, progress)  # fmt: skip
     slices = _slices(machine, map_heights, map_rotations)
-    other = None if other_fit is None else draws_of(other_fit, draws, experiment, own)
+    other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
     request = PoseRequest(
         where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed, slices
     )
@@ -167,7 +176,7 @@ def pose(
     options = (experiment, *at, text_of(times), *limits, other_draws, *carried)
     mapped = () if slices is LEVEL else (plain(asdict(slices)),)
     place = Place.at(output)
-    posterior = folder_of(wires, experiment) / POSTERIOR
+    posterior = posterior_of(wires, experiment)
     decides = configuration("pose", robot, posterior, draws, seed, own, *options, *mapped)
     with open_run(place.path, decides) as run:
         if run.state == "done":

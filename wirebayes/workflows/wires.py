@@ -2,11 +2,11 @@
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -18,13 +18,14 @@ from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, material
+from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, lines_of, material
 from wirebayes.workflows.options import PathLike
 from wirebayes.workflows.predict import one_of
 from wirebayes.workflows.results import POSTERIOR, Findings, Posterior, Posteriors
 
 RobotLike = PathLike | Robot
-Wires = PathLike | Posterior | Posteriors | Findings
+Line = PathLike | Posterior | Posteriors | Findings
+Wires = Line | Mapping[str, Line]  # one line for all legs, or lines by the names that legs have in the robot's file
 
 
 def read_robot(name_or_file: PathLike) -> Robot:
@@ -58,6 +59,18 @@ def robot_of(robot: RobotLike) -> Robot:
     return robot if isinstance(robot, Robot) else read_robot(robot)
 
 
+def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:
+    """The posterior that decides a result; of several lines, what tells them all."""
+    if _several(wires):
+        files = {name: content(folder_of(line, experiment) / POSTERIOR) for name, line in wires.items()}
+        return hash_of(files)
+    return folder_of(wires, experiment) / POSTERIOR
+
+
+def _several(wires: Wires) -> TypeGuard[Mapping[str, Line]]:
+    return isinstance(wires, Mapping) and not isinstance(wires, Posteriors)
+
+
 def folder_of(wires: Wires, experiment: str | None = None) -> Path:
     """The folder with the posterior of a line; of findings, the final one."""
     if isinstance(wires, Findings):
@@ -76,7 +89,7 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
 
     Parameters
     ----------
-    wires : path, Posterior, Posteriors or Findings
+    wires : path, Posterior, Posteriors, Findings, or mapping of wire name to one of them
         A folder with a ``posterior.nc``, or what `fit` or `discover` returned.
     count : int
         Largest number of draws.
@@ -94,11 +107,60 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
     InputError
         If there is no posterior, or its model cannot be used on a robot.
     """
+    if _several(wires):
+        return _together({name: draws_of(line, count, experiment, own_effects) for name, line in wires.items()})
     if isinstance(wires, Posteriors | Findings):
         wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)
     if isinstance(wires, Posterior):
         return _usable(wires.stored(experiment), wires.name, count)
     return read_wires(folder_of(wires), count, experiment, own_effects)
+
+
+def draws_for(
+    robot: Robot, wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None
+) -> WireDraws:
+    """`draws_of`, and an `InputError` where they and the robot's legs do not fit together."""
+    line = draws_of(wires, count, experiment, own_effects)
+    lines_of(robot, line)
+    idle = [name for name in line.each if name not in robot.wire]
+    if line.others and idle:
+        raise InputError(
+            f"--wires: found {idle[0]}, expected one of the legs' wires: {', '.join(sorted({*robot.wire}))}"
+        )
+    return line
+
+
+def _together(lines: dict[str, WireDraws]) -> WireDraws:
+    """Lines of differently named wires, as many draws of each; draws of two lines have nothing to do with another."""
+    if not lines:
+        raise InputError("wires: found no line, expected one or more")
+    name, first = next(iter(lines.items()))
+    count = min(line.count for line in lines.values())
+    rng = np.random.default_rng(0)
+    for other, line in lines.items():
+        for what, a, b in (("elastic-law", first.law, line.law), ("history", first.history, line.history)):
+            if a != b:
+                raise InputError(
+                    f"--wires: found {name} fitted with --{what} {a} and {other} with {b}; expected one for all wires"
+                )
+        order = slice(0, count) if line is first else rng.permutation(line.count)[:count]
+        lines[other] = replace(line.part(order), name=other)
+    first = lines.pop(name)
+    return replace(first, others=lines)
+
+
+def named_lines(texts: Sequence[str]) -> Wires:
+    """What ``--wires`` was given: one folder, or several times ``NAME=FOLDER``."""
+    pairs = [text.partition("=") for text in texts]
+    if len(texts) == 1 and (not pairs[0][1] or Path(texts[0]).exists()):
+        return Path(texts[0])
+    for text, (name, sign, folder) in zip(texts, pairs, strict=True):
+        if not (name and sign and folder):
+            raise InputError(f"--wires: found {text!r} beside others; expected NAME=FOLDER for each")
+    names = [name for name, _, _ in pairs]
+    if len(set(names)) < len(names):
+        raise InputError(f"--wires: found {', '.join(names)}; expected each name once")
+    return {name: Path(folder) for name, _, folder in pairs}
 
 
 def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
@@ -163,7 +225,7 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
 
 
 def configuration(
-    command: str, robot: RobotLike, posterior: Path, draws: int, seed: int, own_effects: Path | None, *rest: Any
+    command: str, robot: RobotLike, posterior: Path | str, draws: int, seed: int, own_effects: Path | None, *rest: Any
 ) -> dict[str, Any]:
     """Everything that decides the results; files by their content, not by where they lie.
 
@@ -187,7 +249,7 @@ def configuration(
         "command": command,
         "version": __version__,
         "robot": hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot)),
-        "wires": content(posterior),
+        "wires": posterior if isinstance(posterior, str) else content(posterior),
         "own_effects": source_of(own_effects),
         "draws": draws,
         "seed": seed,

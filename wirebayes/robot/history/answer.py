@@ -14,7 +14,7 @@ from wirebayes.robot.history.estimate import Estimate, Progress, estimate
 from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
-from wirebayes.robot.mechanics import draws
+from wirebayes.robot.mechanics import draws, sag
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -144,6 +144,7 @@ def _asked(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -
             "effects": [e.key for e in material],
             "left_out": [e.key for e in line.effects if e not in material],
             "legs": list(robot.wire),
+            "lines": list(line.each),
         },
         "feasible": True,
         "history": {
@@ -245,7 +246,9 @@ def _warnings(
     holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
     longest = float(np.diff(history.times_s[holds]).max())
     lengths = inverse.lengths(robot, joint_m)[0]
-    return out + draws.warnings(line, found.track.tension_N[held], longest, lengths)
+    out += draws.warnings(robot, line, found.track.tension_N, longest, lengths)
+    plain = found.plain
+    return out + sag.warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
 
 
 def _pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> tuple[list[str], list[list[Any]]]:

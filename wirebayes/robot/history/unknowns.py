@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 
 from wirebayes.robot.history.follow import uncreeping
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import CORE, WireDraws
+from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.self_calibration.session import OWN, Prior
 from wirebayes.typing import Floats
@@ -97,8 +97,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
     legs, n = robot.legs, line.count
-    fitted = np.stack([np.log(line.parameters[k]) if k in CORE else line.parameters[k] for k in prior.names], 1)
     own = rng.standard_normal((n, len(OWN) * legs)) * max(errors.spread, 1e-6)
-    values = np.concatenate([rng.standard_normal((n, legs)) * prior.reference_sd_m, fitted, own], 1)
+    values = np.concatenate([rng.standard_normal((n, legs)) * prior.reference_sd_m, prior.fitted.T, own], 1)
     white = solve_triangular(root, (values - mean).T, lower=True).T
     return Unknowns(robot, prior, mean, root, np.asarray(white))

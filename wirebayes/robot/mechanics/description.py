@@ -118,6 +118,8 @@ class Robot:
         None where all wires leave from fixed points.
     drums : Drums or None
         None where the joint values are lengths and no motor angles are known.
+    mass_kg_m : (w,) array or None
+        Mass of each leg's wire by length; 0 where it is not given. It is not in the statics; `sag` says what it does.
     tension_bias_N : float
         Standard deviation of a tension sensor's bias, for calibration; 0: no bias.
 
@@ -151,6 +153,7 @@ class Robot:
     pulleys: Pulleys | None = None
     drums: Drums | None = None
     tension_bias_N: float = 0.0
+    mass_kg_m: Floats | None = None
 
     @property
     def legs(self) -> int:

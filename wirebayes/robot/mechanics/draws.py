@@ -4,11 +4,13 @@ Bench quantities, instrument effects and one-off events are dropped here and go 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.errors import InputError
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
@@ -39,6 +41,10 @@ class WireDraws:
     tension_range_N, time_range_s : (low, high) or None
         What was tested; outside, the answer is an extrapolation and is said to be one.
     tension_ref_N : float
+    name : str
+        Of the wire in the robot's file that it is; "default" are the legs that name none.
+    others : mapping of name to WireDraws
+        Lines of legs with other names, as many draws each, independent of these.
     """
 
     parameters: Mapping[str, Floats]
@@ -49,6 +55,8 @@ class WireDraws:
     tension_range_N: tuple[float, float] | None = None
     time_range_s: tuple[float, float] | None = None
     tension_ref_N: float = 1.0
+    name: str = "default"
+    others: Mapping[str, "WireDraws"] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -61,11 +69,18 @@ class WireDraws:
 
     def part(self, index: NDArray[np.intp] | slice) -> "WireDraws":
         """Some of the draws, each with all its parameters."""
-        return replace(self, parameters={k: v[index] for k, v in self.parameters.items()})
+        others = {name: line.part(index) for name, line in self.others.items()}
+        return replace(self, parameters={k: v[index] for k, v in self.parameters.items()}, others=others)
 
     def centre(self) -> "WireDraws":
         """One wire with the posterior mean of every parameter: what a controller would use."""
-        return replace(self, parameters={k: np.array([v.mean()]) for k, v in self.parameters.items()})
+        others = {name: line.centre() for name, line in self.others.items()}
+        return replace(self, parameters={k: np.array([v.mean()]) for k, v in self.parameters.items()}, others=others)
+
+    @property
+    def each(self) -> dict[str, "WireDraws"]:
+        """This line and the others by name."""
+        return {self.name: self} | dict(self.others)
 
 
 def material(effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -97,13 +112,13 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     Wires
         With ``(1, n)`` parameters when all legs share everything, else ``(w, n)``.
     """
-    lines = [given(robot.given[name]) if name in robot.given else line for name in robot.wire]
+    lines = lines_of(robot, line)
     n = line.count
-    effects = line.material()
+    effects = _united(line)
     names = CORE + tuple(c for e in effects for c in e.columns())
-    exponent = line.parameters.get(LENGTH_EXPONENT)
     by_length = [e for e in effects if e.place == "sample"]
-    shared = spread == 0 and not robot.given and exponent is None and not by_length
+    scaled = any(LENGTH_EXPONENT in one.parameters for one in lines)
+    shared = spread == 0 and not robot.given and not line.others and not scaled and not by_length
     theta: dict[str, Floats] = {}
     for name in names:
         if shared:
@@ -118,12 +133,52 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
             theta[name] = theta[name] * np.exp(spread * rng.standard_normal((robot.legs, n)))
     length = np.array([wire.length_mm for wire in lines])[:, None]
     longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
-    if exponent is not None:
-        theta["B"] = theta["B"] * longer ** (exponent - 1.0)
-    hold = steady_hold(theta, length * longer, line.tension_ref_N, length_ref_mm=length)
+    if scaled:
+        exponent = [np.broadcast_to(one.parameters.get(LENGTH_EXPONENT, np.ones(1)), (n,)) for one in lines]
+        theta["B"] = theta["B"] * longer ** (np.stack(exponent) - 1.0)
+    reference = line.tension_ref_N
+    if any(one.tension_ref_N != reference for one in line.others.values()):
+        reference = _by_leg([one.tension_ref_N for one in lines])
+    hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
     theta = dict(Placed(by_length, theta).change("sample", theta, hold))
     others = tuple(e for e in effects if e.place != "sample")
-    return Wires(line.law, line.history, theta, length, others, line.tension_ref_N)
+    return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def lines_of(robot: Robot, line: WireDraws) -> list[WireDraws]:
+    """The line of every leg's wire.
+
+    Raises
+    ------
+    InputError
+        A leg's wire has neither parameters in the robot's file nor a posterior.
+    """
+    out = []
+    for i, name in enumerate(robot.wire):
+        if name in robot.given:
+            out.append(given(robot.given[name]))
+        elif name in line.each or (name == "default" and not line.others):
+            out.append(line.each.get(name, line))
+        else:
+            known = " or ".join(line.each)
+            raise InputError(
+                f"{robot.name}: leg[{i}].wire: found {name!r} and posteriors of {known}; expected one more, "
+                f"--wires {name}=FOLDER"
+            )
+    return out
+
+
+def _united(line: WireDraws) -> tuple[Effect, ...]:
+    """The effects of all lines, each once."""
+    effects: dict[str, Effect] = {}
+    for one in line.each.values():
+        effects |= {effect.key: effect for effect in one.material()}
+    return tuple(effects.values())
+
+
+def _by_leg(values: list[float]) -> Any:
+    """A value a leg where the physics of one wire has a number: effects compute with either."""
+    return np.array(values)[:, None]
 
 
 def nominal_length(robot: Robot) -> Floats:
@@ -148,24 +203,36 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
     raise KeyError(name)
 
 
-def warnings(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
+def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
     """One sentence for each way in which a use leaves what was tested.
 
     Parameters
     ----------
+    robot : Robot
     line : WireDraws
         Knows the tensions, hold durations and length that were tested.
-    tension_N : array
-        Tensions of the use, of any shape; slack and failed ones do not count.
+    tension_N : (..., w) array
+        Tensions of the use; slack and failed ones do not count.
     time_s : float
         Longest time of the use.
-    zero_m : array
+    zero_m : (..., w) array
         Zero-tension lengths of the use.
 
     Returns
     -------
     list of str
     """
+    if not line.others:
+        return _of_one(line, tension_N, time_s, zero_m)
+    of_leg, out = lines_of(robot, line), []
+    for name, one in line.each.items():
+        own = np.array([leg is one for leg in of_leg])
+        if own.any():
+            out += [f"wire {name}: {said}" for said in _of_one(one, tension_N[..., own], time_s, zero_m[..., own])]
+    return out
+
+
+def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
     out = []
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:

@@ -201,8 +201,9 @@ def _robot(t: _Table) -> Robot:
         raise space.fail("upper_m", f"found {upper.tolist()}", f"at least lower_m ({lower.tolist()}) on every axis")
     sensors = t.table("sensors", {})
     bias = sensors.number("tension_bias_N", 0.0, least=0)
-    given = _given(t)
-    legs = _legs(t, given)
+    given, declared, masses = _wires(t)
+    legs = _legs(t, declared)
+    mass_kg_m = np.array([masses.get(leg["wire"], 0.0) for leg in legs])
     for table in (rule, home, space, sensors, t):
         table.finish()
     stack: Callable[[str], Any] = lambda key: np.array([leg[key] for leg in legs])  # noqa: E731
@@ -211,7 +212,7 @@ def _robot(t: _Table) -> Robot:
         stack("exit"), stack("platform"), stack("lines"), stack("beyond"), tuple(leg["actuator"] for leg in legs),
         stack("ratio"), stack("wire_m"), tuple(leg["wire"] for leg in legs), given, tension,
         position, turn, lower, upper, _pulleys(stack("pulley"), stack("axis")),
-        _drums(*(stack(key) for key in _DRUM)), bias,
+        _drums(*(stack(key) for key in _DRUM)), bias, mass_kg_m if mass_kg_m.any() else None,
     )  # fmt: skip
 
 
@@ -223,17 +224,23 @@ def _drums(radius_m: Floats, *rest: Floats) -> Drums | None:
     return Drums(radius_m, *rest) if radius_m.any() else None
 
 
-def _given(t: _Table) -> dict[str, GivenWire]:
-    tables, out = t.table("wires", {}), {}
+def _wires(t: _Table) -> tuple[dict[str, GivenWire], set[str], dict[str, float]]:
+    """Wires of stated parameters, the names of all, and their masses by length where they are given."""
+    tables, given, masses = t.table("wires", {}), {}, {}
     for name in tables.content:
         wire = tables.table(name)
-        values = {short: wire.number(key, above=0) for key, short in _GIVEN.items()}
-        out[name] = GivenWire(values, wire.number("length_mm", above=0))
+        masses[name] = wire.number("mass_kg_m", 0.0, least=0)
+        fitted = wire.take("fitted", "true or no key", False) if name != "default" else True
+        if not isinstance(fitted, bool):
+            raise wire.fail("fitted", f"found {_shown(fitted)}", "true or no key")
+        if not fitted:  # a posterior comes with the command
+            values = {short: wire.number(key, above=0) for key, short in _GIVEN.items()}
+            given[name] = GivenWire(values, wire.number("length_mm", above=0))
         wire.finish()
-    return out
+    return given, set(tables.content), masses
 
 
-def _legs(t: _Table, given: dict[str, GivenWire]) -> list[dict[str, Any]]:
+def _legs(t: _Table, given: set[str]) -> list[dict[str, Any]]:
     value = t.take("leg", "at least two [[leg]] tables")
     if not isinstance(value, list) or len(value) < 2:
         raise t.fail("leg", f"found {_kind(value)}", "at least two [[leg]] tables")

@@ -57,7 +57,8 @@ class Wires:
     def sample(self, leg: int) -> FreshSample:
         """A fresh sample of one leg's wire, with whatever depends on its length in the robot."""
         theta = {k: v[min(leg, len(v) - 1)] for k, v in self.theta.items()}
-        model = Model(self.law, self.history, self.effects, self.tension_ref_N)
+        references = np.ravel(self.tension_ref_N)  # a value a leg where lines differ
+        model = Model(self.law, self.history, self.effects, float(references[min(leg, len(references) - 1)]))
         return FreshSample(theta, model, float(self.length_mm[min(leg, len(self.length_mm) - 1), 0]))
 
     def part(self, index: slice | NDArray[np.intp]) -> "Wires":

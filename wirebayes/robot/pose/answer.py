@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.robot.mechanics import draws, drums, statics
+from wirebayes.robot.mechanics import draws, drums, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -70,6 +70,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
             "effects": [e.key for e in line.material()],
             "left_out": [e.key for e in line.effects if e not in line.material()],
             "legs": list(robot.wire),
+            "lines": list(line.each),
         },
         "tension_distribution": {
             "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
@@ -114,7 +115,8 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     if content["feasible_draws"] < 1:
         weak = 100 * (1 - content["feasible_draws"])
         losses.insert(0, f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched")
-    content["warnings"] = losses + draws.warnings(line, tau, float(request.times_s[-1]), commands.zero_m)
+    content["warnings"] = losses + draws.warnings(robot, line, tau, float(request.times_s[-1]), commands.zero_m)
+    content["warnings"] += sag.warnings(robot, x, R, tau[0])
     if robot.drums is not None:
         content["warnings"] += [
             f"wire {i + 1} is longer here than its drum's wire_length_m, {robot.drums.wire_m[i]:g} m"
@@ -219,9 +221,12 @@ def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: F
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     held = np.isfinite(size[0.0])
-    names = [*draws.CORE, *(column for effect in line.material() for column in effect.columns())]
-    names += [name for name in (draws.LENGTH_EXPONENT,) if name in line.parameters]
-    kept = {name: line.parameters[name][held] for name in names}
+    kept: dict[str, Floats] = {}
+    for wire, one in line.each.items():
+        names = [*draws.CORE, *(column for effect in one.material() for column in effect.columns())]
+        names += [name for name in (draws.LENGTH_EXPONENT,) if name in one.parameters]
+        own = f"{wire} " if line.others else ""
+        kept |= {f"{own}{name}": one.parameters[name][held] for name in names}
     result: dict[str, Any] = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if held.sum() < 30:
         return result | {"sentence": "Fewer than 30 draws that hold the platform: no shares are computed."}

@@ -80,14 +80,25 @@ class Prior:
 
     @property
     def names(self) -> list[str]:
-        """The line's parameters among the unknowns."""
-        exponent = [name for name in (LENGTH_EXPONENT,) if name in self.line.parameters]
-        return [*CORE, *(column for effect in self.line.material() for column in effect.columns()), *exponent]
+        """The parameters of all lines among the unknowns, those of further lines with the line's name before them."""
+        return [
+            name if line is self.line else f"{wire} {name}"
+            for wire, line in self.line.each.items()
+            for name in _own(line)
+        ]
+
+    @property
+    def fitted(self) -> Floats:
+        """(p, n) draws of all lines' parameters, logarithms of those that are positive."""
+        return np.array([
+            np.log(line.parameters[name]) if name in CORE else line.parameters[name]
+            for line in self.line.each.values()
+            for name in _own(line)
+        ])  # fmt: skip
 
     def moments(self, legs: int) -> tuple[Floats, Floats]:
         """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""
-        drawn = self.line.parameters
-        values = np.array([np.log(drawn[k]) if k in CORE else drawn[k] for k in self.names])
+        values = self.fitted
         p, own = len(values), len(OWN) * legs
         biased = legs if self.bias_sd_N > 0 else 0
         mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own + biased)])
@@ -104,9 +115,13 @@ class Prior:
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
         """Wires, and reference errors ``(n, w)``, of unknowns ``(n, d)``."""
         n, legs, p = len(unknowns), robot.legs, len(self.names)
-        columns = unknowns[:, legs : legs + p].T
-        values = {k: np.exp(c) if k in CORE else c for k, c in zip(self.names, columns, strict=True)}
-        wires = for_robot(robot, replace(self.line, parameters=values))
+        columns = iter(unknowns[:, legs : legs + p].T)
+        lines = {}
+        for wire, line in self.line.each.items():
+            values = {k: np.exp(v) if k in CORE else v for k, v in ((k, next(columns)) for k in _own(line))}
+            lines[wire] = replace(line, parameters=values)
+        first = lines.pop(self.line.name)
+        wires = for_robot(robot, replace(first, others=lines))
         own = unknowns[:, legs + p : legs + p + len(OWN) * legs].T.reshape(len(OWN), legs, n)
         theta = dict(wires.theta) | {
             name: wires.theta[name] * np.exp(deviation) for name, deviation in zip(OWN, own, strict=True)
@@ -117,6 +132,12 @@ class Prior:
     def bias_N(self, legs: int, unknowns: Floats) -> Floats:
         """Biases ``(n, w)`` of the tension sensors among unknowns ``(n, d)``; zero where sensors have none."""
         return unknowns[:, -legs:] if self.bias_sd_N > 0 else np.zeros((len(unknowns), legs))
+
+
+def _own(line: WireDraws) -> list[str]:
+    """The parameters of one line."""
+    exponent = [name for name in (LENGTH_EXPONENT,) if name in line.parameters]
+    return [*CORE, *(column for effect in line.material() for column in effect.columns()), *exponent]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,165 @@
+"""Legs cut from different lines, each with its own posterior; what their own weight does."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
+from tests.robot.test_drift import _line
+from wirebayes.cli import main
+from wirebayes.effects import named
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import plain
+from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.mechanics import draws, sag, schema
+from wirebayes.robot.mechanics.wires import tension
+from wirebayes.robot.motion import drift
+from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.workflows.wires import draws_of, named_lines
+
+THIN, THICK = ("default", "thick")
+
+
+def _mixed(robot, thick_legs):
+    wire = tuple(THICK if i in thick_legs else THIN for i in range(robot.legs))
+    return replace(robot, wire=wire)
+
+
+def test_each_leg_has_the_draws_of_its_line():
+    robot = _mixed(schema.read("linear-6"), (1, 4))
+    stiff = replace(_line(5, sd=0.1, seed=2, k1=3000.0), name=THICK, length_mm=2000.0)
+    line = replace(_line(5, sd=0.1, seed=1), others={THICK: stiff})
+    wires = draws.for_robot(robot, line)
+    for i in range(6):
+        own = stiff if i in (1, 4) else line
+        for name in draws.CORE:
+            np.testing.assert_array_equal(wires.theta[name][i], own.parameters[name])
+        assert wires.length_mm[i, 0] == own.length_mm
+    few = line.part(slice(0, 2))
+    np.testing.assert_array_equal(draws.for_robot(robot, few).theta["k1"], wires.theta["k1"][:, :2])
+
+
+def test_an_effect_of_one_line_is_neutral_in_the_others_and_tensions_are_by_each_ones_reference():
+    robot = _mixed(schema.read("linear-6"), (0,))
+    effects = (named("strain_stiffening"), named("tension_dependent_rate"))
+    amplitudes = {"strain_stiffening.c": 8.0, "tension_dependent_rate.m": 0.4}
+    bent = replace(_line(3, effects=effects, **amplitudes), name=THICK, tension_ref_N=6.0)
+    line = replace(_line(3), others={THICK: bent}, tension_ref_N=3.0)
+    wires = draws.for_robot(robot, line)
+    stretched, zero = np.full((6, 3), 1.01), np.ones((6, 3))
+    tau = tension(wires, stretched, zero)[0]
+    alone = tension(draws.for_robot(schema.read("linear-6"), replace(bent, name="default")), stretched, zero)[0]
+    plain_tau = tension(
+        draws.for_robot(robot, replace(_line(3), others={THICK: replace(_line(3), name=THICK)})), stretched, zero
+    )[0]
+    np.testing.assert_allclose(tau[0], alone[0])
+    np.testing.assert_allclose(tau[1:], plain_tau[1:])
+    assert tau[0, 0] > 1.05 * tau[1, 0]
+    course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([60.0]))
+    assert course.found.all()
+    np.testing.assert_array_equal(np.ravel(wires.tension_ref_N), [6.0, 3.0, 3.0, 3.0, 3.0, 3.0])
+
+
+def test_a_leg_without_a_posterior_is_refused_in_one_line():
+    robot = _mixed(schema.read("linear-6"), (3,))
+    with pytest.raises(InputError, match=r"linear-6: leg\[3\].wire: found 'thick' and posteriors of default; expected"):
+        draws.for_robot(robot, _line(2))
+
+
+def test_unknowns_hold_the_parameters_of_every_line():
+    robot = _mixed(schema.read("linear-6"), (1, 4))
+    stiff = replace(_line(50, sd=0.1, seed=2, k1=3000.0), name=THICK)
+    line = replace(_line(50, sd=0.1, seed=1), others={THICK: stiff})
+    prior = Prior(line, 1e-3)
+    assert prior.names == [*draws.CORE, *(f"thick {name}" for name in draws.CORE)]
+    mean, cov = prior.moments(6)
+    assert mean.shape == (6 + 10 + 18,)
+    assert np.linalg.eigvalsh(cov).min() > 0
+    known = unknowns(robot, line, Uncertain(1e-3, 1e-9), np.random.default_rng(0))
+    wires, _ = known.columns(known.draws)
+    np.testing.assert_allclose(wires.theta["k1"], draws.for_robot(robot, line).theta["k1"], rtol=1e-4)
+
+
+def test_the_tested_ranges_are_each_lines_own():
+    robot = _mixed(schema.read("linear-6"), (1, 4))
+    stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
+    line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
+    said = draws.warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
+    assert said == ["wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N"]
+
+
+DECLARED = "[wires.thick]\nfitted = true\nmass_kg_m = 0.02\n[wires.default]\nmass_kg_m = 0.0001\n"
+FIRST = '[[leg]]\nwire = "thick"\n'
+
+
+def _file(tmp_path):
+    """The shipped robot with a thick, heavy first wire."""
+    text = (Path(schema.__file__).parents[2] / "data" / "robots" / "linear-6.toml").read_text()
+    path = tmp_path / "mixed.toml"
+    path.write_text(text.replace("[[leg]]\n", DECLARED + FIRST, 1))
+    return path
+
+
+def test_commands_take_a_posterior_for_each_name(fitted, tmp_path, capsys):  # noqa: F811
+    robot, out = _file(tmp_path), tmp_path / "out"
+    way = tmp_path / "way.csv"
+    way.write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,0,0,.6\n")
+    arguments = ["pose", str(robot), "--trajectory", str(way), "--draws", "10", "--output", str(out)]
+    assert main([*arguments, "--wires", str(fitted)]) == 2
+    line = capsys.readouterr().err.strip()
+    assert "leg[0].wire: found 'thick' and posteriors of default" in line
+    assert "\n" not in line
+    assert not out.exists()
+    assert main([*arguments, "--wires", f"default={fitted}", "--wires", f"thick={fitted}"]) == 0
+    said = json.loads((out / "pose.json").read_text())
+    assert said["wires"]["lines"] == ["default", "thick"]
+    assert any("wire 1 weighs" in warning for warning in said["warnings"])
+    assert main([*arguments, *(f"--wires={name}={fitted}" for name in ("default", "thick", "thin"))]) == 2
+    assert "--wires: found thin, expected one of the legs' wires: default, thick" in capsys.readouterr().err
+    assert main([*arguments, "--wires", f"thick={fitted}", "--wires", str(fitted)]) == 2
+    assert "expected NAME=FOLDER for each" in capsys.readouterr().err
+
+
+def test_names_and_folders_are_read(tmp_path):
+    odd = tmp_path / "a=b"
+    odd.mkdir()
+    assert named_lines([str(odd)]) == odd
+    assert plain(named_lines(["A=x", "B=y"])) == {"A": "x", "B": "y"}
+    with pytest.raises(InputError, match="expected each name once"):
+        named_lines(["A=x", "A=y"])
+
+
+def test_lines_of_two_laws_are_refused(fitted, monkeypatch):  # noqa: F811
+    from wirebayes.results import store
+
+    hooke = store.load(fitted)
+    other = replace(hooke, sample=replace(hooke.sample, model=replace(hooke.sample.model, law="modified")))
+    laws = {"a": hooke, "b": other}
+    monkeypatch.setattr(
+        "wirebayes.results.store.load", lambda folder, experiment=None, own_effects=None: laws[folder.name]
+    )
+    with pytest.raises(InputError, match="found a fitted with --elastic-law hooke and b with modified"):
+        draws_of({"a": "a", "b": "b"}, 10)
+    laws["b"] = hooke
+    both = draws_of({"a": "a", "b": "b"}, 10)
+    assert both.name == "a"
+    assert sorted(both.others["b"].parameters["k1"]) == sorted(both.parameters["k1"])
+    assert (both.others["b"].parameters["k1"] != both.parameters["k1"]).any()
+
+
+def test_sag_is_that_of_a_level_cable():
+    robot = replace(schema.read("linear-6"), mass_kg_m=np.full(6, 0.05), exit_m=np.tile([0.0, 0.0, 1.0], (6, 1)),
+                    platform_m=np.zeros((6, 3)), pulleys=None)  # fmt: skip
+    share, depth, extra = sag.sag(robot, np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0))
+    weight = 0.05 * 9.80665
+    a = 20.0 / weight  # catenary, horizontal tension 20 N
+    np.testing.assert_allclose(share, weight * 4 / 20)
+    np.testing.assert_allclose(depth, a * (np.cosh(2.0 / a) - 1), rtol=1e-3)
+    np.testing.assert_allclose(extra, 2 * a * np.sinh(2.0 / a) - 4.0, rtol=1e-3)
+    hung = sag.sag(robot, np.array([0.0, 0.0, -3.0]), np.eye(3), np.full(6, 20.0))
+    np.testing.assert_allclose(hung[2], 0.0)
+    assert len(sag.warnings(robot, np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0))) == 1
+    assert sag.warnings(replace(robot, mass_kg_m=None), np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0)) == []
