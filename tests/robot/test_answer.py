@@ -93,7 +93,7 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
     from wirebayes.effects.unknown import Discrepancy
 
     line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
-    said = draws.warnings(line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
+    said = draws.warnings(schema.read("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
     assert len(said) == 1
     assert "could not name" in said[0]
 

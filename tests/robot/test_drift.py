@@ -189,6 +189,6 @@ def test_bench_quantities_never_enter():
 
 def test_uses_outside_the_tested_range_are_told():
     line = replace(_line(), tension_range_N=(1.0, 5.0), time_range_s=(0.0, 120.0))
-    said = draws.warnings(line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
+    said = draws.warnings(schema.read("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
     assert len(said) == 3
-    assert draws.warnings(line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []
+    assert draws.warnings(schema.read("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []
