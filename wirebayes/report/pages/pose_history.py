@@ -16,22 +16,24 @@ from wirebayes.report.blocks import (
     embedded,
     files_beside,
     number,
+    picture_file,
     span,
 )
+from wirebayes.report.glossary import meaning
 
 _CAPTIONS = {
-    "motion.svg": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
-    "poses.png": "The robot at a few times: where the platform is meant to be (blue) and, enlarged, where it is (red).",
-    "drift.png": "How far the platform is from where it is meant to be. Line: median, band: 90 % of the draws.",
-    "rotation.png": "How far it has turned from there.",
-    "corrections.png": "Change of each joint value that brings it back. Every row: corrections.csv.",
+    "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
+    "poses": "The robot at a few times: where the platform is meant to be (blue) and, enlarged, where it is (red).",
+    "drift": "How far the platform is from where it is meant to be. Line: median, band: 90 % of the draws.",
+    "rotation": "How far it has turned from there.",
+    "corrections": "Change of each joint value that brings it back. Every row: corrections.csv.",
 }
 _FILES = (
     ("pose.json", "every number of this page as JSON"),
     ("poses.csv", "the pose at every row, with bands"),
     ("corrections.csv", "the joint values that bring the platform back, at every row"),
 )
-_WIDE = ("poses.png",)
+_WIDE = ("poses",)
 _ROWS = 12  # of the tables on the page
 
 
@@ -57,12 +59,17 @@ def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> P
         return Page(f"Robot {pose['robot']}", lead, [Section("Summary", [Text(pose["sentence"], strong=True)])])
     first: list[Block] = [Columns([Points("What was computed", _asked(pose)), *_answers(pose)])]
     first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in pose["warnings"] if _loss(w)]
-    files = [(folder / name, caption) for name, caption in _CAPTIONS.items()]
-    pictures = {path.name: Picture(embedded(path), caption, caption) for path, caption in files if path.is_file()}
+    files = {name: picture_file(folder, name) for name in _CAPTIONS}
+    pictures = {
+        name: Picture(embedded(file), _CAPTIONS[name], _CAPTIONS[name], wide=name in _WIDE)
+        for name, file in files.items()
+        if file is not None
+    }
     wide = [Pictures([pictures.pop(name)]) for name in _WIDE if name in pictures]
     sections = [Section("Summary", first), Section("Pictures", [*wide, Pictures(list(pictures.values()))])]
     sections += [Section("Poses", _poses(pose)), Section("Corrections", _corrections(pose))]
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]))
     seed = f"Seed {configuration.get('seed')}."
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed)
 
@@ -141,12 +148,17 @@ def _poses(pose: dict[str, Any]) -> list[Block]:
         cells = []
         for axis in range(3):
             middle, sd = (None if place[q] is None else place[q][i][axis] for q in ("q50", "sd"))
-            cells += [number(middle, 6), number(None if sd is None else 1e3 * sd)]
+            cells += [_metres(middle), number(None if sd is None else 1e3 * sd)]
         far = drift["distance_mm"]
         lines.append([number(float(drift["times_s"][i]), 6), *cells, number(far["q50"][i]),
                       span(far["q05"][i], far["q95"][i])])  # fmt: skip
     header = ["time, s", "x, m", "sd, mm", "y, m", "sd, mm", "z, m", "sd, mm", "distance, mm", "90 %"]
     return [Table(header, lines, "Some of the rows; all of them, with bands and rotations: poses.csv.")]
+
+
+def _metres(value: float | None) -> str:
+    """A coordinate to a micrometre, beyond which rounding speaks."""
+    return "–" if value is None else f"{value:z.6f}".replace("-", "−")
 
 
 def _corrections(pose: dict[str, Any]) -> list[Block]:

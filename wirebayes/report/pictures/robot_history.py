@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from wirebayes.io.run_folder import write_text
+from wirebayes.io.run_folder import write_bytes, write_text
+from wirebayes.report.blocks import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
 from wirebayes.report.pictures.robot import platform_edges, round_factor
 from wirebayes.robot.history.answer import HistoryAnswer
@@ -45,7 +46,7 @@ def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> 
     if robot.degrees == 6:
         figures["rotation"] = banded(drift, "rotation_deg", "rotation, degrees", "Drift of the orientation", history)
     for name, figure in figures.items():
-        figure.savefig(folder / f"{name}.png", dpi=160)
+        write_bytes(folder / f"{name}.svg", svg(figure))
     write_text(folder / "motion.svg", moving(robot, history, found))
 
 
