@@ -19,7 +19,7 @@ from wirebayes.report.blocks import (
     picture_file,
     span,
 )
-from wirebayes.report.glossary import SYMBOLS, meaning
+from wirebayes.report.glossary import SYMBOLS, meaning, spoken
 
 _FILES = (
     ("import.json", "what was decided, as JSON"),
@@ -68,7 +68,7 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
     hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]
-    blind = [f"Effects it cannot show: {', '.join(_words(name) for name in hidden)}."] if hidden else []
+    blind = [f"Effects it cannot show: {', '.join(spoken(name) for name in hidden)}."] if hidden else []
     prior = [name for name, p in e["parameters"].items() if p["determined_by"] == "prior"]
     blind += [f"Parameters it does not determine: {', '.join(prior)}."] if prior else []
     columns = [Points("What it is", about), Points("What is suspicious", e["warnings"] or ["Nothing."])]
@@ -86,7 +86,7 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
         Table(["parameter", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"], rows, caption)
     )
     seen = [
-        [_words(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]
+        [spoken(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]
         for name, effect in e["effects"].items()
         if effect["shows"] != "no"
     ]
@@ -109,7 +109,3 @@ def _picture(folder: Path, name: str) -> list[Block]:
     alt = f"Displacement and tension of {name} over the whole test."
     caption = "Displacement above, tension below, over the whole test. Shading marks every second hold."
     return [Pictures([Picture(embedded(file), alt, caption, wide=True)])]
-
-
-def _words(effect: str) -> str:
-    return effect.replace("_", " ")

@@ -33,7 +33,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     overview = Table(
         ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
         [
-            [name, _spoken(v), listed([_words(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)]
+            [name, _spoken(v), listed([spoken(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)]
             for name, v in found.items()
         ],
     )
@@ -55,20 +55,20 @@ _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % 
 
 
 def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
-    candidates = listed([_words(e) for e in v["set"]])
+    candidates = listed([spoken(e) for e in v["set"]])
     words = {
         "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
         "unknown": "Something is missing that no effect in the catalogue explains.",
         "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}{_alike(v)}.",
-        "named": f"What is missing: {listed([_words(e) for e in v['effects']])}{_alike(v)}.",
-        "partial": f"{listed([_words(e) for e in v['effects']]).capitalize()} is missing, and something else that no "
+        "named": f"What is missing: {listed([spoken(e) for e in v['effects']])}{_alike(v)}.",
+        "partial": f"{listed([spoken(e) for e in v['effects']]).capitalize()} is missing, and something else that no "
         "effect in the catalogue explains.",
     }
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
     gap = [_gap(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
-    loose = [f"Not identifiable here: {listed([_words(what) for what, _ in hidden])}."] if hidden else []
+    loose = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
     if v.get("next_measurement"):
         loose.append(f"Measure next: {v['next_measurement']}")
     columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in gap if p])]
@@ -86,7 +86,7 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
             "left above the noise."
         )
         blocks.append(Pictures([Picture(drawn(figure), said, said)]))
-        names = [_words(s["model"]) if s is v["steps"][0] else f"+ {_words(s['model'])}" for s in v["steps"]]
+        names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
         scores = [[number(s[k]) for k in ("rmse_N", "elpd", "coverage_90")] for s in v["steps"]]
         lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
         caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
@@ -96,7 +96,7 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
         inclusion = v.get("inclusion", {})
         lines = [
             [
-                _words(effect),
+                spoken(effect),
                 number(round(p, 4), 2),
                 number(round(inclusion[effect], 4), 2) if effect in inclusion else "–",
             ]
@@ -111,12 +111,12 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
             caption += f" Something without a name remains beside them with probability {number(round(rest, 4), 2)}."
         blocks.append(Table(["candidate", "largest share", "missing at all"], lines, caption))
     if v.get("power"):
-        lines = [[_words(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
+        lines = [[spoken(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
         caption = "The smallest amplitude of each effect that this test detects with 80 % power."
         blocks.append(Table(["effect", "amplitude", "unit"], lines, caption))
     if hidden:
         caption = "Not identifiable here: the readings would be nearly the same with or without it."
-        blocks.append(Table(["what", "why"], [[_words(what), why] for what, why in hidden], caption))
+        blocks.append(Table(["what", "why"], [[spoken(what), why] for what, why in hidden], caption))
     return Section(name, blocks)
 
 
@@ -128,7 +128,6 @@ _BEFORE_AND_AFTER = (
     "Measured minus predicted tension, hold after hold: above under the plain model, below with what was found. Shaded "
     "holds were kept apart to test the models; both are fitted to all holds here."
 )
-_words = spoken
 
 
 def _patterns(v: dict[str, Any]) -> dict[str, str]:
@@ -141,7 +140,7 @@ def _patterns(v: dict[str, Any]) -> dict[str, str]:
 
 def _alike(v: dict[str, Any]) -> str:
     """The near-equivalents of what is named: a headline that hides them would promise too much."""
-    like = [_words(e) for e in v.get("group", []) if e not in (*v["effects"], *v["set"], "unknown")]
+    like = [spoken(e) for e in v.get("group", []) if e not in (*v["effects"], *v["set"], "unknown")]
     return f"; on this protocol hard to distinguish from {listed(like)}" if like else ""
 
 
@@ -167,4 +166,4 @@ def _gap(v: dict[str, Any]) -> str:
 def _amplitude(effect: str, a: dict[str, Any]) -> str:
     unit = "" if a.get("unit") in (None, "-", "1") else f" {a['unit']}"
     at = "" if a.get("hold") is None else f", from hold {a['hold']} on"
-    return f"{_words(effect)}: {number(a['mean'])}{unit} ({span(a['q05'], a['q95'])}){at}."
+    return f"{spoken(effect)}: {number(a['mean'])}{unit} ({span(a['q05'], a['q95'])}){at}."

@@ -56,7 +56,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     titles = listed([s.title for s in sections])
     lead = f"Posterior of {titles}: what the readings say about each parameter, compared with the prior."
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
-    sections.append(meaning(("hold", "90 % interval", "prior", "shrunk by"), effects, effects))
+    sections.append(meaning(("hold", "90 % interval", "prior", "contraction"), effects, effects))
     return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 

@@ -55,7 +55,7 @@ def posterior(rows: Rows, caption: str) -> Table:
     """Intervals and verdicts of both likelihoods beside every published value."""
     header = ["sample", "parameter", "published"]
     for likelihood in LIKELIHOOD.values():
-        header += [f"{likelihood}: 90 % interval", "shrunk by", "verdict"]
+        header += [f"{likelihood}: 90 % interval", "contraction", "verdict"]
     lines = []
     for r, s in _pairs(rows, "parameter"):
         unit = unit_text(r["unit"])

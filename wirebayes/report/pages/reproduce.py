@@ -22,7 +22,7 @@ _FILES = (
     ("*/*/summary.json", "one fit: parameters and convergence"),
     ("*/*/posterior.nc", "one fit: all draws, opens with ArviZ"),
 )
-_TERMS = ("hold", "90 % interval", "prior", "shrunk by", "held out", "rms", "drift", "tilt", "specimen spread")
+_TERMS = ("hold", "90 % interval", "prior", "contraction", "held out", "rms", "drift", "tilt", "specimen spread")
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
