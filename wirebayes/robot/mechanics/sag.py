@@ -9,12 +9,11 @@ References
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
+from wirebayes.typing import Floats
 
-Floats = NDArray[np.float64]
 # Weight by tension from which on sag is told: a level wire is then longer than its chord by a ten-thousandth, which is
 # as much as minutes of creep.
 _TOLD = 0.05
