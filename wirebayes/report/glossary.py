@@ -23,8 +23,8 @@ TERMS = {
     "hold": "one position of the moving end, kept while the tension is read.",
     "90 % interval": "the quantity lies in it with a probability of 90 %, given the readings, the prior and the model.",
     "prior": "what was assumed of a thin line before any reading of this test.",
-    "contraction": "share of the prior's variance that the readings took away (of the logarithm if it is positive): at 0 % "
-    "nothing was learned, from 90 % on the readings determine the parameter.",
+    "contraction": "share of the prior's variance that the readings took away, of the logarithm if it is positive. At "
+    "0 % nothing was learned, from 90 % on the readings determine the parameter.",
     "held out": "readings kept from the model while it was fitted, then predicted: an honest test of it.",
     "rms": "root mean square of measured minus predicted tension: a typical error of one reading.",
     "elpd": "expected log predictive density: how well left-out holds are predicted, larger is better. A difference "
