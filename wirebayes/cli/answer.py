@@ -203,8 +203,10 @@ def _checked(name: str, test: dict[str, Any]) -> list[str]:
         number = "-" if hold["number"] is None else hold["number"]
         lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
     for teller in ("data", "data and prior", "prior"):
-        told = [f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == teller]
-        lines += _wrapped(f"parameters from the {teller}", told)
+        ranges = [
+            f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == teller
+        ]
+        lines += _wrapped(f"parameters from the {teller}", ranges)
     for shows, words in _SHOWS.items():
         effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
         lines += _wrapped(words, [_size(e, found) for e, found in effects])
@@ -262,8 +264,8 @@ def _calibration(found: dict[str, Any]) -> list[str]:
         return [f"{found['robot']}: not converged, no lengths to use"]
     length = known["length_m"]
     rows = zip(length["mean"], length["q05"], length["q95"], strict=True)
-    told = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
-    return [f"{found['robot']}: zero-tension lengths in m: {told}"]
+    lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
+    return [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
 
 
 def _band(quantity: dict[str, float] | None) -> str:

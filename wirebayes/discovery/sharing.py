@@ -33,9 +33,9 @@ def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: n
         means = np.array([mean for other, (mean, _) in known.items() if other != b])
         table = _table(effect, float(weight @ means / weight.sum()), float(weight.sum() ** -0.5))
         if table is not None:
-            told = [replace(e, priors=e.priors | {effect.columns()[0]: table}) for e in blocks[b].experiments]
+            with_prior = [replace(e, priors=e.priors | {effect.columns()[0]: table}) for e in blocks[b].experiments]
             near = blocks[b].target.coordinates.to_natural(blocks[b].modes.z[:1])[0]
-            out[b] = fitted(told, blocks[b].effects, blocks[b].law, blocks[b].history, rng, near)
+            out[b] = fitted(with_prior, blocks[b].effects, blocks[b].law, blocks[b].history, rng, near)
     return out
 
 

@@ -216,10 +216,10 @@ def pictures_in(folder: Path, captions: Mapping[str, str]) -> list[Picture]:
     captions : mapping of file name without ending to caption
     """
     files = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in _KINDS}
-    told = {name: captions[name] for name in captions if name in files} | {
+    shown = {name: captions[name] for name in captions if name in files} | {
         n: words(n) for n in files if n not in captions
     }
-    return [Picture(embedded(files[name]), caption, caption) for name, caption in told.items()]
+    return [Picture(embedded(files[name]), caption, caption) for name, caption in shown.items()]
 
 
 def picture_file(folder: Path, name: str) -> Path | None:
@@ -227,17 +227,17 @@ def picture_file(folder: Path, name: str) -> Path | None:
     return next((path for path in (folder / f"{name}{kind}" for kind in _KINDS) if path.is_file()), None)
 
 
-def files_beside(folder: Path, told: Sequence[tuple[str, str]]) -> Links:
+def files_beside(folder: Path, contents: Sequence[tuple[str, str]]) -> Links:
     """Links to those files of a folder that are there; a name may be a pattern.
 
     Parameters
     ----------
     folder : Path
-    told : sequence of (name, what it holds)
+    contents : sequence of (name, what it holds)
     """
     found = [
         (path.relative_to(folder).as_posix(), holds)
-        for name, holds in told
+        for name, holds in contents
         for path in sorted(folder.glob(name))[:_MOST_LINKS]
     ]
     return Links([(quote(name), holds) for name, holds in found])

@@ -125,8 +125,8 @@ class Gallery:
         caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
         jump = stiffest_step(e)
         if abs(jump / published["k1"] - 1) < 0.02:
-            told = f"{number(published['k1'], 4)} N is within 2 % of the stiffest single step between two holds"
-            caption += f" The published {told}, {number(jump, 4)} N."
+            nearest = f"{number(published['k1'], 4)} N is within 2 % of the stiffest single step between two holds"
+            caption += f" The published {nearest}, {number(jump, 4)} N."
         alt = f"Posterior draws of k1 and B of {e.name}: a long ridge hold by hold, a small cloud as a chain."
         self.add("ridge", e.name, figure, alt, caption)
         product = {kind: d["k1"] * d["B"] for kind, d in draws.items()}

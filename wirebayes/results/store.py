@@ -242,7 +242,7 @@ def datatrees(folders: Mapping[str, Path]) -> xr.DataTree:
 
 
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
-    """What was believed before the fit: draws of the prior of one experiment's parameters, each (n,)."""
+    """The prior: draws of the prior of one experiment's parameters, each (n,)."""
     path = folder / "posterior.nc"
     with _opened(path) as tree:
         prior, names = tree["prior"].to_dataset(), json.loads(tree["posterior"].attrs["experiments"])

@@ -36,7 +36,7 @@ def save(state: State, path: Path | None, of_fit: Mapping[str, Any]) -> None:
     path : Path or None
         Nothing is written without one.
     of_fit : mapping
-        What tells this fit from others.
+        What distinguishes this fit from others.
     """
     if path is not None:
         checkpoint.write(path, of_fit, to_values(state), to_arrays(state))

@@ -99,8 +99,8 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     blocks.append(Pictures(pictures))
     blocks.append(_parameters(draws, shrunk, sample.model.effects))
     named = figures.marginals(draws, prior, sample.model.effects)
-    told = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
-    blocks.append(Pictures(told, small=True))
+    marginals = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
+    blocks.append(Pictures(marginals, small=True))
     pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects)
     if pairs is not None:
         alt = f"Posterior of {sample.name}, every pair of parameters."
@@ -181,8 +181,8 @@ def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any
     loose: list[str] = []
     for name, share in shrunk.items():
         unit = unit_text(unit_of(name, effects))
-        told = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
-        (known if share >= MOST else loose).append(told)
+        interval = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
+        (known if share >= MOST else loose).append(interval)
     if not trusted:
         return [Points("90 % intervals, if the model were right", known + loose)]
     nothing = ["No parameter."]

@@ -29,13 +29,13 @@ def _measured(rows: Rows) -> Points:
 
 def _known(tables: dict[str, Rows]) -> Points:
     stiff = [row for row in tables["posterior"] if row["likelihood"] == "chain" and row["parameter"] == "k1"]
-    told = "; ".join(f"{unbroken(row)} {span(row['q05'], row['q95'])} N" for row in stiff)
+    intervals = "; ".join(f"{unbroken(row)} {span(row['q05'], row['q95'])} N" for row in stiff)
     outside = sum(row["verdict"] == "outside" for row in stiff)
     exponents = [row for row in tables["posterior"] if row["parameter"] == "N"]
     below = sum(row["q95"] < 1 for row in exponents)
     whole = sum(row["published"] == 1 for row in exponents if row["likelihood"] == "chain")
     points = [
-        f"Stiffness k1, once the holds are taken as one history (90 % intervals): {told}.",
+        f"Stiffness k1, once the holds are taken as one history (90 % intervals): {intervals}.",
         f"The published k1 lies outside for {outside} of {len(stiff)} wires.",
         f"Creep follows a stretched exponential: N is below 1 in {below} of {len(exponents)} fits. "
         f"The paper has N = 1 on {whole} of {len(stiff)} wires.",

@@ -51,9 +51,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
     view = robot_view(folder)
     turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
-    told = _CAPTIONS | dict.fromkeys(turned, _TURNED)
-    files = {name: picture_file(folder, name) for name in told if not (view and name == "robot")}
-    pictures = [Picture(embedded(p), told[n], told[n]) for n, p in files.items() if p is not None]
+    captions = _CAPTIONS | dict.fromkeys(turned, _TURNED)
+    files = {name: picture_file(folder, name) for name in captions if not (view and name == "robot")}
+    pictures = [Picture(embedded(p), captions[n], captions[n]) for n, p in files.items() if p is not None]
     sections = [Section("Summary", blocks), Section("The robot", view)]
     sections += [Section("Pictures", [Pictures(pictures)] if pictures else [])]
     sections += [Section("Slices of the workspace", _slices(pose))]
@@ -159,8 +159,8 @@ def _drift(pose: dict[str, Any]) -> list[Block]:
                 lines.append([f"{100 * entry['specimen_spread']:g} %", f"{time:g}", *cells])
     header = ["specimen spread", "after, s", "moved, mm", "90 %", "tilt, degrees", "90 %"]
     header += ["from vertical, degrees", "90 %"]
-    told = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. "
-    return [Table(header, lines, told + "Draws whose platform falls are left out.")] if lines else []
+    caption = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. "
+    return [Table(header, lines, caption + "Draws whose platform falls are left out.")] if lines else []
 
 
 def _errors(pose: dict[str, Any]) -> list[Block]:
@@ -183,8 +183,10 @@ def _between(pose: dict[str, Any]) -> list[Block]:
         spread = f"{100 * entry['specimen_spread']:g} %"
         lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _lasts(entry)])
     header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
-    told = "The pose is exact when a calibration ends. " + (_limits(pose["between_calibrations"][0]) if lines else "")
-    return [Table(header, lines, told)] if lines else []
+    caption = "The pose is exact when a calibration ends. " + (
+        _limits(pose["between_calibrations"][0]) if lines else ""
+    )
+    return [Table(header, lines, caption)] if lines else []
 
 
 def _limits(entry: dict[str, Any]) -> str:

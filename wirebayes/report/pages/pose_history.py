@@ -122,7 +122,7 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
     loose = [w[:1].upper() + w[1:] + "." for w in pose["warnings"] if not _loss(w)]
     clock = pose["clock"]
     loose.append(
-        "A test cannot tell when a moving wire's clock starts anew. If it started once and ran on, the pose would "
+        "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
         f"differ by {number(clock['largest_mm'])} mm at most, {number(clock['at_the_end_mm'])} mm at the end."
     )
     if not pose["history"].get("reference_sd_mm") and pose["history"]["kind"] == "measured":

@@ -210,7 +210,7 @@ def _bands(values: Floats) -> dict[str, Any]:
 
 
 def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> dict[str, Any]:
-    """How far poses move if the wires' clocks start once and run on: no test of holds tells which they do."""
+    """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
     anew, once = run(few, RESTART), run(few, np.inf)
     apart = np.linalg.norm(anew.position_m - once.position_m, axis=-1)
@@ -240,7 +240,7 @@ def _warnings(
     width = content["drift"][0]["distance_mm"]
     if clock["largest_mm"] > 0.5 * np.nanmax(np.asarray(width["q95"]) - np.asarray(width["q05"])):
         out.append(
-            f"when the wires' clocks start anew matters here: by up to {clock['largest_mm']:.3g} mm, more than half of "
+            f"when the wires' clocks restart matters here: by up to {clock['largest_mm']:.3g} mm, more than half of "
             "the band; give a column hold to say it"
         )
     holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])

@@ -13,7 +13,7 @@ from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.motion.drift import Walk
 from wirebayes.typing import Floats
 
-# Share of the mean tension by which a command must change a wire's tension to start the clocks anew. On the paper's
+# Share of the mean tension by which a command must change a wire's tension to restart the clocks. On the paper's
 # bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.
 RESTART = 0.1
 
@@ -30,7 +30,7 @@ class Track:
     strain : (n, t, w) array
         Creep of every wire.
     hold : (t,) int array
-        How often the wires' clocks had been started anew.
+        How often the wires' clocks had been restarted.
     """
 
     position_m: Floats
@@ -68,7 +68,7 @@ def follow(
     start : (3,) or (n, 3), (3, 3) or (n, 3, 3) arrays
         Where the first forward solution starts from.
     starts_s : array
-        Rising times at which the wires' clocks start anew (`clock_starts`).
+        Rising times at which the wires' clocks restart (`clock_starts`).
     error_m : (n, w) array or float
         What the zero-tension lengths before creep are beyond what the joint values say.
     progress : function of a row

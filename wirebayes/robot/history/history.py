@@ -26,7 +26,7 @@ class History:
     payload_m : (t, 3) array
         The payload's centre of mass in the platform's frame.
     hold : (t,) int array or None
-        A new number starts the wires' clocks anew; None: a change of load does (`follow.RESTART`).
+        A new number restarts the wires' clocks; None: a change of load does (`follow.RESTART`).
     tension_N : (t, w) array or None
         Measured; NaN where a sensor was not read.
     tilt_rad : (t, 2) array or None

@@ -132,7 +132,7 @@ class LiveEstimator:
         self._joint = np.empty((self._columns, robot.legs))
 
     def load(self, mass_kg: float, centre_m: Floats | None = None) -> None:
-        """Tell what the platform carries from now on beside its own mass.
+        """Set what the platform carries from now on beside its own mass.
 
         Parameters
         ----------
@@ -225,7 +225,7 @@ class LiveEstimator:
         self._lengths = bare, np.broadcast_to(offset, bare.shape)
 
     def _begin(self, time_s: float) -> None:
-        """The wires' clocks start anew."""
+        """The wires' clocks restart."""
         state = self._state if self._wires.effects else replace(self._state, past=())
         self._creep = HoldCreep(self._wires, state, self._tension.T)
         self._since, self._reference = time_s, self._tension[-1]

@@ -28,7 +28,7 @@ class Uncertain:
         Relative, of stiffness, creep amount and rate from wire to wire of one line.
     tension_N, tilt_rad : float
         Standard error of a reading. Half its variance is an offset that the sensor keeps, so that no number of
-        readings tells more than that.
+        readings says more than that.
     """
 
     reference_m: float = 0.0

@@ -65,7 +65,7 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
 def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
     half = float(norm.ppf(0.95)) * known.length_sd_m[0]
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
-    told = {
+    found = {
         "converged": bool(known.converged[0]),
         "misfit": float(known.misfit[0]),
         "length_m": {
@@ -79,8 +79,8 @@ def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
     }
     if prior.bias_sd_N > 0:
         bias_sd = np.sqrt(np.diag(known.covariance[0]))[-robot.legs :]
-        told["tension_bias_N"] = {"mean": known.unknowns[0, -robot.legs :], "sd": bias_sd}
-    return told
+        found["tension_bias_N"] = {"mean": known.unknowns[0, -robot.legs :], "sd": bias_sd}
+    return found
 
 
 def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator) -> dict[str, Any]:
@@ -96,8 +96,8 @@ def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Gener
     R = np.broadcast_to(rotation.matrix(robot.home_rotation_rad), (CANDIDATES, 3, 3))
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1)
-    told = inverse.commands(robot, wires, x[good], R[good], tau[good])
-    ahead = observability.sensitivity(robot, wires, x[good], R[good], told.zero_m, told.offset_m)[1]
+    commands = inverse.commands(robot, wires, x[good], R[good], tau[good])
+    ahead = observability.sensitivity(robot, wires, x[good], R[good], commands.zero_m, commands.offset_m)[1]
     pick = observability.choose_poses(ahead, NEXT, session.tension_sd_N, prior.reference_sd_m)
     return {
         "observability": {
