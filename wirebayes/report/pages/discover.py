@@ -82,8 +82,8 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
     if len(v.get("steps", [])) > 1 and v["steps"][0]["rmse_N"] is not None:
         figure = waterfall(v)
         said = (
-            "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and what "
-            "is left above the noise."
+            "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
+            "what is left above the noise."
         )
         blocks.append(Pictures([Picture(drawn(figure), said, said)]))
         names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
