@@ -119,7 +119,29 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
 def draws_for(
     robot: Robot, wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None
 ) -> WireDraws:
-    """`draws_of`, and an `InputError` where they and the robot's legs do not fit together."""
+    """`draws_of` for a robot, whose legs must fit the lines.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : path, Posterior, Posteriors or Findings
+        As for `draws_of`.
+    count : int
+        Largest number of draws.
+    experiment : str, optional
+        May be left out where there is one.
+    own_effects : Path, optional
+        File of a user's own effects, for a folder.
+
+    Returns
+    -------
+    WireDraws
+
+    Raises
+    ------
+    InputError
+        If there is no posterior, or the lines and the robot's legs do not fit together.
+    """
     line = draws_of(wires, count, experiment, own_effects)
     lines_of(robot, line)
     idle = [name for name in line.each if name not in robot.wire]

@@ -38,7 +38,22 @@ def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -
 
 
 def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[str]:
-    """A sentence on the wire whose own weight matters most, where any does."""
+    """A sentence on the wire whose own weight matters most, where any does.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (3,) array
+    rotation : (3, 3) array
+        The pose.
+    tension_N : (w,) array
+        Of every wire there.
+
+    Returns
+    -------
+    list of str
+        Empty where no wire's weight matters.
+    """
     share, depth, extra = sag(robot, position_m, rotation, tension_N)
     heavy = np.flatnonzero(share > _TOLD)
     if not heavy.size:

@@ -118,16 +118,21 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     content["warnings"] = losses + draws.warnings(robot, line, tau, float(request.times_s[-1]), commands.zero_m)
     content["warnings"] += sag.warnings(robot, x, R, tau[0])
     if robot.drums is not None:
-        content["warnings"] += [
-            f"wire {i + 1} is longer here than its drum's wire_length_m, {robot.drums.wire_m[i]:g} m"
-            for i in drums.emptied(robot.drums, commands.joint_m[commands.feasible])
-        ]
+        content["warnings"] += _emptied(robot.drums, commands.joint_m[commands.feasible])
     spaces = map_slices(robot, line, request.slices)
     content["workspace"] = None
     held = [one for one in spaces if len(one.drift.position_m)]
     if held:  # the first orientation as a whole, then every slice of each
         content["workspace"] = claim.summary(held[0].drift) | {"slices": summaries(spaces)}
     return Answer(content, courses, spaces)
+
+
+def _emptied(known: Drums, joint_m: Floats) -> list[str]:
+    """A sentence for each wire that is longer than its drum holds."""
+    return [
+        f"wire {i + 1} is longer here than its drum's wire_length_m, {known.wire_m[i]:g} m"
+        for i in drums.emptied(known, joint_m)
+    ]
 
 
 def _motors(known: Drums, joint_m: Floats) -> dict[str, Any]:
