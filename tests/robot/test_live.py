@@ -38,7 +38,7 @@ def _run(live, history, **more):
     return out
 
 
-@pytest.mark.parametrize("name", ["cogiro-desk", "linear-7"])
+@pytest.mark.parametrize("name", ["cogiro-desk", pytest.param("linear-7", marks=pytest.mark.slow)])
 def test_an_hour_agrees_with_the_batch(name):
     robot = schema.read(name)
     history, start, line = _history(robot), (robot.home_m, np.eye(3)), _line(32)
@@ -52,6 +52,7 @@ def test_an_hour_agrees_with_the_batch(name):
     assert all(p.held == 1 for p in now)
 
 
+@pytest.mark.slow
 def test_with_readings_it_agrees_with_the_batch_in_the_end():
     robot = schema.read("hangprinter-4")
     history, start, line, errors = _history(robot), (robot.home_m, np.eye(3)), _line(64), Uncertain(1e-3, 0.05, 0.05)
