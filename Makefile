@@ -8,7 +8,7 @@ INPUTS := pyproject.toml constraints.txt
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test test-full coverage lint calibration discover-benchmark benchmark docs dist clean
+.PHONY: mutants run test test-full coverage lint calibration discover-benchmark benchmark docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
@@ -33,6 +33,9 @@ calibration: .venv/run.stamp
 
 discover-benchmark: .venv/run.stamp
 	$(BIN)/python -m analyses.hidden_effects --size full --output out/discover-benchmark
+
+mutants: .venv/test.stamp
+	$(BIN)/python -m analyses.mutants --output out/mutants
 
 benchmark: .venv/test.stamp
 	$(BIN)/python analyses/robot_speed.py

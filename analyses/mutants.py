@@ -26,13 +26,14 @@ ROOT = Path(__file__).parents[1]
 PATIENCE_S = 240  # beyond it a mutant counts as killed: its tests take a tenth
 FAST = "not slow and not browser"
 SAMPLER = ["tests/inference/sampler/test_stop_rule.py", "tests/inference/sampler/test_moves.py"]
+PROPOSAL = "tests/inference/sampler/test_proposal.py"
 THRESHOLDS = "tests/discovery/test_thresholds.py"
 SPACE = ["tests/discovery/test_model_space.py", "tests/discovery/test_verdict.py", THRESHOLDS]
 MODULES = {
-    "wirebayes/model/likelihoods.py": ["tests/model/test_likelihoods.py", "tests/model/test_problem.py"],
+    "wirebayes/model/likelihoods.py": ["tests/model"],
     "wirebayes/inference/convergence.py": SAMPLER,
     "wirebayes/inference/sampler/kept.py": SAMPLER,
-    "wirebayes/inference/sampler/moves.py": SAMPLER,
+    "wirebayes/inference/sampler/moves.py": ["tests/inference/sampler/test_moves.py", PROPOSAL],
     "wirebayes/comparison/compare.py": ["tests/comparison"],
     "wirebayes/discovery/verdict.py": SPACE,
     "wirebayes/discovery/model_space.py": SPACE,

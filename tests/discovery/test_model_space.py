@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from wirebayes.discovery.model_space import EffectSet, log_prior, log_weights, posterior, smallest_set
+from wirebayes.discovery.settings import LEAST_ALTERNATIVE
 from wirebayes.discovery.stepwise import Accepted
-from wirebayes.discovery.verdict import Decision, verdict_of
+from wirebayes.discovery.verdict import Decision, alternatives, verdict_of
 
 ONE = np.ones(1)
 NONE = np.full(1, -20.0)  # a remainder that the readings speak against
@@ -118,3 +119,32 @@ def test_what_is_left_beside_a_name_counts_for_the_name_as_far_as_the_smooth_cur
         more = np.exp(_more_beside(sets, np.array([-40.0, -40.0 + ahead]), 1, 5.0))
         assert more.sum() == pytest.approx(np.exp(5.0))
         assert more[1] / more[0] == pytest.approx(np.exp(ahead))
+
+
+def test_shares_of_a_material_sum_to_one_though_effects_may_not_act_there() -> None:
+    acting = {"a": np.array([1.0, 0.3]), "b": np.array([1.0, 0.6])}
+    sets = [EffectSet((), 0.0, {}, np.full(2, -20.0))]
+    sets += [EffectSet((name,), 5.0, {name: acts}, np.full(2, -20.0)) for name, acts in acting.items()]
+    found = posterior(sets, *log_weights(sets, 20, {}), blocks=2)
+    assert [sum(shares.values()) for shares in found.shares] == pytest.approx([1.0, 1.0])
+    assert found.shares[1]["b"] / found.shares[1]["a"] == pytest.approx(2.0)
+
+
+def test_what_the_final_model_shares_the_probability_with() -> None:
+    """Sets with and without a remainder, the final model first; the improbable and the plain model are left out."""
+    sets = [a_set(names, 0.0, None) for names in ("", "a", "b", "c")]
+    block = {n: SimpleNamespace(effects=[SimpleNamespace(key=n)] if n else []) for n in ("", "a", "b", "c")}
+    weights = {"": (0.1, 0.0), "a": (0.5, 0.2), "b": (0.16, 0.0), "c": (0.5 * LEAST_ALTERNATIVE, 0.015)}
+    space = SimpleNamespace(
+        sets=sets,
+        without=[weights["".join(s.names)][0] for s in sets],
+        beside=[weights["".join(s.names)][1] for s in sets],
+    )
+    explored = SimpleNamespace(fitted={s.key: SimpleNamespace(blocks=[block["".join(s.names)]]) for s in sets})
+    given = SimpleNamespace(posterior=space), explored, 0, block["a"]
+    found = alternatives(*given, "named")  # type: ignore[arg-type]
+    assert [(a.block.effects[0].key, a.remains) for a in found] == [("a", False), ("a", True), ("b", False)]
+    assert [a.probability for a in found] == pytest.approx(np.array([0.5, 0.2, 0.16]) / 0.86)
+    partial = alternatives(*given, "partial")  # type: ignore[arg-type]
+    assert (partial[0].remains, partial[1].remains) == (True, False)
+    assert partial[0].probability == pytest.approx(0.2 / 0.86)
