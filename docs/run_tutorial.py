@@ -23,7 +23,7 @@ DOCS = Path(__file__).parent
 CONTROLLERS = {
     "hooke_only": "ignores creep",
     "creep_aware": "compensates, by this fit",
-    "creep_aware_told_otherwise": "compensates, by the other fit",
+    "creep_aware_other_fit": "compensates, by the other fit",
 }
 PICTURES = {
     "import": "wire/bench.svg",
