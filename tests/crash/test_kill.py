@@ -75,7 +75,7 @@ def attacked(command: str, kills: int, place: Path) -> None:
     assert content(folder) == expected
 
 
-@pytest.mark.parametrize("command", ["fit", "batch"])
+@pytest.mark.parametrize("command", ["batch"])
 def test_kill(command: str, tmp_path: Path) -> None:
     attacked(command, 2, tmp_path)
 
