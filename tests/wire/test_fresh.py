@@ -201,6 +201,7 @@ def test_a_tension_that_the_wire_cannot_carry_has_no_stiffness():
     assert softening.stiffness_N(2.0)[0] == pytest.approx(k1 * np.sqrt(1 - 4 * 80 * 2.0 / k1), rel=1e-12)
 
 
+LINEAR = schema.read("linear-6")
 ROBOT = {key for key in OF_THE_WIRE if not key.startswith("length_dependence")}
 
 
@@ -226,7 +227,7 @@ def test_a_robots_wire_under_a_constant_tension_is_a_fresh_sample(key, follow):
     for time, values in zip(TIMES[1:], expected, strict=True):
         strain = np.broadcast_to(creep.advance(time, load).strain(wires), (6, 3))
         np.testing.assert_allclose(strain, np.tile(values / 1000.0, (6, 1)), rtol=1e-12, atol=1e-15)
-    assert not [text for text in warnings(given, load, 60.0, np.ones((3, 6))) if "left out" in text]
+    assert not [text for text in warnings(LINEAR, given, load, 60.0, np.ones((3, 6))) if "left out" in text]
 
 
 @pytest.mark.parametrize("key", sorted(ROBOT))
@@ -244,7 +245,7 @@ def test_a_parameter_that_depends_on_the_length_is_that_of_the_robots_wires():
         wires, plain = for_robot(robot, given), for_robot(robot, line("plain"))
         longer = robot.wire_m[:, None] ** given.parameters["length_dependence.p"]  # tested at 1 m
         np.testing.assert_allclose(wires.theta[which], plain.theta[which] * longer, rtol=1e-12)
-        assert not warnings(given, np.ones((1, 6)), 60.0, np.ones((3, 6)))
+        assert not warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((3, 6)))
 
 
 def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
@@ -255,6 +256,6 @@ def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
 
     given = WireDraws({name: np.array([PLAIN[name]]) for name in ("k1", "B", "U", "k2", "N")}, 1000.0,
                       effects=(Settling(), named("thermal_expansion")))  # fmt: skip
-    said = warnings(given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
+    said = warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
     assert any("settling has no place in the robot" in text for text in said)
     assert any("knows no temperature: the effect thermal_expansion" in text for text in said)

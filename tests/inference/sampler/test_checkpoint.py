@@ -155,9 +155,7 @@ def test_another_format_is_refused_before_anything_else_is_read(
     checkpoint.write(path, {"unknown": "here"}, {}, {"x": np.zeros(2)})
     monkeypatch.undo()
     monkeypatch.setattr(checkpoint.np, "load", None)
-    with pytest.raises(
-        InputError, match=rf"found format 99, expected {checkpoint.FORMAT}; remove this file to start the fit anew"
-    ):
+    with pytest.raises(InputError, match=rf"found format 99, expected {checkpoint.FORMAT}; {checkpoint.INSTEAD}"):
         checkpoint.read(path, OF_FIT)
 
 
