@@ -1,7 +1,10 @@
 """Files named by a user, read whole: absent, unreadable, endless and foreign ones end in a one-line error."""
 
+import csv
+import io
 import re
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
 from wirebayes.errors import InputError
@@ -48,3 +51,28 @@ def read_text(path: Path, expected: str = "text") -> str:
     if not text.strip():
         raise InputError(f"{path}, line 1, column 1: found an empty file, expected {expected}")
     return text
+
+
+def csv_rows(source: str, text: str, place: Callable[[int], str]) -> list[tuple[int, list[str]]]:
+    """The rows of a CSV that are not empty, each with the number of its last line.
+
+    Parameters
+    ----------
+    source : str
+        What errors call the file.
+    text : str
+    place : callable
+        Of a line's number, counted from 1, to what errors call it.
+
+    Raises
+    ------
+    InputError
+        A row cannot be divided into cells.
+    """
+    lines = csv.reader(io.StringIO(text, newline=""))
+    try:
+        return [(lines.line_num, row) for row in lines if row]
+    except csv.Error as error:
+        raise InputError(
+            f"{source}: {place(lines.line_num)}: found no CSV ({error}); expected cells with commas"
+        ) from None

@@ -111,6 +111,25 @@ def test_leaving_a_hold_out_is_dense_conditioning(p, theta, errors, seed):
         assert found[j] == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
+def test_held_out_holds_are_given_those_before_them_alone():
+    """The last two holds given the first, and of each its first reading, against the dense normal's conditionals."""
+    theta = PLAIN | ERRORS | {"setting_sd": 0.1}
+    y = measured(LOADING, theta)
+    r, covariance, hold = normal(LOADING, theta, Model(), y)
+    line = linearise(LOADING, columns(theta))
+    noise = np.array([theta["sensor_sd"] ** 2]), np.array([theta["setting_sd"]])
+    out = np.isin(np.arange(6), [4, 5])
+    before = likelihoods.chain(line, y[..., None], LOADING.mask & ~out[:, None], *noise)
+    first = np.arange(LOADING.mask.shape[1]) == 0
+    for rows in (LOADING.mask & out[:, None], LOADING.mask & out[:, None] & first):
+        found = likelihoods.held_out(line, before, y[..., None], rows, *noise)[:, 0]
+        seen = rows[LOADING.mask]
+        for j, value in zip((4, 5), found, strict=True):
+            both = ~np.isin(hold, [4, 5]) | (seen & (hold == j))
+            expected = conditional(r[both], covariance[np.ix_(both, both)], hold[both] == j)
+            assert value == pytest.approx(expected, rel=1e-8)
+
+
 def by_hold(p, theta, y, model=None):
     variance = np.array([theta["sensor_sd"] ** 2])
     return likelihoods.hold_by_hold(p, columns(theta), model or Model(), y[..., None], variance)[:, 0]

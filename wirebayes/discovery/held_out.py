@@ -91,8 +91,7 @@ def predicted(
         mask[last] = False
         noise = variance, own["setting_sd"]
         free = likelihoods.chain(line, sample.readings, mask, *noise)
-        asked = np.isin(np.arange(len(mask)), last)
-        log_p = likelihoods.held_out(line, sample.readings, sample.protocol.mask, asked, *noise)
+        log_p = likelihoods.held_out(line, free, sample.readings, sample.protocol.mask & ~mask, *noise)
         elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(len(theta))
         error, floor, inside = [], [], []
         for j in last:

@@ -8,7 +8,6 @@ factors hold by hold in linear time: a Kalman filter whose state is that number.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.linear_algebra import inv, log_determinant, solve
 from wirebayes.typing import Array
@@ -70,35 +69,27 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
 
 
 def held_out(
-    line: Linearised,
-    readings: Array,
-    mask: Array,
-    requested: NDArray[np.bool_],
-    variance: Array,
-    setting_sd: Array,
-    first_only: bool = False,
+    line: Linearised, filtered: Filtered, readings: Array, mask: Array, variance: Array, setting_sd: Array
 ) -> Array:
-    """Log probability of each held-out hold given the holds before it that are not held out.
+    """Log probability of each held-out hold's readings given what the holds before it say that are not held out.
 
     Parameters
     ----------
-    line, readings, mask, variance, setting_sd
-        As for `chain`; the mask covers all readings.
-    requested : (H,) bool array
-        Which holds are held out.
-    first_only : bool
-        Of each held-out hold only the first reading.
+    line, readings, variance, setting_sd
+        As for `chain`.
+    filtered : Filtered
+        What `chain` returned with the held-out holds masked.
+    mask : (H, R) bool array
+        The readings of held-out holds that are evaluated; no others.
 
     Returns
     -------
-    (requested holds, n) array
+    (h, n) array
+        A row for each hold in the mask.
     """
-    before = chain(line, readings, mask & ~requested[:, None], variance, setting_sd)
-    noise = _Noise.of(variance, setting_sd)
-    rows = mask & (np.arange(mask.shape[1]) == 0) if first_only else mask
-    mean, var = before.carried_mean, before.carried_var
-    holds = np.flatnonzero(requested).tolist()
-    return np.array([_hold(line, j, readings[j], rows[j], mean[j], var[j], noise)[0] for j in holds])
+    noise, (mean, var) = _Noise.of(variance, setting_sd), (filtered.carried_mean, filtered.carried_var)
+    holds = np.flatnonzero(mask.any(axis=1)).tolist()
+    return np.array([_hold(line, j, readings[j], mask[j], mean[j], var[j], noise)[0] for j in holds])
 
 
 @dataclass(frozen=True, slots=True)

@@ -206,6 +206,7 @@ def _chain_scores(
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
     problem, here = fitted.problem, fitted.problem.samples[sample]
     whole, tension = experiment.protocol(), experiment.tension()[..., None]
+    later, one = whole.mask & requested[:, None], np.arange(whole.mask.shape[1]) == 0
     parts: list[tuple[Array, Array, Array]] = []
     theta = thinned(fitted.flat)
     for start in range(0, len(theta), _CHUNK):
@@ -213,10 +214,8 @@ def _chain_scores(
         line = linearise(whole, own, here.model)
         noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N), own["setting_sd"]
         with np.errstate(all="ignore"):
-            holds, first = (
-                likelihoods.held_out(line, tension, whole.mask, requested, *noise, first_only=only)
-                for only in (False, True)
-            )
+            before = likelihoods.chain(line, tension, whole.mask & ~requested[:, None], *noise)
+            holds, first = (likelihoods.held_out(line, before, tension, rows, *noise) for rows in (later, later & one))
             together = likelihoods.chain(line, tension, whole.mask, *noise).log_likelihood[requested].sum(axis=0)
         parts.append((holds, first, together))
     whole_hold, first_reading, every = (_log_mean(np.concatenate(v, axis=-1)) for v in zip(*parts, strict=True))

@@ -130,22 +130,12 @@ def answer(
 
 
 def _asked(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -> dict[str, Any]:
-    material = line.material()
     kind = "measured" if history.joint_m is not None else "commanded"
     out: dict[str, Any] = {
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
-        "wires": {
-            "draws": line.count,
-            "tested_length_mm": line.length_mm,
-            "elastic_law": line.law,
-            "history": line.history,
-            "effects": [e.key for e in material],
-            "left_out": [e.key for e in line.effects if e not in material],
-            "legs": list(robot.wire),
-            "lines": list(line.each),
-        },
+        "wires": draws.summary(robot, line),
         "feasible": True,
         "history": {
             "kind": kind,

@@ -1,7 +1,5 @@
 """Reads a robot's history from CSV, strictly: a row a time, complaints with line and column."""
 
-import csv
-import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +15,7 @@ from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.typing import Floats
 from wirebayes.units import nearest
-from wirebayes.user_files import read_text
+from wirebayes.user_files import csv_rows, read_text
 
 POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
@@ -112,13 +110,8 @@ def parse(
     InputError
         Naming line and column, what was found and what was expected.
     """
-    lines = csv.reader(io.StringIO(text, newline=""))
-    try:
-        numbered = [(lines.line_num, row) for row in lines if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(
-            f"{source}: {place(lines.line_num)}: found no CSV ({error}); expected cells with commas"
-        ) from None
+    rows = csv_rows(source, text, place)
+    numbered = [(line, row) for line, row in rows if any(cell.strip() for cell in row)]
     first, header = numbered[0] if numbered else (1, [])
     names = [cell.strip() for cell in header]
     columns = columns_of(robot, any(name.startswith("motor_") for name in names))

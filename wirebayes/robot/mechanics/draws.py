@@ -203,6 +203,21 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
     raise KeyError(name)
 
 
+def summary(robot: Robot, line: WireDraws) -> dict[str, Any]:
+    """Which wires an answer is for, as ``pose.json`` says it."""
+    kept = line.material()
+    return {
+        "draws": line.count,
+        "tested_length_mm": line.length_mm,
+        "elastic_law": line.law,
+        "history": line.history,
+        "effects": [e.key for e in kept],
+        "left_out": [e.key for e in line.effects if e not in kept],
+        "legs": list(robot.wire),
+        "lines": list(line.each),
+    }
+
+
 def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
     """One sentence for each way in which a use leaves what was tested.
 

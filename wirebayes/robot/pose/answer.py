@@ -62,16 +62,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
         "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0]},
-        "wires": {
-            "draws": line.count,
-            "tested_length_mm": line.length_mm,
-            "elastic_law": line.law,
-            "history": line.history,
-            "effects": [e.key for e in line.material()],
-            "left_out": [e.key for e in line.effects if e not in line.material()],
-            "legs": list(robot.wire),
-            "lines": list(line.each),
-        },
+        "wires": draws.summary(robot, line),
         "tension_distribution": {
             "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
         },

@@ -1,7 +1,5 @@
 """Reads a calibration session from CSV, strictly: one row per hold, errors with line and column."""
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,7 +12,7 @@ from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.typing import Floats
-from wirebayes.user_files import read_text
+from wirebayes.user_files import csv_rows, read_text
 
 POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
@@ -125,13 +123,7 @@ def parse(
     InputError
         Naming line and column, what was found and what was expected.
     """
-    lines = csv.reader(io.StringIO(text, newline=""))
-    try:
-        numbered = [(lines.line_num, row) for row in lines if row]
-    except csv.Error as error:
-        raise InputError(
-            f"{source}: {place(lines.line_num)}: found no CSV ({error}); expected cells with commas"
-        ) from None
+    numbered = csv_rows(source, text, place)
     rows = [row for _, row in numbered]
     tilted = bool(rows) and rows[0][-1] == NORMAL[-1]
     motors, moved = (bool(rows) and given(rows[0]) for given in (has_motors, has_motion))
