@@ -8,20 +8,23 @@ INPUTS := pyproject.toml constraints.txt
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
+# A process a core; the tests of a file share fits and stay together. More than four would wait for the longest file.
+SIDE_BY_SIDE := -n logical --maxprocesses 4 --dist loadfile
+
 .PHONY: mutants run test test-full coverage lint calibration discover-benchmark benchmark docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
 
 test: lint
-	$(BIN)/python -m pytest -m "not slow and not browser"
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not slow and not browser"
 
 test-full: lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 # Not part of make test: counting lines doubles its time.
 coverage: .venv/test.stamp
-	$(BIN)/python -m pytest -m "not slow and not browser" --cov=wirebayes --cov-report=term:skip-covered
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not slow and not browser" --cov=wirebayes --cov-report=term:skip-covered
 
 lint: .venv/test.stamp
 	$(BIN)/ruff check .

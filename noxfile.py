@@ -4,7 +4,7 @@ import nox
 
 nox.options.default_venv_backend = "venv"
 nox.options.error_on_missing_interpreters = False
-FAST = ("-m", "not slow and not browser")
+FAST = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile", "-m", "not slow and not browser")
 
 
 @nox.session(python=["3.11", "3.12", "3.13"])
