@@ -11,10 +11,10 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.model.linear_amplitudes import completed
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.problem import Problem, Sample, build
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.staircase import linearise
+from wirebayes.wire.staircase import Model, linearise
 
 
 @dataclass(frozen=True)
@@ -80,37 +80,40 @@ def predicted(
     problem, theta = _draws(trained, rng, 500)
     whole = build(experiments, effects, law=block.law, history=block.history)
     # The training readings' reference tension belongs to the parameters.
-    models = [s.model for s in problem.samples]
-    out: list[HeldOut] = []
-    for sample, model, k in zip(whole.samples, models, train, strict=True):
-        own = problem.parameters(theta, problem.samples[len(out)])
-        line = linearise(sample.protocol, own, model)
-        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
-        last = np.flatnonzero(sample.protocol.recorded)[k:]
-        mask = sample.protocol.mask.copy()
-        mask[last] = False
-        noise = variance, own["setting_sd"]
-        free = likelihoods.chain(line, sample.readings, mask, *noise)
-        log_p = likelihoods.held_out(line, free, sample.readings, sample.protocol.mask & ~mask, *noise)
-        elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(len(theta))
-        error, floor, inside = [], [], []
-        for j in last:
-            keep = sample.protocol.mask[j]
-            c, s = line.by_creep[j][keep], line.by_setting[j][keep]
-            mean = line.tension[j][keep] + c * free.carried_mean[j]
-            p, q = free.carried_var[j], own["setting_sd"] ** 2
-            y = sample.readings[j][keep]
-            error.append(mean.mean(axis=1) - y[:, 0])
-            floor.append((variance + s**2 * q).mean(axis=1))
-            drawn = mean + rng.normal(size=mean.shape) * np.sqrt(variance + c**2 * p + s**2 * q)
-            low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
-            inside.append((y[:, 0] >= low) & (y[:, 0] <= high))
-        e = np.concatenate(error)
-        out.append(
-            HeldOut([int(n) for n in sample.protocol.number[last]], float((e**2).mean()), len(e),
-                    float(np.concatenate(floor).mean()), elpd, float(np.concatenate(inside).mean()))
-        )  # fmt: skip
-    return out
+    return [
+        _scored(ahead, trained_on.model, problem.parameters(theta, trained_on), k, rng)
+        for ahead, trained_on, k in zip(whole.samples, problem.samples, train, strict=True)
+    ]
+
+
+def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng: np.random.Generator) -> HeldOut:
+    """The recorded holds of a sample after the first `train`, predicted with draws of its own parameters."""
+    line = linearise(sample.protocol, own, model)
+    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+    noise = variance, own["setting_sd"]
+    last = np.flatnonzero(sample.protocol.recorded)[train:]
+    mask = sample.protocol.mask.copy()
+    mask[last] = False
+    carried = likelihoods.chain(line, sample.readings, mask, *noise)
+    log_p = likelihoods.held_out(line, carried, sample.readings, sample.protocol.mask & ~mask, *noise)
+    elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(log_p.shape[1])
+    error, floor, inside = [], [], []
+    for j in last:
+        keep = sample.protocol.mask[j]
+        by_creep, by_setting = line.by_creep[j][keep], line.by_setting[j][keep]
+        mean = line.tension[j][keep] + by_creep * carried.carried_mean[j]
+        known = variance + by_setting**2 * own["setting_sd"] ** 2
+        drawn = mean + rng.normal(size=mean.shape) * np.sqrt(known + by_creep**2 * carried.carried_var[j])
+        low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
+        y = sample.readings[j][keep][:, 0]
+        error.append(mean.mean(axis=1) - y)
+        floor.append(known.mean(axis=1))
+        inside.append((y >= low) & (y <= high))
+    e = np.concatenate(error)
+    return HeldOut(
+        [int(n) for n in sample.protocol.number[last]], float((e**2).mean()), len(e),
+        float(np.concatenate(floor).mean()), elpd, float(np.concatenate(inside).mean()),
+    )  # fmt: skip
 
 
 def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:

@@ -51,6 +51,34 @@ def occam(one_sided: bool) -> float:
     return float(0.5 * np.log(2 * np.pi) - np.log(LARGEST if one_sided else 2.0 * LARGEST))
 
 
+@dataclass(frozen=True)
+class _Profile:
+    """The evidence by amplitude, everything else refitted, amplitudes rising.
+
+    Attributes
+    ----------
+    amplitude : (a,) array
+    value : (a,) array
+        Log evidence against the blocks without the effect; -inf where no climb converged.
+    ends : sequence of (a, d) arrays
+        Where the climbs of each block ended, unconstrained.
+    """
+
+    amplitude: Array
+    value: Array
+    ends: Sequence[Array]
+
+    @property
+    def best(self) -> int:
+        return int(np.argmax(self.value))
+
+    def joined(self, other: "_Profile") -> "_Profile":
+        """Both as one; where an amplitude is in both, this one's."""
+        amplitude, order = np.unique(np.concatenate([self.amplitude, other.amplitude]), return_index=True)
+        ends = [np.concatenate(pair)[order] for pair in zip(self.ends, other.ends, strict=True)]
+        return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
+
+
 def refit(blocks: Sequence[LaplaceFit], which: Sequence[int], effect: Effect, per_delta: float, guess: float) -> Refit:
     """Refit one effect with one amplitude shared by the blocks `which`.
 
@@ -69,47 +97,62 @@ def refit(blocks: Sequence[LaplaceFit], which: Sequence[int], effect: Effect, pe
     one_sided = low >= main.neutral
     pinned = [Pinned(blocks[b], effect) for b in which]
     reference = sum(blocks[b].log_evidence for b in which)
-    starts = [p.starts() for p in pinned]
-
-    def curve(amplitudes: Array, start: list[Array] | None) -> tuple[Array, list[Array]]:
-        total, ends = np.zeros(len(amplitudes)), []
-        for i, p in enumerate(pinned):
-            begin = np.tile(starts[i], (len(amplitudes), 1)) if start is None else start[i]
-            k = len(begin) // len(amplitudes)
-            found = p.climb(begin, np.repeat(amplitudes, k))
-            value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
-            pick = np.argmax(value, axis=1)
-            total = total + value[np.arange(len(amplitudes)), pick]
-            ends.append(found.z.reshape(len(amplitudes), k, -1)[np.arange(len(amplitudes)), pick])
-        return total - reference, ends
-
     steps = np.concatenate([_DELTAS, [max(abs(guess) / per_delta, 0.3)]]) * per_delta
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
-    value, ends = curve(grid, None)
+    profile = _climbed(pinned, reference, grid, [np.tile(p.starts(), (len(grid), 1)) for p in pinned])
     outward = refined = 0
     while refined < 2:
-        best = int(np.argmax(value))
-        edge = best in (0, len(grid) - 1) and low < grid[best] < high and grid[best] != main.neutral
-        if edge and outward < _OUTWARD:
+        at = float(profile.amplitude[profile.best])
+        at_end = profile.best in (0, len(profile.amplitude) - 1)
+        if at_end and low < at < high and at != main.neutral and outward < _OUTWARD:
             # The scan's unit was too small: go on outwards before looking closer.
-            finer = np.clip(main.neutral + (grid[best] - main.neutral) * np.array([1.3, 1.7, 2.3]), low, high)
+            finer = np.clip(main.neutral + (at - main.neutral) * np.array([1.3, 1.7, 2.3]), low, high)
             outward += 1
         else:
-            left = grid[best - 1] if best else (main.neutral if one_sided else 2 * grid[0] - grid[1])
-            right = grid[best + 1] if best + 1 < len(grid) else grid[best]
-            finer = np.linspace(left, right, 8)[1:-1]
+            finer = _around(profile, main.neutral if one_sided else None)
             refined += 1
-        more, more_ends = curve(finer, [_between(grid, e, best, finer) for e in ends])
-        grid, value = np.concatenate([grid, finer]), np.concatenate([value, more])
-        ends = [np.concatenate([e, m]) for e, m in zip(ends, more_ends, strict=True)]
-        grid, order = np.unique(grid, return_index=True)
-        value, ends = value[order], [e[order] for e in ends]
-    best = int(np.argmax(value))
-    sd = _width(grid, value, best, per_delta)
-    log_bayes = float(value[best] + occam(one_sided))
-    theta = tuple(p.natural(e[best][None], grid[best : best + 1])[0] for p, e in zip(pinned, ends, strict=True))
-    return Refit(effect, tuple(which), log_bayes, float(grid[best]), sd, theta)
+        begin = [_between(profile.amplitude, e, profile.best, finer) for e in profile.ends]
+        profile = profile.joined(_climbed(pinned, reference, finer, begin))
+    return _summary(effect, which, pinned, profile, per_delta, one_sided)
+
+
+def _climbed(pinned: Sequence[Pinned], reference: float, amplitudes: Array, begin: Sequence[Array]) -> _Profile:
+    """The profile at amplitudes (a,): each block climbs from k starts an amplitude, (a k, d); the best end stays."""
+    total, ends, rows = np.zeros(len(amplitudes)), [], np.arange(len(amplitudes))
+    for block, start in zip(pinned, begin, strict=True):
+        k = len(start) // len(amplitudes)
+        found = block.climb(start, np.repeat(amplitudes, k))
+        value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
+        pick = np.argmax(value, axis=1)
+        total = total + value[rows, pick]
+        ends.append(found.z.reshape(len(amplitudes), k, -1)[rows, pick])
+    return _Profile(amplitudes, total - reference, ends)
+
+
+def _around(profile: _Profile, end: float | None) -> Array:
+    """Six amplitudes on either side of the best, no lower than `end` if there is one."""
+    grid, best = profile.amplitude, profile.best
+    outside = 2 * grid[0] - grid[1] if end is None else end
+    left = grid[best - 1] if best else outside
+    right = grid[best + 1] if best + 1 < len(grid) else grid[best]
+    return np.linspace(left, right, 8)[1:-1]
+
+
+def _summary(
+    effect: Effect,
+    which: Sequence[int],
+    pinned: Sequence[Pinned],
+    profile: _Profile,
+    per_delta: float,
+    one_sided: bool,
+) -> Refit:
+    best = profile.best
+    at = profile.amplitude[best : best + 1]
+    log_bayes = float(profile.value[best] + occam(one_sided))
+    sd = _width(profile.amplitude, profile.value, best, per_delta)
+    theta = tuple(p.natural(e[best][None], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
+    return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 
 
 def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:

@@ -5,12 +5,13 @@ linear map: tensions then stay apart from slackness where a plain box of poses a
 """
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import vector
-from wirebayes.robot.proof.ball_arithmetic import Balance
+from wirebayes.robot.proof.ball_arithmetic import Balance, Strand
 from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
@@ -137,6 +138,22 @@ def _linear_answer(middle: Balance, C: Floats, generators: tuple[Floats, Floats]
     return out
 
 
+class _Box(NamedTuple):
+    """Poses around the commanded one, in balls: all of them, and what is left of them beside the linear answer."""
+
+    whole: list[Any]
+    beside: list[Any]
+    line: Any  # (d, q), the linear answer to each parameter
+
+
+class _WireInBox(NamedTuple):
+    """One wire for all poses of a box and all parameters."""
+
+    pull: tuple[Any, Any]  # tension, N, and its slope by the stretched length, N/m
+    wrench: Any  # (d, 1), of 1 N
+    by_parameter: list[Any]  # the tension by each parameter, N
+
+
 def _image(
     middle: Balance,
     wide: Balance,
@@ -147,40 +164,57 @@ def _image(
     beside: Floats,
 ) -> Floats:
     """Largest distance of Krawczyk's image from the linear answer, (d,)."""
-    import flint
+    from flint import arb_mat
 
-    arb, d, q = flint.arb, len(C), Y.shape[1]
-    any_ = arb(0, 1)
-    box = [arb(0, float(r)) for r in (along + beside) * _UP]
-    rest = [arb(0, float(r)) for r in beside]
-    lines = flint.arb_mat(Y.tolist())
-    pulls, pushes, by_parameter = [], [], []
-    for i in range(wide.robot.legs):
-        strand = wide.strand(i, box)
-        # the strain by the mean value theorem in pose and parameters at once, so that what cancels does
-        stretch = [sum((strand.slope[k] * lines[k, j] for k in range(d)), arb(0)) for j in range(q)]
-        by_strain, by_own = wide.strain_slopes(i, strand.length)
-        strain = middle.strain(i, middle.strand(i, [arb(0)] * d).length)
-        for j in range(q):
-            strain += (by_strain * stretch[j] + by_own * arb(float(generators[1][i, j]))) * any_
-        strain += by_strain * sum((a * b for a, b in zip(strand.slope, rest, strict=True)), arb(0))
-        pulls.append(wide.pull(i, strain, strand.length))
-        by_k1, by_zero = wide.by_wire(i, strand.length, strain)
-        pushes.append(flint.arb_mat([[v] for v in strand.wrench]))
-        by_parameter.append((by_k1, by_zero))
-    _, slope = wide.evaluate(box, pulls)
-    precondition = flint.arb_mat(C.tolist())
+    d, q = Y.shape
+    box = _Box(_balls(middle, (along + beside) * _UP), _balls(middle, beside), arb_mat(Y.tolist()))
+    wires = [_wire_in_box(middle, wide, i, box, *own) for i, own in enumerate(zip(*generators, strict=True))]
+    _, slope = wide.evaluate(box.whole, [wire.pull for wire in wires])
+    precondition = arb_mat(C.tolist())
     turned = precondition * slope
-    eye = flint.arb_mat([[int(i == j) for j in range(d)] for i in range(d)])
     weight, forces = middle.at_centre()
-    image = (eye - turned) * flint.arb_mat([[r] for r in rest]) - precondition * weight
+    image = (_identity(d) - turned) * _column(box.beside) - precondition * weight
     for wrench, tau in forces:
         image -= (precondition * wrench) * tau
-    change = turned * lines
-    for push, (by_k1, by_zero), G, H in zip(pushes, by_parameter, *generators, strict=True):
-        moved = precondition * push
-        pulled = [by_k1 * arb(float(g)) + by_zero * arb(float(h)) for g, h in zip(G, H, strict=True)]
-        change += moved * flint.arb_mat([pulled])
-    image -= change * flint.arb_mat([[any_] for _ in range(q)])
+    change = turned * box.line
+    for wire in wires:
+        change += (precondition * wire.wrench) * arb_mat([wire.by_parameter])
+    image -= change * _column([middle.arb(0, 1)] * q)
     out = [image[k, 0].abs_upper() for k in range(d)]
     return np.array([np.nextafter(float(v), np.inf) if v.is_finite() else np.inf for v in out])
+
+
+def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H: Floats) -> _WireInBox:
+    """Wire `i` over the box, G (q,) and H (q,) its own rows of the generators."""
+    strand = wide.strand(i, box.whole)
+    strain = _strain(middle, wide, i, strand, box, H)
+    by_k1, by_zero = wide.by_wire(i, strand.length, strain)
+    by_parameter = [by_k1 * wide.arb(float(g)) + by_zero * wide.arb(float(h)) for g, h in zip(G, H, strict=True)]
+    return _WireInBox(wide.pull(i, strain, strand.length), _column(strand.wrench), by_parameter)
+
+
+def _strain(middle: Balance, wide: Balance, i: int, strand: Strand, box: _Box, H: Floats) -> Any:
+    """Strain of wire `i`, by the mean value theorem in pose and parameters at once, so that what cancels does."""
+    arb = wide.arb
+    by_strain, by_own = wide.strain_slopes(i, strand.length)
+    strain = middle.strain(i, middle.strand(i, [arb(0)] * len(box.whole)).length)
+    for j, h in enumerate(H):
+        stretch = sum((slope * box.line[k, j] for k, slope in enumerate(strand.slope)), arb(0))
+        strain += (by_strain * stretch + by_own * arb(float(h))) * arb(0, 1)
+    return strain + by_strain * sum((a * b for a, b in zip(strand.slope, box.beside, strict=True)), arb(0))
+
+
+def _balls(balance: Balance, radii: Floats) -> list[Any]:
+    return [balance.arb(0, float(r)) for r in radii]
+
+
+def _column(balls: list[Any]) -> Any:
+    from flint import arb_mat
+
+    return arb_mat([[v] for v in balls])
+
+
+def _identity(d: int) -> Any:
+    from flint import arb_mat
+
+    return arb_mat([[int(i == j) for j in range(d)] for i in range(d)])
