@@ -105,3 +105,83 @@ def test_a_set_known_by_refits_alone_keeps_its_weight(monkeypatch: pytest.Monkey
 def test_a_remainder_alone_needs_no_test(monkeypatch: pytest.MonkeyPatch) -> None:
     found = decided(monkeypatch, explored({"a": 3.0}, smooth=12.0), {}, {})
     assert found.best is None and verdict_of(found, 0) == ("unknown", [])
+
+
+def test_a_remainder_in_question_is_tried_on_four_sets_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best one and three others; the fifth would pass, and is not asked."""
+    sets = {"a": 20.0, "b": 19.9, "c": 19.8, "d": 19.7, "e": 19.6}
+    failing = dict.fromkeys("abcd", 0.01)
+    assert names(decided(monkeypatch, explored(sets), {}, failing)) == "a"
+    failing.pop("d")
+    assert names(decided(monkeypatch, explored(sets), {}, failing)) == "d"
+
+
+def test_sets_that_failed_the_second_test_lose_their_weight_to_the_one_that_passed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = decided(monkeypatch, explored({"a": 20.0, "b": 19.0, "c": 18.5}), {}, {"a": 0.01, "b": 0.02})
+    assert names(found) == "c"
+    assert set(found.posterior.inclusion) == {"c"} and verdict_of(found, 0)[0] == "named"
+
+
+def test_nothing_left_to_add_passes_the_second_test() -> None:
+    """No candidate is left that could be missing, so no simulation is needed."""
+    whole = SimpleNamespace(scanned=([], [], []), blocks=[None, None])
+    found = verdict._retested(whole, Settings(), np.random.default_rng(0), map)  # type: ignore[arg-type]
+    assert found == Retest(None, [[], []])
+    assert not verdict._fails(found)
+    assert verdict._fails(Retest(0.03, [[]])) and not verdict._fails(Retest(0.0301, [[]]))
+
+
+@pytest.mark.parametrize("before", [True, False])
+def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the set without it was fitted, against that, else against the plain model; in its own materials alone."""
+    monkeypatch.setattr(verdict.held_out, "leave_one_hold_out", lambda fit, rng: np.array(fit))
+    plain = [[1.0], [2.0, 2.0], [3.0]]
+    sets = explored({"a": 1.0, "ab": 2.0})
+    sets.fitted[frozenset("a")].blocks[:] = [[5.0], [6.0, 6.0], [7.0]]
+    best = sets.fitted[frozenset("ab")]
+    best.blocks[:] = [[10.0], [20.0, 20.0], [30.0]]
+    best.accepted = (best.accepted[0], Accepted("b", (1, 2), {}))  # type: ignore[misc]
+    if not before:
+        del sets.fitted[frozenset("a")]
+    found = verdict._gain(plain, best, sets, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    assert found.tolist() == ([0.0, 28.0, 23.0] if before else [0.0, 36.0, 27.0])
+
+
+def test_effects_are_established_in_the_materials_where_they_act(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = decided(monkeypatch, explored({"a": 30.0, "ab": 60.0}), {"ab": 20.0}, {})
+    assert [a.name for a in verdict.established(found, 0)] == ["a", "b"]
+    assert verdict.established(found, 1) == []  # no effect acts in a second material
+    assert found.gains.keys() == {"a", "b"} and found.gains["b"].tolist() == [20.0]
+    none = decided(monkeypatch, explored({"a": 3.0}, smooth=12.0), {}, {})
+    assert verdict.established(none, 0) == []
+
+
+def test_the_chain_of_sets_is_reported_effect_by_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step whose set was never fitted has no gain of its own."""
+    sets = explored({"a": 20.0, "ab": 40.0, "abc": 60.0})
+    del sets.fitted[frozenset("ab")]
+    assert list(decided(monkeypatch, sets, {}, {}).gains) == ["a", "c"]
+
+
+def test_more_models_than_three_beside_the_final_one_are_not_listed() -> None:
+    from wirebayes.discovery.verdict import alternatives
+
+    letters = "abcdef"
+    sets = [EffectSet((n,), 0.0, {}, None) for n in letters]
+    block = {n: SimpleNamespace(effects=[SimpleNamespace(key=n)]) for n in letters}
+    chances = [0.3, 0.2, 0.17, 0.13, 0.11, 0.09]
+    space = SimpleNamespace(sets=sets, without=chances, beside=[0.0] * 6)
+    known = SimpleNamespace(fitted={s.key: SimpleNamespace(blocks=[block[s.names[0]]]) for s in sets})
+    given = SimpleNamespace(posterior=space), known, 0, block["b"]
+    found = alternatives(*given, "named")  # type: ignore[arg-type]
+    assert [a.block.effects[0].key for a in found] == ["b", "a", "c", "d"]
+    assert sum(a.probability for a in found) == pytest.approx(1.0)
+    assert found[1].probability == pytest.approx(0.3 / 0.8)
+    space.without = [0.04, 0.9, 0.03, 0.03, 0.0, 0.0]  # improbable ones are not sampled beside it
+    assert alternatives(*given, "named") == []  # type: ignore[arg-type]
+    space.without = [0.05, 0.9, 0.03, 0.02, 0.0, 0.0]
+    assert len(alternatives(*given, "named")) == 2  # type: ignore[arg-type]
+    space.without = [0.0] * 6
+    assert alternatives(*given, "named") == []  # type: ignore[arg-type]

@@ -10,6 +10,7 @@ from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, neste
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, kept
 from wirebayes.inference.sampler.kept import OUTWEIGHS
+from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.state import Diagnostics, Kept, Learned, Sampling, Walkers
 
 ENSEMBLES, WALKERS, D = 4, 32, 3
@@ -121,3 +122,104 @@ def test_places_that_the_proposal_overlooks(nats: float, again: int, finished: b
     state, _ = looked(draws(64), overlooked=nats, again=again)
     assert (state.finished, state.converged) == (finished, converged)
     assert ("makes too little of some places" in state.why) is (finished and not converged)
+
+
+def after(steps: int, ess: float, memory: float = 1.0, evaluations: int = 0, **learned: float) -> Sampling:
+    """A run that was looked at after so many steps."""
+    about = Diagnostics(np.full(D, memory), np.array([ess, 2.0 * ess, 3.0 * ess]), np.ones(D))
+    rows = np.empty((steps, ENSEMBLES * WALKERS, D))
+    blocks = Kept((rows,), (rows[..., 0],), evaluations)
+    known = Learned(None, None, 1, **learned)  # type: ignore[arg-type]
+    return Sampling(None, known, None, 0, blocks, about)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("steps", "ess", "memory", "most_steps", "more"),
+    [
+        (100, 2000.0, 1.0, 4000, 50),  # effective draws grow with the steps: half as many again are missing
+        (100, 2900.0, 1.0, 4000, 8),  # three steps would do; the rule is not looked at so often
+        (100, 1000.0, 1.0, 4000, 100),  # no further than it has looked
+        (100, 2900.0, 25.0, 4000, 25),  # five autocorrelation times are 125 steps
+        (100, 2000.0, 1.0, 120, 20),  # the last step is the last
+    ],
+)
+def test_a_block_has_the_steps_that_are_missing(
+    steps: int, ess: float, memory: float, most_steps: int, more: int
+) -> None:
+    policy = Policy(ess=3000.0, block=32, most_steps=most_steps)
+    assert kept.block_steps(after(steps, ess, memory), policy) == more
+
+
+def test_a_short_first_block_may_be_followed_by_short_ones() -> None:
+    policy = Policy(ess=3000.0, block=4)
+    assert kept.block_steps(replace(after(4, 1.0), diagnostics=None), policy) == 4
+    assert kept.block_steps(after(8, 2999.0), policy) == 4
+
+
+@pytest.mark.parametrize(("ess", "again"), [(2100.0, False), (1900.0, True)])
+def test_a_poor_proposal_is_learned_again(ess: float, again: bool) -> None:
+    """Fewer than one effective draw in five evaluations: a mode may be about to be found, though little is missing."""
+    assert kept.promises_more(after(100, ess, evaluations=10_000), Policy(ess=2200.0)) is again
+
+
+@pytest.mark.parametrize(("wanted", "again"), [(10_000.0, False), (80_000.0, True)])
+def test_what_is_left_to_do_is_weighed_against_a_new_start(wanted: float, again: bool) -> None:
+    """At 0.25 effective draws an evaluation 10,000 wanted cost 20,000 more, 80,000 cost 300,000; learned once more, at
+    0.4, 29,096 and 204,096."""
+    assert kept.promises_more(after(100, 5000.0, evaluations=20_000), Policy(ess=wanted)) is again
+
+
+@pytest.mark.parametrize(
+    ("finished", "again", "overlooked", "starts_anew"),
+    [(False, 0, 0.0, True), (False, 1, 0.0, False), (False, 1, OUTWEIGHS + 0.1, True), (True, 0, 9.0, False)],
+)
+def test_draws_count_as_burn_in_once_or_for_what_was_overlooked(
+    finished: bool, again: int, overlooked: float, starts_anew: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    poor = replace(after(100, 10.0, evaluations=10_000, again=again, overlooked=overlooked), finished=finished)
+    monkeypatch.setattr(kept, "more", lambda target, state, policy: state)
+    monkeypatch.setattr(kept, "looked", lambda target, state, policy: state)
+    monkeypatch.setattr(burn_in, "again", lambda target, state, policy: "anew")
+    found = kept.step(None, poor, Policy())  # type: ignore[arg-type]
+    assert (found == "anew") is starts_anew
+
+
+def test_a_block_is_kept_with_its_densities_and_what_it_cost() -> None:
+    target = gaussian(D)
+    policy = Policy(ensembles=ENSEMBLES, walkers=WALKERS, block=16)
+    rng = np.random.RandomState(0)
+    z = rng.normal(size=(ENSEMBLES * WALKERS, D))
+    wide = Mixture(np.ones(1), np.zeros((1, D)), np.eye(D)[None])
+    state = Sampling(Walkers(z, target(z), rng.get_state()), Learned(wide, wide, 1), None, 1000)  # type: ignore[arg-type]
+    for blocks in (1, 2):
+        before = target.evaluations
+        state = kept.more(target, state, policy)  # type: ignore[arg-type]
+        found = state.kept
+        assert found.steps == 16 * blocks == len(np.concatenate(found.log_density))
+        assert np.concatenate(found.log_density)[-1] == pytest.approx(target(found.z[-1][-1]))
+        assert found.proposed == 16 * blocks * ENSEMBLES * WALKERS
+        whole = np.concatenate([z[None], *found.z])
+        assert found.accepted == (np.diff(whole, axis=0) != 0).any(axis=2).sum()
+        assert state.evaluations == 1000 + found.evaluations
+        assert target.evaluations - before >= 16 * ENSEMBLES * WALKERS
+
+
+def test_walkers_belong_to_the_ensemble_in_whose_row_they_stand() -> None:
+    policy = Policy(ensembles=3, walkers=2)
+    blocks = [np.arange(6.0)[None, :, None] + 10.0 * np.array([0.0, 1.0])[:, None, None], np.full((1, 6, 1), 20.0)]
+    found = kept.by_ensemble(blocks, policy)
+    assert found.shape == (3, 3, 2, 1)
+    assert found[1, :, :, 0].tolist() == [[2.0, 3.0], [12.0, 13.0], [20.0, 20.0]]
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_a_positive_parameter_is_judged_by_its_logarithm(unit: float) -> None:
+    """Whatever its unit; by itself a tail of 12 decades would hide that one ensemble lies a factor of ten off."""
+    z = draws(200)
+    z[:, :WALKERS, 0] += np.log(10.0)
+    target = gaussian(D)
+    expected = looked(z)[1]
+    target.coordinates.log_columns[:] = True
+    target.coordinates.to_natural = lambda z: unit * np.exp(z)
+    found = kept._diagnosed(target, by_ensemble(z))  # type: ignore[arg-type]
+    assert found.r_hat == pytest.approx(expected.r_hat) and found.ess == pytest.approx(expected.ess)

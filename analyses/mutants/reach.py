@@ -1,0 +1,72 @@
+"""Which fast tests run a line: measured once a test file, and again when the file or its helpers change."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from analyses.mutants.tree import reach_of
+
+# Folders whose tests say what the modules of a package do; others only run them.
+TESTS = {
+    "model": ["tests/model"],
+    "inference": ["tests/inference"],
+    "results": ["tests/results"],
+    "prediction": ["tests/prediction"],
+    "comparison": ["tests/comparison"],
+    "discovery": ["tests/discovery"],
+    "robot": ["tests/robot"],
+}
+
+
+_PATIENCE_CPU_S = 60.0  # a file that takes longer has no test for a mutant
+
+
+class Reach:
+    """Seconds of each test and, for each line of the package, the tests that run it."""
+
+    def __init__(self, rows: Iterable[dict]) -> None:
+        self.seconds: dict[str, float] = {}
+        self.of_line: dict[tuple[str, int], set[str]] = {}
+        for row in rows:
+            self.seconds |= row["seconds"]
+            for test, files in row["lines"].items():
+                for file, lines in files.items():
+                    for line in lines:
+                        tests = row["seconds"] if test == "fixtures" else [test]
+                        self.of_line.setdefault((file, line), set()).update(tests)
+
+    def tests(self, lines: Iterable[tuple[str, int]], budget_s: float) -> list[str]:
+        """The quickest tests that run any of the lines, as far as the seconds last; by file, quick files first."""
+        able = set().union(*(self.of_line.get(line, set()) for line in lines))
+        chosen, spent = [], 0.0
+        for test in sorted(able, key=lambda test: (self.seconds[test], test)):
+            spent += self.seconds[test]
+            if spent > budget_s:
+                break
+            chosen.append(test)
+        of_file: dict[str, float] = {}
+        for test in chosen:
+            of_file[test.split("::")[0]] = of_file.get(test.split("::")[0], 0.0) + self.seconds[test]
+        return sorted(chosen, key=lambda test: (of_file[test.split("::")[0]], test.split("::")[0], self.seconds[test]))
+
+
+def measure(tree: Path, record: Path, packages: Iterable[str]) -> Reach:
+    """Take from the record what still holds, measure the rest, and keep it there."""
+    known = {row["key"]: row for row in map(json.loads, record.read_text().splitlines())} if record.exists() else {}
+    rows = []
+    for file in test_files(tree, packages):
+        key = f"{file} {hashlib.sha256((tree / file).read_bytes()).hexdigest()[:16]}"
+        if key not in known:
+            print(f"reach of {file}", flush=True)
+            known[key] = {"key": key} | reach_of(tree, file, tree.parent / "reach.json", _PATIENCE_CPU_S)
+            with record.open("a") as out:
+                out.write(json.dumps(known[key]) + "\n")
+        rows.append(known[key])
+    return Reach(rows)
+
+
+def test_files(tree: Path, packages: Iterable[str]) -> list[str]:
+    """Of the folders of some packages."""
+    folders = [tree / folder for package in packages for folder in TESTS[package]]
+    return [str(path.relative_to(tree)) for folder in folders for path in sorted(folder.rglob("test_*.py"))]

@@ -1,0 +1,121 @@
+"""Which sets the search fits: by promise, a few at once, and no more than it says."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery import stepwise
+from wirebayes.discovery.model_space import EffectSet, log_prior
+from wirebayes.discovery.name_evidence import NameEvidence
+from wirebayes.discovery.settings import LEFT_OVER, MOST_EFFECTS, MOST_LOOKS, REACH, Settings
+
+NAMES = 20
+ONE = np.ones(1)
+PAIR = log_prior(2, NAMES)  # by which a set of two is less likely beforehand than one of one
+
+
+def evidence(values: dict[str, float]) -> NameEvidence:
+    refits = {name: [SimpleNamespace(effect=SimpleNamespace(key=name), blocks=(0,), sd=1.0)] for name in values}
+    return NameEvidence(values, refits, dict.fromkeys(values, ONE))  # type: ignore[arg-type]
+
+
+def explored(
+    monkeypatch: pytest.MonkeyPatch,
+    singles: dict[str, float],
+    further: dict[str, dict[str, float]] | None = None,
+    smooth: float = -20.0,
+    credits: dict[str, float] | None = None,
+    remainders: dict[str, float] | None = None,
+) -> tuple[stepwise.Explored, list[str]]:
+    """What the search makes of sets whose evidence is written down, and the order in which it fitted them."""
+    order: list[str] = []
+
+    def fit(parent: Any, name: str, *others: Any) -> stepwise.FittedSet:
+        names = (*parent.effects.names, name)
+        order.append("".join(sorted(names)))
+        left = np.array([(remainders or {}).get(order[-1], -20.0)])
+        more = (further or {}).get(order[-1])
+        found = None if more is None else evidence(more)
+        return stepwise.FittedSet(EffectSet(names, 0.0, {}, left), [], (), found, ([], [], []))
+
+    monkeypatch.setattr(stepwise, "_fit", fit)
+    known = {name: np.array([value]) for name, value in (credits or {}).items()}
+    monkeypatch.setattr(stepwise, "_credits", lambda expansions, trials: known)
+    scans: Any = [SimpleNamespace(flexible=np.array([smooth]))]
+    settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
+    found = stepwise.explore(
+        [None], evidence(singles), [], [], scans, settings, np.random.default_rng(0), map  # type: ignore[list-item]
+    )  # fmt: skip
+    return found, order
+
+
+def test_the_three_most_promising_names_are_fitted_first_then_two_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    singles = {name: 20.0 - 0.1 * k for k, name in enumerate("abcdefghij")}
+    found, order = explored(monkeypatch, singles)
+    assert "".join(order) == "abcdefg" and len(order) == MOST_LOOKS == 7
+    assert [s.names for s in found.sets][0] == () and len(found.sets) == 11  # the others keep their evidence
+
+
+def test_what_lies_too_far_below_the_best_is_not_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert explored(monkeypatch, {"a": 20.0, "b": 20.1 - REACH, "c": 19.9 - REACH})[1] == ["a", "b"]
+
+
+def test_the_best_set_is_fitted_though_all_looks_are_spent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each fit finds a still better set of one effect more; four effects are the most."""
+    chain = {"a": {"b": 15.0}, "ab": {"c": 15.0}, "abc": {"d": 15.0}, "abcd": {"e": 15.0}}
+    singles = dict.fromkeys("a", 20.0)
+    found, order = explored(monkeypatch, singles, chain)
+    assert order == ["a", "ab", "abc", "abcd"] and MOST_EFFECTS == 4
+    assert found.fitted[frozenset("abc")].effects.log_bayes == 50.0
+    many = {name: 20.0 - 0.01 * k for k, name in enumerate("abcdefg")}
+    last = {"g": {"h": 15.0}}  # the seventh look finds the best set of all
+    assert explored(monkeypatch, many, last)[1][-1] == "gh"
+
+
+def test_an_effect_that_explains_nothing_more_makes_no_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = explored(monkeypatch, {"a": 20.0}, {"a": {"b": 0.1, "c": 0.0, "d": -1.0}})
+    assert [set(s.names) for s in found.sets] == [set(), {"a"}, {"a", "b"}]
+    assert [s.log_bayes for s in found.sets] == [0.0, 20.0, 20.1]
+
+
+def test_a_set_keeps_the_better_of_two_chains(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two orders of the same names, whose refits found different evidence."""
+    found, _ = explored(monkeypatch, {"a": 10.0, "b": 10.0}, {"a": {"b": 2.5}, "b": {"a": 3.0}})
+    (pair,) = [s for s in found.sets if len(s.names) == 2]
+    assert pair.log_bayes == 13.0 and pair.names == ("b", "a")
+
+
+def test_a_set_that_is_good_beside_a_remainder_is_fitted_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alone b is hopeless; beside a remainder, which has half the weight of none, it may come to 25 nats."""
+    promised = {"a": -30.0, "b": 20.0}
+    order = explored(monkeypatch, {"a": 24.0, "b": 1.0}, smooth=5.0, credits=promised)[1]
+    assert order == ["b", "a"]
+    assert explored(monkeypatch, {"a": 24.0, "b": 1.0}, smooth=5.0, credits={"a": -30.0, "b": 14.0})[1] == ["a"]
+
+
+def test_the_promise_of_a_fitted_set_is_what_its_fit_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With b fitted, its remainder is known to be small, so that c, six nats below the best name, is within reach."""
+    singles, promised = {"a": 24.0, "b": 1.0, "c": 20.5}, {"a": -30.0, "b": 40.0, "c": -30.0}
+    order = explored(monkeypatch, singles, smooth=5.0, credits=promised)[1]
+    assert order == ["b", "a", "c"]
+
+
+def test_what_further_effects_explain_may_be_a_remainder_that_is_not_smooth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is as likely as one further effect, and explains no more than its bound."""
+    for value in (5.0, 20.0):
+        found, _ = explored(monkeypatch, {"a": 20.0, "b": 18.0}, {"a": {"c": value, "d": 1.0}})
+        # the remainder's weight of a half comes on top
+        assert found.left_over == {frozenset("a"): pytest.approx(np.log(1.0 / 0.5) + PAIR + min(value, LEFT_OVER))}
+
+
+def test_credit_beside_a_remainder_is_that_of_the_best_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    from wirebayes.discovery.refit import occam
+
+    values = {"x": np.array([1.0, 5.0, 3.0, 9.0]), "y": np.array([4.0, 2.0, 0.0, 9.0])}
+    monkeypatch.setattr(stepwise, "beside_smooth", lambda x: values[x])
+    trials: Any = [SimpleNamespace(effect=SimpleNamespace(name=n), one_sided=n == "a") for n in "aab"]
+    found = stepwise._credits(["x", "y"], trials)  # type: ignore[list-item]
+    assert found["a"] == pytest.approx(np.array([5.0, 4.0]) + occam(True))
+    assert found["b"] == pytest.approx(np.array([3.0, 0.0]) + occam(False))

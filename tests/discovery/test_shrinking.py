@@ -1,0 +1,159 @@
+"""Whether the gap shrinks: the rule at its thresholds, sums over holds by hand, and which model is which."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery import held_out, shrinking
+from wirebayes.discovery.held_out import HeldOut, gap_closed, last_third
+from wirebayes.discovery.shrinking import _compared, _Gain
+from wirebayes.effects import named
+from wirebayes.io.paper import experiments
+
+
+def held(squares: float, elpd: Any = (0.0, 0.0), floor: float = 1.0, inside: float = 0.9) -> HeldOut:
+    return HeldOut([9, 10], squares, 10, floor, np.array(elpd, float), inside)
+
+
+@pytest.mark.parametrize(
+    ("final", "error", "flexible", "shrinks"),
+    [
+        (4.1, 1.0, 0.0, True),
+        (3.9, 1.0, 0.0, False),  # a difference below four may be chance
+        (6.1, 3.0, 0.0, True),
+        (5.9, 3.0, 0.0, False),  # two standard errors
+        (9.0, 1.0, 9.0, True),  # as good as a smooth curve
+        (9.0, 1.0, 9.1, False),
+    ],
+)
+def test_the_gap_shrinks_when_the_gain_is_clear_and_no_curve_does_better(
+    final: float, error: float, flexible: float, shrinks: bool
+) -> None:
+    assert _Gain(final, error, flexible).shrinks is shrinks
+
+
+def test_the_gap_closed_is_a_share_of_the_excess_over_noise() -> None:
+    """Mean squared errors of 5 and 2 above a noise of 1: three quarters of the excess are gone."""
+    assert gap_closed(held(5.0), held(2.0)) == pytest.approx(0.75)
+    assert gap_closed(held(5.0), held(9.0)) == pytest.approx(-1.0)
+    assert gap_closed(held(5.0, floor=7.0), held(1.0)) == 1.0  # the final model's noise counts
+    assert gap_closed(held(1.0), held(0.5)) is None  # nothing was in excess
+    assert held(4.0).rmse_N == 2.0
+
+
+@pytest.mark.parametrize(("holds", "train"), [(3, 0), (4, 3), (5, 3), (6, 4), (9, 6), (11, 7)])
+def test_the_last_third_is_held_out_where_there_are_four_holds(holds: int, train: int) -> None:
+    one = experiments()[2]
+    assert last_third(replace(one, holds=one.recorded_holds[:holds])) == train
+
+
+@pytest.mark.parametrize("remains", [False, True])
+def test_gains_are_sums_over_holds_with_their_spread(remains: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two experiments; fits in the order plain, with the effects, plain with a discrepancy, effects with one."""
+    plain, effects = np.array([1.0, 2.0, 3.0, 4.0]), np.array([4.0, 4.0, 4.0, 8.0])
+    smooth, both = [np.array([2.0, 3.0]), np.array([4.0, 5.0])], [np.array([7.0, 7.0]), np.array([7.0, 11.0])]
+    fits = [plain, effects, *smooth, *(both if remains else [])]
+    monkeypatch.setattr(held_out, "leave_one_hold_out", lambda fit, rng: fit)
+    found = shrinking._gain(fits, 1, 2, remains, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    gained = np.array([6.0, 5.0, 4.0, 7.0] if remains else [3.0, 2.0, 1.0, 4.0])
+    assert found.final == gained.sum() and found.flexible == 4.0
+    assert found.standard_error == pytest.approx(2.0 * np.std(gained, ddof=1))  # the root of four holds
+
+
+def test_a_gain_without_named_effects_is_that_of_the_discrepancy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(held_out, "leave_one_hold_out", lambda fit, rng: fit)
+    fits = [np.array([1.0, 2.0]), np.array([4.0, 8.0])]
+    found = shrinking._gain(fits, 0, 1, True, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    assert found.final == found.flexible == 9.0
+
+
+def test_a_report_compares_the_final_model_with_the_plain_one() -> None:
+    plain, final = held(5.0, [1.0, 2.0], inside=0.5), held(2.0, [4.0, 6.0])
+    gain = _Gain(9.0, 1.0, 2.0)
+    found = _compared(plain, final, held(3.0), gain)
+    assert found["plain"] == {"rmse_N": np.sqrt(5.0), "elpd": 3.0, "coverage_90": 0.5}
+    assert found["final"]["elpd"] == 10.0
+    assert found["final"]["elpd_difference_se"] == pytest.approx(1.0)  # of 3 and 4: sd √½, times √2
+    assert (found["floor_N"], found["gap_closed"], found["shrinks"]) == (1.0, 0.75, True)
+    assert found["leave_one_hold_out"]["flexible_elpd_difference"] == 2.0
+    alone = _compared(held(5.0, [1.0]), held(2.0, [4.0]), None, None)
+    assert alone["final"]["elpd_difference_se"] is None and alone["flexible"] is None
+    assert alone["gap_closed"] is None and alone["shrinks"] is False
+    assert _compared(plain, final, None, _Gain(0.0, 1.0, 0.0))["shrinks"] is False
+
+
+def test_an_event_of_another_test_and_a_comparison_of_lengths_do_not_act_on_one_alone() -> None:
+    one = experiments()[0]
+    slip = replace(named("grip_slip@4"), test=one.name)  # type: ignore[type-var]
+    elsewhere, anywhere = replace(slip, test="another"), named("memory")
+    lengths = SimpleNamespace(compares_lengths=True)
+    assert shrinking.alone([slip, elsewhere, anywhere, lengths], one) == (slip, anywhere)  # type: ignore[list-item]
+
+
+def test_a_discrepancy_is_as_slow_as_the_holds_are_long() -> None:
+    one = experiments()[0]
+    holds = [replace(h, duration_s=seconds) for h, seconds in zip(one.holds, (150.0, 600.0, 200.0), strict=False)]
+    found = shrinking.discrepancy(replace(one, holds=tuple(holds)), 0.3)
+    assert found == type(found)(3, 0.3, 200.0)
+    at_once = [replace(h, time_s=0.0 * h.time_s, duration_s=0.0) for h in holds]
+    assert shrinking.discrepancy(replace(one, holds=tuple(at_once)), 0.3) == type(found)(3, 0.3, 1.0)
+
+
+class Model(SimpleNamespace):
+    """A fit that knows its name and its experiments."""
+
+
+def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, holds: int = 9) -> list[Any]:
+    """Reports of two experiments where a model's squared error says which one it is, and on what."""
+    error = {"plain": 50.0, "a": 40.0, "ab": 30.0, "plain~": 20.0, "a~": 15.0, "ab~": 10.0}
+    pair = tuple(replace(e, holds=e.recorded_holds[:holds]) for e in experiments()[1:3])
+    models = [Model(name=name, experiments=pair, effects=(), law="", history="") for name in ("plain", *stages)]
+
+    def predicted(trained: Any, rng: Any) -> list[HeldOut]:
+        smooth = "~" if trained.effects == ("discrepancy",) else ""
+        assert list(trained.train) == [last_third(e) for e in trained.experiments]
+        names = [e.name for e in pair]
+        return [held(error[trained.block.name + smooth] + names.index(e.name)) for e in trained.experiments]
+
+    def gained(fits: list[Any], named: int, n: int, remains: bool, rng: Any, parallel_map: Any) -> _Gain:
+        said = [f.name for f in fits]
+        base = (["plain", stages[-1]] if stages else ["plain"]) + ["~"] * (4 if remains and stages else 2)
+        assert said == base and named == bool(stages) and n == 2
+        return _Gain(9.0, 1.0, 2.0)
+
+    monkeypatch.setattr(shrinking, "_predicted", predicted)
+    monkeypatch.setattr(shrinking, "with_discrepancy", lambda base, e, rng: ("discrepancy",))
+    monkeypatch.setattr(shrinking, "fitted", lambda *given: Model(name="~"))
+    monkeypatch.setattr(shrinking, "_gain", gained)
+    return shrinking.shrinking(
+        models[0], models[1:], stages, remains, np.random.default_rng(0), map  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("stages", "remains", "final", "flexible"),
+    [(["a", "ab"], False, 30.0, 20.0), (["a", "ab"], True, 10.0, 20.0), ([], True, 20.0, 20.0), ([], False, 50.0, 0.0)],
+)
+def test_every_model_is_scored_under_its_own_name(
+    stages: list[str], remains: bool, final: float, flexible: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for i, report in enumerate(scored(monkeypatch, stages, remains)):
+        squares = {m["model"]: round(m["rmse_N"] ** 2, 9) for m in report.steps}
+        assert squares == {"plain": 50.0 + i} | {"a": 40.0 + i, "ab": 30.0 + i} if stages else {"plain": 50.0 + i}
+        assert report.held_out["final"]["rmse_N"] ** 2 == pytest.approx(final + i)
+        if flexible:
+            assert report.held_out["flexible"]["rmse_N"] ** 2 == pytest.approx(flexible + i)
+            assert report.held_out["shrinks"]
+        else:  # nothing was added, so nothing shrinks
+            assert report.held_out["flexible"] is None and not report.held_out["shrinks"]
+
+
+def test_too_few_holds_are_not_held_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = scored(monkeypatch, ["a"], False, holds=3)
+    assert [(f.held_out["holds"], f.held_out["shrinks"], f.held_out["final"]["elpd"]) for f in found] == [
+        ([], False, None)
+    ] * 2
+    assert [m["model"] for m in found[0].steps] == ["plain", "a"]

@@ -1,0 +1,207 @@
+"""Burn-in by its parts: weights that no row may swallow, places by weight, and what the proposal overlooks."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.statistical.targets import gaussian
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import burn_in, proposal
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
+
+D = 3
+NORMAL = Mixture(np.ones(1), np.zeros((1, D)), np.eye(D)[None], 1e6)
+
+
+def test_no_row_counts_for_more_than_the_root_of_all() -> None:
+    """Of 400 rows one has nearly all weight; twenty times the mean is left to it, a share of 20 / 21."""
+    log_weight = np.full(400, 0.0)
+    log_weight[7] = 50.0
+    weight = np.exp(log_weight - 50.0)
+    capped = np.minimum(weight, 20.0 * weight.mean())
+    rows = burn_in._resampled(log_weight, 10_000, np.random.default_rng(0))
+    assert np.mean(rows == 7) == pytest.approx(capped[7] / capped.sum(), abs=1e-3)
+    even = burn_in._resampled(np.zeros(400), 4000, np.random.default_rng(0))
+    assert (np.bincount(even, minlength=400) == 10).all()
+    assert np.abs(np.corrcoef(even, np.arange(4000))[0, 1]) < 0.1  # in random order
+
+
+def test_ensembles_begin_at_places_of_their_own_by_weight() -> None:
+    """Weights of one and two in turn, the same in every ensemble: twice as many walkers begin at the heavier places."""
+    policy = Policy(ensembles=3, walkers=600)
+    places = 60
+    weight = np.where(np.arange(places) // 3 % 2, 2.0, 1.0)
+    rows = burn_in._placed(policy, np.log(weight), np.random.default_rng(1)).reshape(3, 600)
+    for i, own in enumerate(rows):
+        assert set(own) == set(range(i, places, 3))
+        assert np.mean(weight[own] == 2.0) == pytest.approx(2 / 3, abs=0.02)
+
+
+def test_warm_and_cold_draws_follow_their_densities() -> None:
+    """Two places as often as each other, one three times as dense: the warm density is the power 0.4 of that."""
+    z = np.repeat([[0.0], [1.0]], 500, axis=0)
+    value = np.log(3.0) * z[:, 0]
+    hot, cold = burn_in._resampled_twice(z, value, np.zeros(1000), np.random.default_rng(2))
+    assert cold.mean() == pytest.approx(0.75, abs=0.002)
+    assert hot.mean() == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4), abs=0.002)
+    cold = burn_in._resampled_twice(z, value, value, np.random.default_rng(2))[1]  # places that came by weight
+    assert cold.mean() == pytest.approx(0.5, abs=0.002)
+
+
+def test_the_start_has_no_walker_where_the_density_is_zero() -> None:
+    def half(z: np.ndarray) -> np.ndarray:
+        return np.where(z[:, 0] > 0, -0.5 * (z**2).sum(axis=1), -np.inf)
+
+    target = type("Half", (), {"__call__": lambda self, z: half(z), "problem": gaussian(D).problem})()
+    z, value = burn_in._finite_draws(target, NORMAL, 501, np.random.RandomState(0))
+    assert z.shape == (501, D) and (z[:, 0] > 0).all()
+    assert np.array_equal(value, half(z))
+
+
+@pytest.mark.parametrize(("shift", "witness"), [(0.0, None), (0.0, 0.0), (9.0, 9.0)])
+def test_what_the_proposal_overlooks_is_measured_in_nats(shift: float, witness: float | None) -> None:
+    """Evenly spread log ratios of posterior to proposal, from -5 to 5: the 99.9 % quantile is 4.99 above the median.
+
+    The search left places of the same ratios, or of some that lie 9 nats higher: their 99 % quantile counts then.
+    """
+    z = np.zeros((1001, D))
+    base = NORMAL.log_density(z)
+    ratios = np.linspace(-5.0, 5.0, 1001)
+    left = None if witness is None else (z, base + ratios + witness)
+    learned = Learned(NORMAL, NORMAL, 1, left)
+    expected = 4.99 if not shift else 4.9 + shift
+    assert burn_in.overlooked(learned, z, base + ratios + 100.0 if left is None else base + ratios) == pytest.approx(
+        expected, abs=0.011
+    )
+
+
+def test_burn_in_walks_with_few_walkers() -> None:
+    """A quarter of them, but two more than twice as many as there are parameters: differences must span the space."""
+    target = gaussian(8)
+    assert burn_in._walking(target, Policy(ensembles=4, walkers=128)) == 4 * 32  # type: ignore[arg-type]
+    assert burn_in._walking(target, Policy(ensembles=4, walkers=40)) == 4 * 18  # type: ignore[arg-type]
+    assert burn_in._walking(target, Policy(ensembles=4, walkers=16)) == 4 * 16  # type: ignore[arg-type]
+
+
+def burning(overlooked: float = 0.0, **state: object) -> BurnIn:
+    learned = Learned(NORMAL, NORMAL, 1, acceptance=1.0, overlooked=overlooked)
+    walkers = Walkers(np.zeros((8, D)), np.zeros(8), np.random.RandomState(0).get_state())
+    return BurnIn(walkers, learned, np.random.default_rng(0), 5, **state)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("round_", "overlooked", "draws"),
+    [(1, 0.0, 1024), (2, 0.0, 2048), (3, 0.0, 4096), (7, 0.0, 4096), (3, 6.0, 4 * 4096), (1, 6.0, 4096)],
+)
+def test_the_first_rounds_take_a_quarter_and_half_as_many_draws(round_: int, overlooked: float, draws: int) -> None:
+    target = gaussian(D)
+    policy = Policy(round_draws=4096)
+    state, (z, value, base) = burn_in._drawn(target, burning(overlooked, round=round_), policy)  # type: ignore[arg-type]
+    assert len(z) == draws and state.evaluations == 5 + draws
+    assert value == pytest.approx(target(z)) and base == pytest.approx(NORMAL.log_density(z))
+
+
+def test_a_round_has_a_thousand_draws_at_least_or_all_that_are_wanted() -> None:
+    for wanted, draws in ((3000, 1024), (512, 512)):
+        found = burn_in._drawn(gaussian(D), burning(round=1), Policy(round_draws=wanted))  # type: ignore[arg-type]
+        assert len(found[1][0]) == draws
+
+
+class Sixth:
+    """A log density that differs from the proposal's by one of six values, evenly; what is accepted is known."""
+
+    def __init__(self, gap: float) -> None:
+        self.gap, self.evaluations = gap, 0
+        self.problem = gaussian(D).problem
+        self.coordinates = gaussian(D).coordinates
+
+    def __call__(self, z: np.ndarray) -> np.ndarray:
+        self.evaluations += len(z)
+        return NORMAL.log_density(z) + np.where(z[:, 0] > 0, self.gap, 0.0)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1.0])
+def test_acceptance_is_that_of_independent_draws(gap: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of the draws have weight 1, half e^gap: a walker stands at the heavy ones with odds e^gap."""
+    monkeypatch.setattr(burn_in, "_fitted", lambda target, state, *given, **known: state)
+    state = burn_in.step(Sixth(gap), burning(), Policy(rounds=9, round_draws=40_000))  # type: ignore[arg-type]
+    heavy = np.exp(gap) / (1.0 + np.exp(gap))
+    assert state.learned.acceptance == pytest.approx(1.0 - 0.5 * heavy * (1.0 - np.exp(-gap)), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("gap", "tail", "rounds", "most", "taken"),
+    [
+        (0.0, 1.5, 3, 9, 3),  # at least so many
+        (1.4, 1.5, 3, 9, 3),
+        (1.6, 1.5, 3, 5, 5),  # the heavy tenth of the places lies 1.6 nats above the median: not settled, all rounds
+    ],
+)
+def test_burn_in_ends_when_the_proposal_leaves_out_no_tail(
+    gap: float, tail: float, rounds: int, most: int, taken: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(burn_in, "_fitted", lambda target, state, *given, **known: state)
+    target = Sixth(gap)
+    inner = type(target).__call__
+
+    def tenth(self: Sixth, z: np.ndarray) -> np.ndarray:
+        return inner(self, z) - np.where((z[:, 0] > 0) & (z[:, 0] < 1.28), self.gap, 0.0)
+
+    monkeypatch.setattr(Sixth, "__call__", tenth)
+    state: BurnIn | Sampling = burning()
+    count = 0
+    while isinstance(state, BurnIn) and count < 12:
+        count += 1
+        policy = Policy(ensembles=2, walkers=4, rounds=rounds, most_rounds=most, tail=tail, round_draws=4096)
+        state = burn_in.step(target, state, policy)  # type: ignore[arg-type]
+    assert count == taken
+
+
+@pytest.mark.parametrize(("acceptance", "trusted"), [(0.06, True), (0.04, False)])
+def test_a_proposal_that_hardly_helps_is_given_up(acceptance: float, trusted: bool) -> None:
+    """Then walkers begin where the walk came by, and move by differential evolution."""
+    target = gaussian(D)
+    far = np.full((100, D), 30.0)
+    near = np.zeros((100, D))
+    drawn, walk = (near, target(near), target(near)), (far, target(far), target(far))
+    state = replace(burning(walk=walk).knowing(acceptance=acceptance), evaluations=7)
+    policy = Policy(ensembles=2, walkers=10)
+    found = burn_in._frozen(target, state, policy, drawn, 1)  # type: ignore[arg-type]
+    assert found.learned.trusted is trusted
+    assert bool(np.abs(found.walkers.positions).mean() < 10.0) is trusted
+    assert found.evaluations > 7 and found.walkers.values == pytest.approx(target(found.walkers.positions))
+
+
+@pytest.mark.parametrize(("overlooked", "rounds_left"), [(0.0, 1), (6.0, 4)])
+def test_kept_draws_are_learned_from_as_burn_in(
+    overlooked: float, rounds_left: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One more round; four where places were overlooked, which are rare."""
+    seen: dict[str, np.ndarray] = {}
+
+    def fitted(target: object, state: BurnIn, policy: Policy, hot: np.ndarray, cold: np.ndarray) -> BurnIn:
+        seen.update(hot=hot, cold=cold)
+        return state
+
+    monkeypatch.setattr(burn_in, "_fitted", fitted)
+    z = np.repeat([0.0, 1.0, 1.0, 1.0], 10)[:, None, None] * np.ones((1, 25, 1))  # as often as they are dense
+    kept = Kept((z[:4], z[4:]), tuple(np.log(3.0) * part[..., 0] for part in (z[:4], z[4:])))
+    learned = Learned(NORMAL, NORMAL, 1, again=2, overlooked=overlooked)
+    walkers = SimpleNamespace(positions=z[-1])
+    state = Sampling(walkers, learned, np.random.default_rng(3), 11, kept)  # type: ignore[arg-type]
+    policy = Policy(rounds=3, most_rounds=9)
+    found = burn_in.again(None, state, policy)  # type: ignore[arg-type]
+    assert (found.learned.again, found.evaluations) == (3, 11)
+    assert (policy.most_rounds if overlooked else policy.rounds) - found.round == rounds_left
+    assert len(seen["cold"]) == 1000 and seen["cold"].mean() == 0.75
+    assert seen["hot"].mean() == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4), abs=0.002)
+
+
+def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:
+    """Shares sum to one; while it learns more than twice as much comes from what reaches the tails."""
+    for shares in (proposal.SHARES, proposal.EXPLORING, proposal.ROUGH_SHARES):
+        assert sum(shares) == pytest.approx(1.0)
+    assert proposal.SHARES[0] > proposal.EXPLORING[0] > proposal.ROUGH_SHARES[0]
