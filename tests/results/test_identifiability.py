@@ -11,7 +11,16 @@ from wirebayes.effects import named
 from wirebayes.io.paper import experiments
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import build
-from wirebayes.results.identifiability import SENSITIVE, extrapolation, identifiability, sensitivity, to_dict
+from wirebayes.results.identifiability import (
+    SENSITIVE,
+    Extrapolation,
+    Taught,
+    _weighted_quantiles,
+    extrapolation,
+    identifiability,
+    sensitivity,
+    to_dict,
+)
 
 
 def normal_model(noise: dict[str, float], draws: int = 4000, total: float | None = None) -> Any:
@@ -86,3 +95,79 @@ def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
     band = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0)  # type: ignore[arg-type]
     assert (band.posterior_mm[0] == 0.0).all()
     assert "do not creep at this tension" in band.to_dict()["sentence"]
+
+
+def about(contraction: float = 0.95, sensitivity: float = 0.0, ridges: dict[str, float] | None = None) -> Taught:
+    return Taught("k1", contraction, 100.0, 1.5, True, sensitivity, 1.0, ridges or {})
+
+
+@pytest.mark.parametrize(
+    ("contraction", "sensitivity", "said"),
+    [
+        (0.29, 0.0, "next to nothing"),
+        (0.31, 0.0, "data and prior both"),
+        (0.89, 0.0, "data and prior both"),
+        (0.91, 0.049, "the data determine it"),
+        (0.91, 0.051, "data and prior both"),
+    ],
+)
+def test_what_determines_a_parameter_turns_at_its_thresholds(contraction: float, sensitivity: float, said: str) -> None:
+    assert said in about(contraction, sensitivity).sentence
+
+
+@pytest.mark.parametrize(("correlation", "ridge"), [(0.88, False), (0.92, True), (-0.92, True)])
+def test_a_ridge_is_a_correlation_above_nine_tenths(correlation: float, ridge: bool) -> None:
+    root = np.linalg.cholesky(np.array([[1.0, correlation], [correlation, 1.0]]))
+    model = normal_model({"a": 1.0, "b": 1.0})
+    z = stats.norm.ppf((np.arange(4000) + 0.5) / 4000)
+    model.flat = np.column_stack([z, np.random.default_rng(0).permutation(z)]) @ root.T
+    one, other = identifiability(model)
+    assert (list(one.ridges), list(other.ridges)) == ((["b"], ["a"]) if ridge else ([], []))
+
+
+def test_a_range_of_a_positive_parameter_is_a_factor() -> None:
+    """Log-normal draws of a log-normal prior; both ranges are ratios, whatever the unit."""
+    model = normal_model({"k": 1.0})
+    model.problem.prior = Prior({"k": stats.lognorm(0.5, scale=700.0)}, {}, frozenset({"k"}))
+    model.flat = 800.0 * np.exp(0.1 * stats.norm.ppf((np.arange(4000) + 0.5) / 4000))[:, None]
+    model.problem.log_likelihood = lambda rows: np.zeros(len(rows))
+    (found,) = identifiability(model)
+    assert found.is_factor and "×" in found.sentence
+    assert found.prior_range == pytest.approx(np.exp(2 * 1.645 * 0.5), rel=1e-3)
+    assert found.posterior_range == pytest.approx(np.exp(2 * 1.645 * 0.1), rel=1e-3)
+    assert found.contraction == pytest.approx(1.0 - 0.1**2 / 0.5**2, abs=0.002)
+
+
+def far_out(share: float = 0.0, k: float = 0.2, longest_s: float = 600.0) -> Extrapolation:
+    """Bands of which the one with a weaker prior is wider by a share, in logarithms."""
+    band = np.exp(np.array([[-1.0], [0.0], [1.0]]))
+    return Extrapolation(np.array([3600.0]), 2.0, band, band ** (1.0 + share), band, k, longest_s)
+
+
+@pytest.mark.parametrize(
+    ("share", "k", "said"),
+    [
+        (0.09, 0.2, "hardly depends on the prior: with half the prior's weight the band is 9 % wider"),
+        (0.11, 0.2, "it depends on the prior: with half the prior's weight the band is 11 % wider"),
+        (0.5, 0.69, "it depends on the prior"),
+        (0.5, 0.71, "cannot show"),
+    ],
+)
+def test_the_prior_s_part_in_an_extrapolation_turns_at_a_tenth(share: float, k: float, said: str) -> None:
+    found = far_out(share, k)
+    assert found.prior_share == pytest.approx([share])
+    assert said in found.to_dict()["sentence"] and "after 1 h at 2 N" in found.to_dict()["sentence"]
+
+
+def test_an_extrapolation_is_one_beyond_the_longest_hold() -> None:
+    assert far_out(longest_s=3600.0).warning == "" == far_out(longest_s=7200.0).warning
+    assert "1 h is 6 times the longest hold (600 s)" in far_out().warning
+    assert far_out(longest_s=0.0).warning != ""  # no hold lasted at all
+
+
+def test_weighted_quantiles_are_those_of_repeated_values() -> None:
+    values, counts = np.array([3.0, 1.0, 2.0]), np.array([200.0, 500.0, 300.0])
+    found = _weighted_quantiles(values, counts, [0.05, 0.25, 0.65, 0.9])
+    assert found == pytest.approx([1.0, 1.0, 2.0, 3.0])
+    # halfway between the middles of two values' shares
+    assert _weighted_quantiles(values, counts, [0.45]) == pytest.approx([1.5])

@@ -42,6 +42,35 @@ def test_few_specimens_and_failed_ones_are_passed_over():
     assert not outliers([*lot(), *lot(3, material="other"), row("odd", 9000.0, material="other")])
 
 
+@pytest.mark.parametrize(("specimens", "compared"), [(5, False), (6, True)])
+def test_six_specimens_are_compared_five_are_not(specimens, compared):
+    assert bool(outliers([*lot(specimens - 1), row("odd", 9e7)])) is compared
+
+
+def test_creep_is_compared_per_metre_of_length_and_said_so():
+    (found,) = outliers([*lot(), row("odd", 1000.0, length=2000.0, b=0.8)])
+    assert (found.parameter, found.value, found.median) == ("B", pytest.approx(0.8), pytest.approx(0.2))
+    assert "B per m of length is 0.8" in found.sentence
+
+
+def test_a_low_specimen_lies_below_and_the_farthest_comes_first():
+    found = outliers([*lot(), row("low", 500.0), row("lower", 200.0)])
+    assert [o.experiment for o in found] == ["lower", "low"]
+    assert "below the median" in found[0].sentence and found[0].z < 0
+
+
+def test_a_robust_z_is_the_distance_in_expected_distances():
+    """Nine values whose median absolute deviation is one, each known to 0.5, one of them badly."""
+    values = np.array([-4.0, -3.0, -1.0, -0.5, 0.0, 0.5, 1.0, 3.0, 4.0])
+    sd = np.full(9, 0.5)
+    sd[8] = 3.0
+    spread = 1.4826**2 - 0.25  # what the posteriors' width does not explain
+    expected = values / np.sqrt(spread + sd**2)
+    assert robust_z(values, sd) == pytest.approx(expected)
+    # scatter that the posteriors explain leaves no spread
+    assert robust_z(values, np.full(9, 2.0)) == pytest.approx(values / 2.0)
+
+
 def test_equal_specimens_divide_nothing_by_zero():
     same = [row(f"s{i}", 1000.0, sd=0.0) for i in range(8)]
     assert not outliers(same)

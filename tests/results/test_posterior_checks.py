@@ -88,3 +88,32 @@ def test_readings_without_noise_have_a_floor_and_say_so(simulated):
 def with_tensions(experiment, tension):
     holds = [replace(h, tension_N=tension[j, : h.time_s.size]) for j, h in enumerate(experiment.holds)]
     return replace(experiment, holds=tuple(holds))
+
+
+def test_exact_thresholds_of_a_silent_check(simulated):
+    """A test that never moved has no steps to compare with; a fit without setting errors has none to judge."""
+    sample = simulated.problem.samples[0]
+    own = draws(simulated.problem, setting_sd=5.0)
+    still = replace(sample.protocol, displacement_mm=np.ones(len(sample.protocol.displacement_mm)))
+    assert posterior_checks.loose_steps(own, replace(sample, protocol=still)) == ""
+    assert posterior_checks.loose_steps({k: v for k, v in own.items() if k != "setting_sd"}, sample) == ""
+
+
+@pytest.mark.parametrize(("share", "named"), [(1.9, True), (2.1, False)])
+def test_an_error_finer_than_a_load_cell_resolves_is_no_noise(simulated, share, named):
+    sample = replace(simulated.problem.samples[0], resolution_N=0.0)
+    largest = np.abs(sample.readings).max()
+    own = draws(simulated.problem, sensor_sd=share * FINEST * largest / np.exp(0.001 * 1.645))
+    assert ("carry no noise" in posterior_checks.noise(own, sample)) is named
+    coarse = replace(sample, resolution_N=0.01)  # the display hides what noise there is
+    assert posterior_checks.noise(own, coarse) == ""
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.89, False), (0.91, True)])
+def test_an_interval_that_shrank_by_less_than_a_tenth_taught_nothing(simulated, left, named):
+    """Of any parameter but the sensor's error, which every reading shows."""
+    even = np.linspace(0.0, 1.0, 1001)
+    prior = {"k1": even, "B": even, "sensor_sd": even}
+    own = {"k1": left * even, "B": even, "sensor_sd": 0.1 * even}
+    assert ("say nothing of the wire" in posterior_checks.taught(own, prior)) is named
+    assert posterior_checks.taught({"k1": even[:1] + 0 * even}, {"k1": np.ones(9)}) == ""  # nothing was to be learned

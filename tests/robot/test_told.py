@@ -1,0 +1,160 @@
+"""What is said of a hold, from falls, margins and pose errors that are written down."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wirebayes.robot.motion import claim, control
+from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
+from wirebayes.robot.motion.drift import Course, Falls
+from wirebayes.robot.pose import answer, controllers, stability
+from wirebayes.robot.pose.request import PoseRequest, band
+
+NEVER, NAN = np.inf, np.nan
+TIMES = np.array([0.0, 10.0, 60.0])
+
+
+def course(falls: Falls | None, legs: int = 3) -> Course:
+    n = 0 if falls is None else len(falls.time_s)
+    return Course(TIMES, np.zeros((n, 3, 3)), np.zeros((n, 3, 3, 3)), np.ones((n, 3, legs)), None, None, falls)  # type: ignore[arg-type]
+
+
+# Five draws: two fall (one is caught), two hold, one never began.
+FIVE = Falls(
+    time_s=np.array([5.0, 30.0, NEVER, NEVER, NEVER]),
+    wire=np.array([1, 1, -1, -1, -1]),
+    drop_m=np.array([0.02, NEVER, 0.0, 0.0, 0.0]),
+    slack_s=np.array([[NEVER, 4.0, NEVER], [NEVER, NEVER, NEVER], [20.0, NEVER, NEVER], [NEVER] * 3, [NEVER] * 3]),
+    tension_share=np.array([[0.9, 0.0, 0.9], [0.8, 0.1, 0.9], [0.0, 0.5, NAN], [0.7, 0.6, NAN], [NAN, NAN, NAN]]),
+    stiffness_share=np.array([0.0, 0.1, 0.4, 0.6, NAN]),
+)
+
+
+def test_falls_are_shares_of_the_draws_that_began() -> None:
+    found = stability.summary(course(FIVE))
+    assert found["began"] == pytest.approx(0.8)
+    assert found["fall_probability"] == 0.5
+    assert found["fall_probability_at"].tolist() == [0.0, 0.25, 0.5]
+    assert found["fall_time_s"] == {"first": 5.0, "median": 17.5, "last": 30.0}
+    assert found["fall_wires"].tolist() == [0.0, 0.5, 0.0]
+    assert found["fall_distance_mm"] == {"first": 20.0, "median": 20.0, "last": 20.0}
+    assert found["caught_probability"] == 0.5
+    assert found["slack_probability"].tolist() == [0.25, 0.25, 0.0]
+    assert found["slack_time_s"] == [{"first": 20.0, "median": 20.0, "last": 20.0},
+                                     {"first": 4.0, "median": 4.0, "last": 4.0}, None]  # fmt: skip
+    assert found["least_tension_wire"] == 2  # of four draws three come nearest to slackness there
+    # margins are those of the two draws that hold to the end
+    assert found["least_tension_share"]["mean"] == pytest.approx(0.3)
+    assert found["stiffness_share"]["mean"] == pytest.approx(0.5)
+
+
+def test_warnings_say_who_falls_when_and_what_catches_it() -> None:
+    began, fall, slack = stability.warnings(course(FIVE), 0.05)[:3]
+    assert began.startswith("20 % of the draws cannot begin at the pose (specimens differing by 5 %): no stable")
+    assert "not stable" in stability.warnings(course(FIVE), 0.0, stable=False)[0]
+    assert "falls in 50 % of the draws within 60 s" in fall and "first after 5 s, in the median after 17.5 s" in fall
+    assert fall.endswith("wire 2 giving way; it drops 20 mm")
+    assert slack.endswith("wire 1 in 25 % of the draws, first after 20 s; wire 2 in 25 % of the draws, first after 4 s")
+
+
+def holding(tension: float, stiffness: float) -> Course:
+    n = 4
+    return course(Falls(
+        np.full(n, NEVER), np.full(n, -1), np.zeros(n), np.full((n, 3), NEVER),
+        np.tile([0.9, 0.95, tension], (n, 1)), np.full(n, stiffness),
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("tension", "stiffness", "said"),
+    [
+        (0.21, 0.31, []),
+        (0.19, 0.31, ["wire 3 may keep only 19 % of its tension within 60 s (specimens alike)"]),
+        (0.21, 0.29, ["the stiffness against the softest motion may fall to 29 % within 60 s (specimens alike)"]),
+        (0.21, -0.1, ["the stiffness against the softest motion may fall to 0 % within 60 s (specimens alike)"]),
+    ],
+)
+def test_a_platform_that_holds_is_warned_of_when_it_comes_near_to_a_fall(
+    tension: float, stiffness: float, said: list[str]
+) -> None:
+    """Below a fifth of a wire's tension, or three tenths of the stiffness."""
+    assert stability.warnings(holding(tension, stiffness), 0.0) == said
+    found = stability.summary(holding(tension, stiffness))
+    assert found["caught_probability"] is None and found["fall_time_s"] is None and found["fall_probability"] == 0.0
+
+
+def test_where_no_draw_begins_there_is_nothing_more_to_say() -> None:
+    none = Falls(*(getattr(FIVE, name)[4:] for name in Falls.__dataclass_fields__))
+    for lost in (course(none), course(None)):
+        assert stability.summary(lost) == {"began": 0.0}
+        assert len(stability.warnings(lost, 0.0)) == 1
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(1.0, "100 %"), (0.996, "nearly all"), (0.99, "99 %"), (0.995, "nearly all"), (0.123, "12.3 %")]
+)
+def test_nearly_all_is_not_all(share: float, said: str) -> None:
+    assert stability._percent(share) == said
+
+
+def test_a_time_within_tolerance_is_the_last_one_where_it_holds_the_probability() -> None:
+    """Distances grow by a millimetre a time in every draw; the angle leaves its tolerance earlier."""
+    times = np.array([0.0, 1.0, 10.0, 100.0])
+    error = control.PoseError(times, np.tile([0.0, 1e-3, 2e-3, 3e-3], (20, 1)), np.zeros((20, 4)), np.ones(20, bool))
+    asked = PoseRequest(np.zeros(3), np.eye(3), times, 2.5e-3, 0.01)
+    assert controllers._lasts(error, asked) == {"longest_time_within_s": 10.0, "still_within_at_the_end": False}
+    always = PoseRequest(np.zeros(3), np.eye(3), times, 3.5e-3, 0.01)
+    assert controllers._lasts(error, always) == {"longest_time_within_s": 100.0, "still_within_at_the_end": True}
+    error.angle_rad[:2, 1] = 0.02  # a tenth of the draws
+    assert controllers._lasts(error, asked)["longest_time_within_s"] == 0.0
+    error.angle_rad[1, 1] = 0.0  # one draw of twenty: 95 % are left
+    assert controllers._lasts(error, asked)["longest_time_within_s"] == 10.0
+    told = controllers._tolerances(PoseRequest(np.zeros(3), np.eye(3), times, 2e-3, np.radians(0.5)))
+    assert told == {"tolerance_mm": 2.0, "tolerance_deg": pytest.approx(0.5)}
+
+
+def at(distance_m: Any, tilt_rad: Any, times_s: Any = (0.0, 60.0)) -> Any:
+    """A hold of as many draws as there are distances, at the last of the times."""
+    n, away = len(distance_m), np.zeros((len(distance_m), len(times_s), 3))
+    away[:, -1, 0] = distance_m
+    turn = np.tile(np.eye(3), (n, len(times_s), 1, 1))
+    c, s = np.cos(tilt_rad), np.sin(tilt_rad)
+    turn[:, -1] = np.moveaxis(np.array([[c, 0 * c, s], [0 * c, 0 * c + 1, 0 * c], [-s, 0 * c, c]]), -1, 0)
+    return SimpleNamespace(position_m=away, rotation=turn, times_s=np.array(times_s))
+
+
+def test_the_paper_s_figures_hold_in_the_draws_that_keep_both() -> None:
+    d, t = DISTANCE_M, TILT_RAD
+    alike = at(np.array([0.9 * d, 0.9 * d, 1.1 * d, NAN]), np.array([0.9 * t, 1.1 * t, 0.5 * t, NAN]))
+    other = at(np.array([0.1 * d] * 4), np.zeros(4), (0.0, 30.0))
+    asked: Any = None
+    found = answer._claim({0.0: alike, 0.05: other}, np.zeros(3), np.eye(3), asked)
+    assert found["holds"] == [{"specimen_spread": 0.0, "probability": 0.25}, {"specimen_spread": 0.05,
+                                                                             "probability": None}]  # fmt: skip
+    # section 4 of the paper: 0.3 mm and 0.055° within a minute
+    assert (found["time_s"], found["distance_mm"]) == (60.0, pytest.approx(0.3)) and TIME_S == 60.0
+    assert found["tilt_deg"] == pytest.approx(0.055)
+
+
+def test_the_claim_over_a_workspace_counts_points_and_draws() -> None:
+    d = np.array([[0.5, 0.5, 2.0], [0.5, 2.0, 0.5], [0.5, 0.5, NAN]]) * DISTANCE_M
+    space = claim.WorkspaceDrift(
+        np.zeros((3, 3)), d, 0.5 * TILT_RAD * np.ones((3, 3)), np.array([[2.0, 7.0]] * 3), 0.8, 0.9
+    )
+    found = claim.summary(space)
+    assert space.holds() == pytest.approx([2 / 3] * 3)
+    assert found["probability"] == pytest.approx(2 / 3) and found["probability_everywhere"] == pytest.approx(1 / 3)
+    assert found["q50_drift_mm"] == pytest.approx(0.15) and found["q95_drift_mm"] == pytest.approx(0.6, rel=0.01)
+    assert (found["lowest_tension_N"], found["highest_tension_N"]) == (2.0, 7.0)
+    assert space.median_distance_m == pytest.approx([0.15e-3] * 3)
+    kept = space.part(np.array([True, False, True]), 0.5)
+    assert (kept.found, kept.feasible, len(kept.position_m)) == (0.5, 0.5, 2)
+    assert space.part(np.zeros(3, bool), 0.5).found == 0.0
+
+
+def test_a_band_is_the_mean_the_spread_and_nine_in_ten_of_the_draws() -> None:
+    found = band(np.append(np.arange(101.0), NAN))
+    assert (found["mean"], found["q05"], found["q50"], found["q95"]) == (50.0, 5.0, 50.0, 95.0)
+    assert found["sd"] == pytest.approx(np.sqrt((101**2 - 1) / 12))
