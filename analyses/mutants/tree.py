@@ -15,7 +15,7 @@ from typing import Any
 
 from analyses.mutants.mistakes import ROOT, Mutant
 
-FAST = "not slow and not browser"
+FAST = "not slow and not browser and not statistical"  # the last are in make test, but too dear for every mutant
 
 
 def preload() -> None:

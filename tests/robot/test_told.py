@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wirebayes.robot.motion import claim, control
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.motion import claim, control, drift
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.drift import Course, Falls
 from wirebayes.robot.pose import answer, controllers, stability
@@ -158,3 +159,69 @@ def test_a_band_is_the_mean_the_spread_and_nine_in_ten_of_the_draws() -> None:
     found = band(np.append(np.arange(101.0), NAN))
     assert (found["mean"], found["q05"], found["q50"], found["q95"]) == (50.0, 5.0, 50.0, 95.0)
     assert found["sd"] == pytest.approx(np.sqrt((101**2 - 1) / 12))
+
+
+@pytest.fixture(scope="module")
+def hung() -> Any:
+    """A small robot, ten draws of a wire that creeps, and a request with no spread between specimens but a tenth."""
+    rng = np.random.default_rng(0)
+    wire = {"k1": 800.0, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
+    line = draws.WireDraws({k: v * np.exp(0.02 * rng.standard_normal(10)) for k, v in wire.items()}, 1000.0)
+    robot = schema.read("hangprinter-4")
+    return robot, line, PoseRequest(robot.home_m, np.eye(3), np.array([0.0, 60.0]), specimen_spread=0.1)
+
+
+def test_a_calibration_lasts_longer_on_wires_that_crept_before_or_are_compensated(hung: Any) -> None:
+    robot, line, asked = hung
+    rows = controllers.between_calibrations(robot, line, asked, np.random.default_rng(1))
+    lasts = {(r["specimen_spread"], r["loaded_before_s"], r["controller"]): r["longest_time_within_s"] for r in rows}
+    ways = ("held_still", "creep_aware")
+    assert set(lasts) == {(s, h, c) for s in (0.0, 0.1) for h in (0.0, 3600.0) for c in ways}
+    assert all(r["solved"] == 1.0 and r["tolerance_mm"] == pytest.approx(0.3) for r in rows)
+    for spread in (0.0, 0.1):
+        assert lasts[spread, 0.0, "held_still"] < lasts[spread, 3600.0, "held_still"]
+        assert lasts[spread, 0.0, "held_still"] < lasts[spread, 0.0, "creep_aware"]
+    # held still from the first moment on, the platform drifts as a command's does
+    times = np.geomspace(1.0, 1e5, 41)[:20]
+    course = drift.from_command(robot, draws.for_robot(robot, line), asked.position_m, asked.rotation, times)
+    away = np.linalg.norm(course.position_m - asked.position_m, axis=-1)
+    within = (away < 0.3e-3).mean(axis=0) >= 0.95
+    assert lasts[0.0, 0.0, "held_still"] == pytest.approx(times[np.argmin(within) - 1])
+
+
+def test_a_controller_that_knows_creep_is_nearer_after_a_minute(hung: Any) -> None:
+    robot, line, asked = hung
+    less = draws.WireDraws(line.parameters | {"B": 0.5 * line.parameters["B"]}, 1000.0)
+    found = controllers.errors(robot, line, asked, np.random.default_rng(1), less)
+    error = {(r["specimen_spread"], r["controller"]): r["distance_mm"]["q50"] for r in found}
+    names = ("hooke_only", "creep_aware_other_fit", "creep_aware")
+    assert set(error) == {(s, c) for s in (0.0, 0.1) for c in names}
+    worst, half, best = (error[0.0, name] for name in names)
+    assert worst[0] == pytest.approx(half[0]) == pytest.approx(best[0])  # no wire has crept yet
+    assert worst[1] > half[1] > best[1]
+    assert len(controllers.errors(robot, line, asked, np.random.default_rng(1))) == 4
+
+
+def test_a_leg_without_a_drum_leaves_no_gap_in_the_others() -> None:
+    found = answer._by_leg(np.array([[1.0, NAN], [3.0, NAN]]))
+    assert found["mean"] == [2.0, None] and found["sd"] == [1.0, None]
+
+
+@pytest.mark.parametrize(("held", "shared"), [(29, False), (30, True)])
+def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, shared: bool) -> None:
+    """The drift is ten times the logarithm of one parameter, in millimetres, of the draws that hold."""
+    rng = np.random.default_rng(0)
+    line = draws.WireDraws({k: np.exp(rng.standard_normal(40)) for k in draws.CORE}, 1000.0)
+    size = 1e-2 * (10.0 + np.log(line.parameters["B"]))
+    size[held:] = NAN
+    courses = {s: at(size * (1.0 + s), np.zeros(40)) for s in (0.0, 0.1)}
+    found = answer._shares(line, courses, np.zeros(3), np.eye(3))
+    assert (found["time_s"], found["output"]) == (60.0, "distance")
+    if not shared:
+        assert "Fewer than 30 draws" in found["sentence"] and "shared_draw" not in found
+        return
+    assert found["shared_draw"]["B"] > 0.7 and sum(found["shared_draw"].values()) == pytest.approx(1.0)
+    sd = 1e3 * np.std(size[:held])
+    assert [row["sd_mm"] for row in found["sd_mm"]] == pytest.approx([sd, 1.1 * sd])
+    lost = {0.0: courses[0.0], 0.1: at(np.full(40, NAN), np.zeros(40))}
+    assert answer._shares(line, lost, np.zeros(3), np.eye(3))["sd_mm"][1]["sd_mm"] is None

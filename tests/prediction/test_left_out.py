@@ -1,0 +1,61 @@
+"""Leaving holds out where the densities are written down: when to refit, which draws, and what an error is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.inference.policy import Policy
+from wirebayes.io.paper import experiments
+from wirebayes.model.problem import Problem, build
+from wirebayes.prediction import leave_one_hold_out as module
+from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out, standard_error, thinned
+
+
+@pytest.mark.parametrize(("tail", "refits"), [(0.49, False), (0.51, True), (np.nan, True)])
+def test_a_heavy_tail_of_the_importance_ratios_asks_for_a_refit(
+    tail: float, refits: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Above Pareto k of 0.5, or where it is not defined; what was not refitted counts as converged."""
+    rng = np.random.default_rng(0)
+    log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, without])])
+    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, tail)))
+    chains = SimpleNamespace(converged=False)
+    made: list[int] = []
+
+    def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
+        made.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
+        return SimpleNamespace(flat=np.zeros((500, 8)), chains=chains)
+
+    monkeypatch.setattr(module, "fit", fit_without)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    shares: list[float] = []
+    found = leave_each_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
+    assert list(found.refitted) == [refits] * 4 and found.converged is not refits
+    assert made == ([0, 1, 2, 3] if refits else [])
+    assert shares == [0.25, 0.5, 0.75, 1.0]
+    if not refits:  # weights 1/p: the harmonic mean
+        assert found.elpd == pytest.approx(np.log(stats.hmean(np.exp(log_p), axis=1)))
+
+
+def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.zeros((4, 500))])
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    found = leave_each_hold_out(stub)  # type: ignore[arg-type]
+    assert found.elpd.tolist() == [0.0] * 4 and found.pareto_k.tolist() == [0.0] * 4 and not found.refitted.any()
+
+
+def test_thinned_rows_reach_from_the_first_to_the_last() -> None:
+    rows = np.arange(9001.0)[:, None]
+    few = thinned(rows, 10)
+    assert few[:, 0].tolist() == [round(9000 * i / 9) for i in range(10)]
+    assert len(thinned(rows)) == 4000 and thinned(rows[:7]).tolist() == rows[:7].tolist()
+
+
+def test_one_hold_has_no_standard_error() -> None:
+    assert np.isnan(standard_error(np.array([3.0])))
+    assert standard_error(np.array([1.0, 3.0])) == pytest.approx(2.0)  # sd √2, times √2
