@@ -144,9 +144,10 @@ def _reached_by(file: str, site: _Site) -> list[tuple[str, int]]:
         return [(file, statement.lineno), *(_span(file, node, node) if isinstance(node, ast.expr | ast.stmt) else [])]
     if functions:
         return _span(file, functions[-1].body[0], functions[-1].body[-1])
-    names = [node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
-             for node in chain if isinstance(node, ast.AnnAssign | ast.Assign)]  # fmt: skip
-    return uses(names[0].id) if names and isinstance(names[0], ast.Name) else []
+    targets = [target for node in chain if isinstance(node, ast.AnnAssign | ast.Assign)
+               for target in ([node.target] if isinstance(node, ast.AnnAssign) else node.targets)]  # fmt: skip
+    names = [node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)]
+    return [line for name in names for line in uses(name)]
 
 
 def mutants(file: str, number: int, seed: int) -> list[Mutant]:

@@ -17,8 +17,8 @@ TESTS = {
     "prediction": [f"tests/prediction/test_{name}.py" for name in ("held_out", "left_out", "predictive", "table")],
     "comparison": ["tests/comparison"],
     "discovery": [f"tests/discovery/test_{name}.py" for name in ("explore", "held_out", "model_space", "name_evidence",
-                                                                 "power", "sharing", "shrinking", "subsets",
-                                                                 "thresholds", "verdict")],
+                                                                 "power", "refit", "sharing", "shrinking",
+                                                                 "stepwise", "subsets", "thresholds", "verdict")],
     "robot": [f"tests/robot/test_{name}.py" for name in ("answer", "certificate", "control", "forward", "pulleys",
                                                          "reach", "statics", "tensions", "told")],
 }  # fmt: skip

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wirebayes.comparison import candidates as module
 from wirebayes.comparison import compare
 from wirebayes.comparison.candidates import BASE, Candidate
 from wirebayes.comparison.compare import Task, judge, side_by_side
+from wirebayes.effects import CATALOGUE
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 
@@ -125,3 +127,19 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
     assert found["leave_one_hold_out"]["refitted"].tolist() == [2]
     assert found["converged"] is False  # one of three samplings was not
     assert found["effects"] == [] and found["parameters"] == 8
+    for candidate, listed in (("memory", ["memory"]), ("logarithmic", [])):  # a rival law is no effect of the catalogue
+        other = replace(PLAIN, effects=(candidate,))
+        assert compare._scores(Task(experiments()[1], other, train_holds), 0, Policy())["effects"] == listed
+
+
+def test_an_event_is_not_put_where_its_fit_did_not_converge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever evidence it claims; of several modes the best one counts."""
+    ends = iter([([True, True], [1.0, 3.0]), ([False, True], [90.0, 2.0]), ([True, False], [4.0, 5.0])])
+
+    def modes(target: object, rng: object) -> SimpleNamespace:
+        converged, evidence = next(ends)
+        return SimpleNamespace(converged=np.array(converged), log_evidence=np.array(evidence))
+
+    monkeypatch.setattr(module, "modes", modes)
+    variants = CATALOGUE["grip_slip"].variants([experiments()[1].protocol()])[:3]
+    assert module._most_evident(PLAIN, experiments()[1], variants, 0) is variants[2]

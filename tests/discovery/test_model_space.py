@@ -52,6 +52,7 @@ def test_inclusion_counts_every_set_and_the_first_name_has_the_share() -> None:
     assert found.shares[0]["a"] == pytest.approx(found.inclusion["a"][0])
     assert found.shares[0]["b"] == 0.0
     assert found.best.names == ("a", "b")
+    assert list(found.shares[0]) == ["a", "c", "unknown", "b"]  # as they are listed: the most probable first
 
 
 def test_the_same_effect_under_two_names_makes_it_no_likelier() -> None:

@@ -36,6 +36,8 @@ def test_signatures_are_as_alike_as_the_angle_between_them_is_small() -> None:
     assert found["a", "a"] == pytest.approx(1.0)
     assert found["a", "b"] == found["b", "a"] == pytest.approx(np.cos(np.pi / 4))  # a sign makes no other signature
     assert found["a", "c"] == 0.0  # it does not show
+    many = np.random.default_rng(0).normal(size=(40, 1)) * np.linspace(0.1, 3.3, 60)
+    assert max(similarity([many], [probe(f"p{i}") for i in range(60)], [1.0]).values()) <= 1.0  # whatever is rounded
 
 
 @pytest.mark.usefixtures("signatures")
@@ -189,7 +191,9 @@ def test_the_plan_with_the_largest_value_wins_and_is_compared_with_the_present_t
     monkeypatch.setattr(power, "replace_problem", lambda target, other: other)
     fit: Any = SimpleNamespace(target=SimpleNamespace(problem=problem, displacement_mm=WHOLE.displacement_mm))
     words, ratio = power._best_plan(fit, lambda x: float(x.displacement_mm.sum()))  # type: ignore[attr-defined]
-    assert words.startswith("take twice as many") and ratio == pytest.approx(11.5 / 7.0)
+    assert words == "take twice as many, half as large steps over 1 to 4 mm" and ratio == pytest.approx(11.5 / 7.0)
+    problem.samples.append(problem.samples[0])
+    assert power._best_plan(fit, lambda x: float(x.displacement_mm.sum()))[0].endswith("each sample's displacements")  # type: ignore[attr-defined]
     assert power._best_plan(fit, lambda x: 0.0 if x is fit.target else 1.0)[1] == np.inf
 
 
@@ -201,6 +205,8 @@ def test_what_a_second_effect_takes_up_does_not_distinguish_the_first(monkeypatc
     fit: Any = SimpleNamespace(modes=SimpleNamespace(z=np.zeros((1, 1))))
     assert power._separation(None, fit, ["a", "b"]) == pytest.approx(3.0)  # type: ignore[arg-type, list-item]
     assert power._separation(None, fit, ["a"]) == pytest.approx(5.0)  # type: ignore[arg-type, list-item]
+    sizes[:, 1] = [1e-3, 0.0]
+    assert power._separation(None, fit, ["a", "b"]) == pytest.approx(3.0)  # type: ignore[arg-type, list-item]
     sizes[:, 1] = 0.0
     assert power._separation(None, fit, ["a", "b"]) == pytest.approx(5.0)  # type: ignore[arg-type, list-item]
 

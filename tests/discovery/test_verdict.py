@@ -149,6 +149,18 @@ def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, mon
     assert found.tolist() == ([0.0, 28.0, 23.0] if before else [0.0, 36.0, 27.0])
 
 
+@pytest.mark.parametrize(("names_", "gain"), [("a", 4.0), ("abc", 20.0)])
+def test_the_first_effect_gains_over_the_plain_model_the_third_over_two(
+    names_: str, gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verdict.held_out, "leave_one_hold_out", lambda fit, rng: np.array(fit))
+    sets = explored({"a": 1.0, "ab": 2.0, "abc": 3.0})
+    for set_, elpd in (("a", 5.0), ("ab", 10.0), ("abc", 30.0)):
+        sets.fitted[frozenset(set_)].blocks[:] = [[elpd]]  # type: ignore[list-item]
+    best = sets.fitted[frozenset(names_)]
+    assert verdict._gain([[1.0]], best, sets, np.random.default_rng(0), map).tolist() == [gain]  # type: ignore[list-item]
+
+
 def test_effects_are_established_in_the_materials_where_they_act(monkeypatch: pytest.MonkeyPatch) -> None:
     found = decided(monkeypatch, explored({"a": 30.0, "ab": 60.0}), {"ab": 20.0}, {})
     assert [a.name for a in verdict.established(found, 0)] == ["a", "b"]

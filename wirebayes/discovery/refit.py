@@ -161,7 +161,7 @@ def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:
     apart = grid[aside] - grid[best]
     share = np.divide(finer - grid[best], apart, out=np.zeros(len(finer)), where=apart != 0)
     near = np.isfinite(ends[aside]).all(axis=1) & (share <= 1.0)
-    return np.asarray(ends[best] + np.where(near, share, 0.0)[:, None] * (ends[aside] - ends[best]))
+    return np.where(near[:, None], ends[best] + share[:, None] * (ends[aside] - ends[best]), ends[best])
 
 
 def _width(grid: Array, value: Array, best: int, fallback: float) -> float:

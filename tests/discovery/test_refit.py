@@ -1,0 +1,95 @@
+"""A refit on evidence that is a known curve of the amplitude: its top is found wherever it lies, and its width."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery import refit
+from wirebayes.discovery.refit import occam
+from wirebayes.effects import named
+
+TWO_SIDED = named("strain_stiffening")
+
+
+def refitted(monkeypatch: pytest.MonkeyPatch, tops: list[float], effect: Any = TWO_SIDED, guess: float = 3.0) -> Any:
+    """Refitted on blocks whose evidence is normal in δ about these tops; δ = 1 is a thousandth of the amplitude."""
+
+    class Curve:
+        def __init__(self, block: Any, effect: Any) -> None:
+            self.top = block.top
+
+        def starts(self) -> np.ndarray:
+            return np.zeros((2, 1))
+
+        def climb(self, start: np.ndarray, amplitude: np.ndarray) -> SimpleNamespace:
+            """The second of two starts ends lower; a climb from afar does not converge."""
+            value = -0.5 * (amplitude / 1e-3 - self.top) ** 2
+            if len(start) > 1 and amplitude[0] == amplitude[1]:
+                value[1::2] -= 5.0
+            end = (amplitude / 1e-3)[:, None]
+            return SimpleNamespace(converged=np.ones(len(start), bool), log_evidence=value, z=end)
+
+        def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+            assert z[:, 0] == pytest.approx(amplitude / 1e-3)
+            return np.column_stack([z, amplitude])
+
+    monkeypatch.setattr(refit, "Pinned", Curve)
+    blocks: Any = [SimpleNamespace(top=top, log_evidence=-0.5 * top**2) for top in tops]
+    return refit.refit(blocks, range(len(tops)), effect, 1e-3, guess * 1e-3)
+
+
+@pytest.mark.parametrize("top", [0.4, -7.0, 30.0, 100.0, -400.0])
+def test_the_top_is_found_within_and_far_beyond_the_first_amplitudes(
+    top: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = refitted(monkeypatch, [top])
+    assert found.amplitude / 1e-3 == pytest.approx(top, abs=max(0.15, 0.02 * abs(top)))
+    off = found.amplitude / 1e-3 - top
+    assert found.log_bayes == pytest.approx(0.5 * top**2 - 0.5 * off**2 + occam(False))
+    assert found.sd == pytest.approx(1e-3, rel=1e-6)
+    assert found.theta[0] == pytest.approx([found.amplitude / 1e-3, found.amplitude])
+
+
+def test_blocks_that_share_an_amplitude_add_their_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tops at 4 and 6: the shared amplitude is 5, known √2 times as well, and half a nat a block is lost."""
+    found = refitted(monkeypatch, [4.0, 6.0])
+    assert found.amplitude == pytest.approx(5e-3, rel=0.02) and found.sd == pytest.approx(1e-3 / np.sqrt(2), rel=1e-6)
+    assert found.log_bayes == pytest.approx(0.5 * (4.0**2 + 6.0**2) - 1.0 + occam(False), abs=0.02)
+    assert found.blocks == (0, 1) and len(found.theta) == 2
+
+
+def test_an_amplitude_that_cannot_be_negative_ends_at_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = refitted(monkeypatch, [-3.0], named("toe"))
+    assert 0.0 <= found.amplitude < 0.2e-3
+    assert found.log_bayes < occam(True)
+    assert refitted(monkeypatch, [9.0], named("toe")).log_bayes == pytest.approx(40.5 + occam(True), abs=0.05)
+
+
+def width(value: list[float], grid: Any = (0.0, 1.0, 3.0, 4.0, 9.0)) -> float:
+    return refit._width(np.array(grid), np.array(value), int(np.argmax(value)), 7.0)
+
+
+def test_a_width_is_that_of_the_parabola_through_the_top_on_any_grid() -> None:
+    grid = np.array([0.0, 1.0, 3.0, 4.0, 9.0])
+    for top in (1.2, 2.9, 4.5):
+        assert width(list(-0.5 * ((grid - top) / 2.0) ** 2)) == pytest.approx(2.0)
+    # what lies farther out does not matter, but next to the top it must be known
+    assert width([-3.0, -1.0, 0.0, -0.5, -np.inf]) < 7.0
+    assert width([-3.0, -1.0, 0.0, -np.inf, -1.0]) == 7.0
+    assert width([-3.0, -np.inf, 0.0, -1.0, -1.0]) == 7.0
+    # at an end there is no parabola
+    assert width([0.0, -1.0, -2.0, -3.0, -4.0]) == width([-4.0, -3.0, -2.0, -1.0, 0.0]) == 7.0
+    # a plateau has no curvature
+    assert width([0.0, 0.0, 0.0], (0.0, 1.0, 2.0)) == 7.0 == refit._width(np.arange(3.0), np.zeros(3), 1, 7.0)
+
+
+def test_climbs_begin_on_the_line_between_what_is_known() -> None:
+    """Ends 0, 10 and 40 at amplitudes 0, 1 and 2, the best in the middle; beyond the grid nothing is extrapolated."""
+    grid, ends = np.array([0.0, 1.0, 2.0]), np.array([[0.0], [10.0], [40.0]])
+    found = refit._between(grid, ends, 1, np.array([0.5, 1.0, 1.5, 2.0, 2.5]))
+    assert found[:, 0].tolist() == [5.0, 10.0, 25.0, 40.0, 10.0]
+    ends[2] = np.nan
+    assert refit._between(grid, ends, 1, np.array([1.5]))[:, 0].tolist() == [10.0]
+    assert refit._between(grid, ends, 0, np.array([-1.0, 0.5]))[:, 0].tolist() == [0.0, 5.0]
