@@ -47,7 +47,8 @@ def judgement(row: dict, judged: dict[str, list[dict]]) -> tuple[str, str]:
     """What people said of a survivor: "equivalent" or "survives", and why; nothing if nobody has looked."""
     for word, cases in judged.items():
         for case in cases:
-            if case["file"] == row["file"] and case["function"] == row["function"] and case["what"] == row["what"]:
+            same = all(case[name] == row[name] for name in ("file", "function", "what"))
+            if same and case.get("statement", "") in row["statement"]:
                 return word, case["why"]
     return "", ""
 
@@ -122,7 +123,7 @@ def main() -> None:
                 with record.open("a") as out:
                     out.write(json.dumps(row) + "\n")
                 print(f"{row['outcome']:14s} {row['s']:6.1f} s {mutant.file}:{mutant.line} {mutant.what}", flush=True)
-            rows.append(row)
+            rows.append(row | {"line": mutant.line, "statement": mutant.statement})
     judged = tomllib.loads((Path(__file__).parent / "judged.toml").read_text(encoding="utf-8"))
     print("\n".join([*table(rows, judged, 2), "", *table(rows, judged, 9), "", "Survivors:"]))
     for row in rows:

@@ -36,6 +36,7 @@ class Mutant:
     file: str
     function: str
     line: int
+    statement: str
     what: str
     text: str
     reached_by: tuple[tuple[str, int], ...]
@@ -160,15 +161,16 @@ def mutants(file: str, number: int, seed: int) -> list[Mutant]:
         holder = [node for node in (*site.inside, site.node) if isinstance(node, ast.stmt)][-1]
         words = [str(seed), file, ".".join(named), before, after, ast.unparse(holder)]
         rank = hashlib.sha256("\x1f".join(words).encode()).hexdigest()
-        drawn.append((rank, site.at, ".".join(named), f"{site.word}: {before} -> {after}"))
+        statement = " ".join(ast.unparse(holder).split())
+        drawn.append((rank, site.at, ".".join(named), statement, f"{site.word}: {before} -> {after}"))
     out = []
-    for _, at, function, what in sorted(drawn)[:number]:
+    for _, at, function, statement, what in sorted(drawn)[:number]:
         tree = ast.parse(source)
         site = next(site for site in _sites(tree, iter(range(10**6))) if site.at == at)
         line = getattr(site.node, "lineno", 0)
         reached = tuple(_reached_by(file, site))
         text = ast.unparse(ast.fix_missing_locations(_Swap(site.node, site.changed).visit(tree)))
-        out.append(Mutant(file, function, line, what, text, reached))
+        out.append(Mutant(file, function, line, statement, what, text, reached))
     return sorted(out, key=lambda mutant: mutant.line)
 
 
@@ -200,5 +202,5 @@ def named() -> list[Mutant]:
         line = source[: source.index(old)].count("\n") + 1
         on_import = uses(old.split(" ")[0]) if old[0].isupper() and " = " in old else []
         what = f"named: {old.strip()} -> {new.strip() or 'nothing'}"
-        out.append(Mutant(file, "", line, what, source.replace(old, new), ((file, line), *on_import)))
+        out.append(Mutant(file, "", line, "", what, source.replace(old, new), ((file, line), *on_import)))
     return out

@@ -143,3 +143,21 @@ def test_an_event_is_not_put_where_its_fit_did_not_converge(monkeypatch: pytest.
     monkeypatch.setattr(module, "modes", modes)
     variants = CATALOGUE["grip_slip"].variants([experiments()[1].protocol()])[:3]
     assert module._most_evident(PLAIN, experiments()[1], variants, 0) is variants[2]
+
+
+@pytest.mark.parametrize("name", ["exponential", "two_modes"])
+def test_a_law_of_time_constants_creeps_by_exponentials(name: str) -> None:
+    """By the tensions of the first hold: one time constant of 20 s, or a second, ten times as long, with two fifths."""
+    experiment = experiments()[0]
+    (law,) = (c for c in module.candidates(experiment, PLAIN, CATALOGUE) if c.name == name)
+    problem = module.problem_of(law, experiment, module.effects_of(law, experiment, CATALOGUE, 0))
+    values = {"k1": 700.0, "B": 0.25, "U": 0.7, "k2": 0.05, "preload": 0.3, "sensor_sd": 0.01, "setting_sd": 0.01,
+              "two_modes.slow_share": 0.4, "two_modes.slower": 10.0}  # fmt: skip
+    theta = np.array([[values[parameter] for parameter in problem.names]])
+    sample = problem.samples[0]
+    tension, t = problem.linearised(theta, sample)[0].tension[0, :, 0], sample.protocol.time_s[0]
+    crept = (1000.0 + 1.0 + 0.3) / (1.0 + tension / 700.0) - 1000.0  # zero-tension length less that of the start, mm
+    share = 1.0 - np.exp(-0.05 * t)
+    if name == "two_modes":
+        share = 0.6 * share + 0.4 * (1.0 - np.exp(-0.005 * t))
+    assert crept[1:] / crept[-1] == pytest.approx(share[1:] / share[-1], rel=1e-9)

@@ -1,0 +1,113 @@
+"""The global test by its parts: gross errors struck out first, larger effects tried where the scan decides nothing."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wirebayes.discovery import global_test, gross_errors
+from wirebayes.discovery.global_test import MOST_TIMES, examine
+from wirebayes.discovery.screening import Candidate
+from wirebayes.discovery.settings import ALPHA
+from wirebayes.errors import InputError
+from wirebayes.io.paper import experiments
+
+SIMULATIONS = 199
+
+
+def examined(monkeypatch: pytest.MonkeyPatch, linear: float, larger: float, alpha: float = ALPHA) -> tuple[Any, int]:
+    """The test of a block whose scan has one p and whose test from larger effects another, and the simulations made."""
+    made: list[int] = []
+
+    def simulated(block: Any, trials: Any, n: int, rng: Any) -> Any:
+        made.append(n)
+        return SimpleNamespace(scan=None, z=np.zeros((n, 1)))
+
+    def joined(parts: Any) -> Any:
+        return SimpleNamespace(scan=None, z=np.concatenate([part.z for part in parts]))
+
+    class Larger:
+        log_bayes = {"a": 3.0}
+
+        def __init__(self, *given: Any) -> None:
+            pass
+
+        def test(self, *given: Any) -> Any:
+            return SimpleNamespace(p=larger, null=np.zeros(sum(made)))
+
+    test = lambda *given: SimpleNamespace(p=linear, null=np.zeros(sum(made)))  # noqa: E731
+    monkeypatch.setattr(global_test.screening, "candidate_probes", lambda *given: ([], [Candidate(0, "a", (0,), True)]))
+    monkeypatch.setattr(global_test.screening, "joined_replicates", joined)
+    monkeypatch.setattr(global_test.screening, "global_test", test)
+    monkeypatch.setattr(global_test.residual_patterns, "patterns", lambda problem: ([], None))
+    monkeypatch.setattr(global_test, "_strike_gross_errors", lambda block, *given: (block, []))
+    monkeypatch.setattr(global_test, "simulated_with_patterns", simulated)
+    monkeypatch.setattr(global_test, "Continuation", Larger)
+    for name in ("expand", "scan"):
+        monkeypatch.setattr(global_test, name, lambda *given, **known: None)
+    block: Any = SimpleNamespace(target=SimpleNamespace(problem=None), modes=SimpleNamespace(z=np.zeros((1, 1))))
+    return examine([block], {}, SIMULATIONS, np.random.default_rng(0), alpha=alpha), sum(made)
+
+
+def test_what_is_plain_to_see_needs_no_larger_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No simulation of 199 is as surprising: nothing that is tried further could change the verdict."""
+    found, made = examined(monkeypatch, linear=1 / 200, larger=0.9)
+    assert found.test.p == 1 / 200 and found.further == {} and made == SIMULATIONS
+
+
+@pytest.mark.parametrize(("larger", "times"), [(0.5, 1), (0.002, 1), (0.04, MOST_TIMES)])
+def test_larger_effects_decide_and_a_p_on_the_level_gets_more_simulations(
+    larger: float, times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, made = examined(monkeypatch, linear=0.3, larger=larger)
+    assert found.test.p == larger and found.further == {"a": 3.0}
+    assert made == times * SIMULATIONS
+
+
+def test_the_level_asked_for_says_what_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert examined(monkeypatch, linear=0.3, larger=0.2, alpha=0.2)[1] == MOST_TIMES * SIMULATIONS
+    assert examined(monkeypatch, linear=0.3, larger=0.04, alpha=0.2)[1] == SIMULATIONS
+
+
+def test_without_an_effect_that_could_show_nothing_is_tested(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(global_test.screening, "candidate_probes", lambda *given: ([], []))
+    with pytest.raises(InputError, match="no effect of the catalogue could show"):
+        examine([], {}, SIMULATIONS, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(("wrong", "struck"), [(0, 0), (1, 1), (4, 4), (9, 5)])
+def test_readings_are_struck_out_one_by_one_of_their_own_experiment(
+    wrong: int, struck: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As long as one is suspect, and no more than one in twenty: five of a hundred and some."""
+    one, other = experiments()[1:3]
+    pair = (one, replace(other, holds=other.holds[: (110 - gross_errors.readings_of([one])) // 5]))
+    assert 100 <= gross_errors.readings_of(pair) < 120
+    rivals: list[float] = []
+
+    def suspect(block: Any, rival: float) -> Any:
+        rivals.append(rival)
+        return None if len(rivals) > wrong else (pair[1].name, pair[1].holds[2].number, 1, 9.0)
+
+    def fitted(members: Any, *given: Any, **known: Any) -> Any:
+        return SimpleNamespace(**(vars(block) | {"experiments": tuple(members)}))
+
+    block: Any = SimpleNamespace(experiments=pair, target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(),
+                                 law="", history="", exponent=None)  # fmt: skip
+    # the best effect of this block explains 7, one of another block 50, a smooth curve 4
+    effects = SimpleNamespace(effects=np.array([[7.0, 50.0]]), flexible=np.array([4.0]))
+    monkeypatch.setattr(gross_errors, "suspect", suspect)
+    monkeypatch.setattr(global_test, "fitted", fitted)
+    monkeypatch.setattr(global_test, "expand", lambda *given: None)
+    monkeypatch.setattr(global_test, "scan", lambda x: effects)
+    candidates = [Candidate(0, "a", (0,), True), Candidate(1, "b", (1,), True)]
+    found, gone = global_test._strike_gross_errors(block, [], candidates, 0, np.random.default_rng(0))
+    assert len(gone) == struck and set(rivals) == {7.0}
+    assert (
+        gone == [{"experiment": other.name, "hold": pair[1].holds[2].number, "reading": 1, "log_bayes": 9.0}] * struck
+    )
+    lost = [gross_errors.readings_of([before]) - gross_errors.readings_of([after])
+            for before, after in zip(pair, found.experiments, strict=True)]  # fmt: skip
+    assert lost == [0, min(struck, 4)]  # a hold of five readings has no second one after four are gone
