@@ -7,23 +7,23 @@ from pathlib import Path
 
 from analyses.mutants.tree import reach_of
 
+
+def _files(package: str, names: str) -> list[str]:
+    return [f"tests/{package}/test_{name}.py" for name in names.split()]
+
+
 # Folders and files whose tests say what the modules of a package do. Others run them too, in whole fits and commands
 # that take too long to be asked of every mutant.
 TESTS = {
     "model": ["tests/model"],
     "inference": ["tests/inference/sampler"],
-    "results": [f"tests/results/test_{name}.py" for name in ("contraction", "identifiability", "outliers",
-                                                             "posterior_checks")],
-    "prediction": [f"tests/prediction/test_{name}.py" for name in ("held_out", "left_out", "predictive", "table")],
+    "results": _files("results", "contraction identifiability outliers posterior_checks"),
+    "prediction": _files("prediction", "held_out left_out pit_band predictive table"),
     "comparison": ["tests/comparison"],
-    "discovery": [f"tests/discovery/test_{name}.py" for name in ("explore", "held_out", "model_space", "name_evidence",
-                                                                 "power", "refit", "sharing", "shrinking",
-                                                                 "stepwise", "subsets", "thresholds", "verdict")],
-    "robot": [f"tests/robot/test_{name}.py" for name in ("answer", "certificate", "control", "forward",
-                                                         "reach", "statics", "tensions", "told")],
+    "discovery": _files("discovery", "explore global_test held_out model_space name_evidence power refit sharing "
+                                     "shrinking stepwise subsets thresholds verdict"),
+    "robot": _files("robot", "answer certificate control forward reach statics tensions told"),
 }  # fmt: skip
-
-
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant
 
 
