@@ -110,7 +110,7 @@ def main() -> None:
         reach = measure(tree, asked.output / "reach.jsonl", packages)
         sound = set[str]()
         for mutant in todo:
-            tests = reach.tests(mutant.reached_by, asked.budget)
+            tests = reach.tests(mutant, asked.budget)
             of_files = _hash(tree, tests)
             row = known.get(mutant.key)
             if row is None or (row["outcome"] == "survived" and row["of_files"] != of_files):

@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+from analyses.mutants.mistakes import Mutant
 from analyses.mutants.tree import reach_of
 
 
@@ -21,7 +22,7 @@ TESTS = {
     "prediction": _files("prediction", "held_out left_out pit_band predictive table"),
     "comparison": ["tests/comparison"],
     "discovery": _files("discovery", "explore global_test held_out model_space name_evidence power refit sharing "
-                                     "shrinking stepwise subsets thresholds verdict"),
+                                     "settings shrinking stepwise subsets thresholds verdict"),
     "robot": _files("robot", "answer certificate control forward reach statics tensions told"),
 }  # fmt: skip
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant
@@ -41,9 +42,15 @@ class Reach:
                         tests = row["seconds"] if test == "fixtures" else [test]
                         self.of_line.setdefault((file, line), set()).update(tests)
 
-    def tests(self, lines: Iterable[tuple[str, int]], budget_s: float) -> list[str]:
-        """The quickest tests that run any of the lines, as far as the seconds last; by file, quick files first."""
-        able = set().union(*(self.of_line.get(line, set()) for line in lines))
+    def tests(self, mutant: Mutant, budget_s: float) -> list[str]:
+        """The quickest tests that run a mutant, as far as the seconds last; by file, quick files first.
+
+        What runs on import counts where it is used, and in the test file of the module's name.
+        """
+        able = set().union(*(self.of_line.get(line, set()) for line in mutant.reached_by))
+        if not mutant.function:
+            own = f"/test_{Path(mutant.file).stem}.py::"
+            able |= {test for test in self.seconds if own in test}
         chosen, spent = [], 0.0
         for test in sorted(able, key=lambda test: (self.seconds[test], test)):
             spent += self.seconds[test]
