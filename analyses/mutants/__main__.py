@@ -15,7 +15,7 @@ import tomllib
 from pathlib import Path
 
 from analyses.mutants.mistakes import Mutant, mutants, named
-from analyses.mutants.reach import measure
+from analyses.mutants.reach import measure, package_of
 from analyses.mutants.tree import copy_of_the_checkout, preload, run
 
 # What decides, by package.
@@ -106,7 +106,7 @@ def main() -> None:
     preload()
     with tempfile.TemporaryDirectory(prefix="mutants-") as scratch:
         tree = copy_of_the_checkout(Path(scratch))
-        packages = sorted({mutant.file.split("/")[1] for mutant in todo})
+        packages = sorted({package_of(mutant.file) for mutant in todo})
         reach = measure(tree, asked.output / "reach.jsonl", packages)
         sound = set[str]()
         for mutant in todo:

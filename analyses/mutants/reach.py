@@ -23,7 +23,8 @@ TESTS = {
     "comparison": ["tests/comparison"],
     "discovery": _files("discovery", "explore global_test held_out model_space name_evidence power refit sharing "
                                      "settings shrinking stepwise subsets thresholds verdict"),
-    "robot": _files("robot", "answer certificate control forward reach statics tensions told"),
+    "robot": _files("robot", "answer control forward statics tensions told"),
+    "robot/proof": _files("robot", "certificate reach"),
 }  # fmt: skip
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant
 
@@ -76,6 +77,12 @@ def measure(tree: Path, record: Path, packages: Iterable[str]) -> Reach:
                 out.write(json.dumps(known[key]) + "\n")
         rows.append(known[key])
     return Reach(rows)
+
+
+def package_of(file: str) -> str:
+    """The package of a module that has tests of its own here."""
+    parts = file.split("/")[1:]
+    return next(name for name in ("/".join(parts[:n]) for n in (2, 1)) if name in TESTS)
 
 
 def test_files(tree: Path, packages: Iterable[str]) -> list[str]:

@@ -9,7 +9,7 @@ from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.predictive import PredictionRequest, predict
+from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict
 from wirebayes.wire.staircase import simulate
 
 TRUTH = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.006, "setting_sd": 0.02}
@@ -155,3 +155,18 @@ def test_hold_by_hold_spreads_the_first_readings_own_error() -> None:
     # with no creep left to matter both readings' errors add: slopes by length are nearly equal
     expected = np.sqrt(2 * (TRUTH["sensor_sd"] ** 2 + 0.01**2 / 12))
     assert drawn[5, 1].std() == pytest.approx(expected, rel=0.1)
+
+
+def test_draws_that_could_not_be_computed_leave_a_gap_and_given_readings_that_do_not_vary_none() -> None:
+    """Readings moved to where two given ones take their values; both are the same one here, and then one is unknown."""
+    rng = np.random.default_rng(0)
+    first = np.tile(rng.normal(size=(1, 2000)), (2, 1))
+    drawn = np.vstack([first[0], 0.5 * first[0] + 0.1 * rng.normal(size=2000)])
+    moved = _regressed(drawn, first, np.array([2.0, 2.0]))
+    assert moved[0] == pytest.approx(np.full(2000, 2.0))
+    assert moved[1].mean() == pytest.approx(1.0, abs=0.01) and moved[1].std() == pytest.approx(0.1, rel=0.05)
+    drawn[1, 5] = np.nan
+    assert np.isfinite(_regressed(drawn, first, np.array([2.0, 2.0]))[0]).all()
+    first[:, 5] = np.inf
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(_regressed(drawn, first, np.array([2.0, 2.0]))).any()
