@@ -12,12 +12,13 @@ from tests.robot.independent import Rig
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
-from wirebayes.robot.history import commanded, corrections, table
-from wirebayes.robot.history.estimate import estimate, predicted
-from wirebayes.robot.history.follow import clock_starts, follow, uncreeping
+from wirebayes.robot.history import commanded, conditioning, corrections, table
+from wirebayes.robot.history.conditioning import Readings, predicted
+from wirebayes.robot.history.estimate import estimate
+from wirebayes.robot.history.follow import Track, clock_starts, follow, uncreeping
 from wirebayes.robot.history.history import History, roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, Sensors
-from wirebayes.robot.history.unknowns import Uncertain, unknowns
+from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import inverse
 
@@ -230,6 +231,68 @@ def test_readings_move_draws_to_the_posterior_of_a_linear_problem():
     # what stays of a sensor's error is never averaged away
     assert np.isclose(of.noise**2 + of.offset**2, of.sd**2).all()
     assert found.sd[d + 1] > 0.1
+
+
+def _curved(z0, z1):
+    """Tensions of one wire at two rows, curved in the unknowns by more than the sensor's error."""
+    return np.stack([5 + 0.3 * z0 + 0.08 * z0**2, 5 + 0.2 * z0 - 0.3 * z1 + 0.1 * z0 * z1], -1)
+
+
+def _hinged(z0, z1):
+    """The wire is slack where z0 is positive; z1 is read beside it, at the second row."""
+    return np.stack([np.maximum(-z0, 0.0) * 0.8, np.maximum(-z0, 0.0) * 0.8], -1)
+
+
+@pytest.mark.parametrize(("tension", "read", "least"), [(_curved, [5.5, 5.3], 0.5), (_hinged, [0.02, -0.03], 0.3)])
+def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, least):
+    of = Sensors(np.array([0.1, 1.0, 1.0]), np.zeros(3))
+    values = np.full((2, 3), np.nan)
+    values[:, 0] = read
+    rng, n = np.random.default_rng(0), 4000
+
+    def known():
+        return Unknowns(None, None, np.zeros(2), np.eye(2), rng.standard_normal((n, 2)))
+
+    def way(white, name, without):
+        tau = tension(*white.T) * (0.0 if without.any() else 1.0)
+        columns = (len(white), 2)
+        return Track(np.zeros((*columns, 3)), np.tile(np.eye(3), (*columns, 1, 1)), tau[..., None],
+                     np.zeros((*columns, 1)), np.zeros(2, np.int64))  # fmt: skip
+
+    given = Readings(values, np.ones(2), of)
+    loose = conditioning.slack_wires(given, 1)
+    assert loose.tolist() == [tension is _hinged]
+    mode = conditioning.find_mode(known(), given, way, loose)
+    assert mode.converged
+    found = conditioning.draw(known, given, mode, way, rng)
+    grid = np.linspace(-4, 4, 81)
+    z = np.stack(np.meshgrid(grid, grid, grid, indexing="ij"))
+    left = np.array(read) - tension(z[0], z[1]) - of.offset[0] * z[2][..., None]
+    weight = np.exp(-0.5 * ((left / of.noise[0]) ** 2).sum(-1) - 0.5 * (z**2).sum(0))
+    weight /= weight.sum()
+    for i in range(2):
+        mean = (weight * z[i]).sum()
+        sd = np.sqrt((weight * (z[i] - mean) ** 2).sum())
+        assert found.white[:, i].mean() == pytest.approx(mean, abs=0.08 * sd)
+        assert found.white[:, i].std() == pytest.approx(sd, rel=0.08)
+        low = grid[np.searchsorted(np.cumsum(np.moveaxis(weight, i, 0).sum((1, 2))), 0.05)]
+        assert np.quantile(found.white[:, i], 0.05) == pytest.approx(low, abs=0.1 * sd + 0.05)
+    assert least * n < found.effective <= n
+
+
+def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsys):  # noqa: F811
+    robot = schema.read("hangprinter-4")
+    history = _told(robot, TIMES[:2], _places(robot)[:2])
+    rows = [[t, *j, *tau] for t, j, tau in zip(TIMES, history.joint_m, [[1.14, 1.07, 1.1, 5.28]] * 2, strict=False)]
+    head = [f"{kind}_{i}_{unit}" for kind, unit in (("joint", "m"), ("tension", "N")) for i in range(1, 5)]
+    table_of = [["time_s", *head], *rows]
+    (tmp_path / "log.csv").write_text("\n".join(",".join(map(str, row)) for row in table_of) + "\n")
+    arguments = ["pose", "hangprinter-4", "--wires", str(fitted), "--joints", str(tmp_path / "log.csv")]
+    assert main([*arguments, "--draws", "20", "--output", str(tmp_path / "out")]) == 0
+    said = json.loads((tmp_path / "out" / "pose.json").read_text())
+    assert 0 < said["readings"]["effective_draws"] <= 20
+    assert any("of 20 draws agree with the readings" in warning for warning in said["warnings"])
+    assert "independent ones" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_an_inclinometer_reads_what_turned_the_platform():

@@ -103,7 +103,8 @@ def _asked(pose: dict[str, Any]) -> list[str]:
         out.append(
             f"{readings['tensions']} tensions (standard error {readings['tension_sd_N']:g} N) and {readings['tilts']} "
             f"inclinations ({readings['tilt_sd_rad']:g} rad) were read; mean squared residual "
-            f"{number(readings['misfit'])}."
+            f"{number(readings['misfit'])}. Given them, the draws are worth {number(readings['effective_draws'], 2)} "
+            "independent ones."
         )
     return out
 

@@ -6,19 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.robot.history.conditioning import Readings, draw, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow
-from wirebayes.robot.history.history import History, roll_and_pitch
-from wirebayes.robot.history.readings import Information, Sensors, sensors, weight
-from wirebayes.robot.history.unknowns import Uncertain, Unknowns, slopes, unknowns
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.readings import sensors, weight
+from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.typing import Floats
 
 Progress = Callable[[str, float, float], None]
-_MOST = 8  # Gauss-Newton passes to the mode
-_ASTRAY = 3.0  # posterior sd: a draw that would still have to move so far is none of the posterior
-_NEAR = 0.2  # of a posterior sd: nearer to its end, a pass need not be repeated
+_NONE = 1e-9  # of a wire's stiffness: it bears nothing, and the equations keep their form
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,8 @@ class Estimate:
         Mean squared standardised residual of the readings at the mode; well above one when no wire explains them.
     converged : bool
         Whether the mode was reached, where there were readings.
+    effective : float or None
+        How many independent draws agree with the readings.
     """
 
     track: Track
@@ -46,6 +47,7 @@ class Estimate:
     error_m: Floats
     misfit: float | None = None
     converged: bool = True
+    effective: float | None = None
 
 
 def estimate(
@@ -59,9 +61,8 @@ def estimate(
 ) -> Estimate:
     """Where the platform was at each row: forward kinematics of creeping wires, with what the sensors say of them.
 
-    Without tensions and tilts every draw of the posterior is followed through the history. With them, Gauss-Newton over
-    the whole history finds the mode of reference lengths, parameters and specimens; the draws are moved by what the
-    readings say (`readings`), and followed again.
+    Without tensions and tilts every draw of the posterior is followed through the history. With them, the draws are
+    those of reference lengths, parameters and specimens given the readings (`conditioning`).
 
     Parameters
     ----------
@@ -83,55 +84,17 @@ def estimate(
     way = _Way(known, history, start, plain_track(known, history, start, progress), progress)
     if not history.read:
         return way.followed(known.draws)
-    of = sensors(robot, errors)
-    y, counts = readings(history, robot.legs), weights(history.times_s)
-    m, d, n = y.shape[1], known.count, line.count
-    z, last, cost, found, converged = np.zeros(d + m), np.zeros(d + m), np.inf, None, False
-    slope = np.empty(0)
-    for number in range(_MOST):
-        track = way.track(*known.columns(known.differences(z[:d])), f"mode, pass {number + 1}")
-        h = predicted(track)
-        left = y - h[0] - of.offset * z[d:]
-        new = float(np.nansum(counts[:, None] * (left / of.noise) ** 2) + z @ z) if track.held[0].all() else np.inf
-        if not new <= cost:  # no better, or not in balance: go half as far
-            z = 0.5 * (z + last)
-            continue
-        slope = slopes(h)
-        found, cost, last = _gathered(of, slope, left[None], counts), new, z
-        move = found.moves(-z[None], np.zeros((1, d + m)))[0]
-        if _small(move[None], found):
-            converged = True
-            break
-        z = z + move
-    if found is None:  # not even the mean wires hang in balance
-        return replace(way.followed(known.draws), converged=False)
-    noise = rng.standard_normal((n, d + m))
-    prior = np.concatenate([known.draws, rng.standard_normal((n, m))], 1)
-    draws = last + found.moves(prior - last, noise)
-    out = way.followed(draws[:, :d])
-    for _ in range(2):  # where the way from the mode was not straight, or a draw left it
-        left = y - predicted(out.track) - of.offset * draws[:, None, d:]
-        move = _gathered(of, slope, left, counts).moves(prior - draws, noise)
-        astray = ~(np.abs(move / found.sd).max(1) < _ASTRAY)
-        near = _small(move[~astray], found)
-        if near and not astray.any():
-            break
-        draws = _without(astray, draws if near else draws + move, rng)
-        out = way.followed(draws[:, :d])
-    misfit = float(np.nanmean((_mean(y - predicted(out.track)) / of.sd) ** 2))
-    return replace(out, misfit=misfit, converged=converged)
-
-
-def _without(astray: NDArray[np.bool_], draws: Floats, rng: np.random.Generator) -> Floats:
-    """Draws that contradict the readings (their platform fell, say) replaced by others."""
-    good = np.flatnonzero(~astray)
-    if not good.size:
-        return draws
-    return np.asarray(draws[np.where(astray, rng.choice(good, len(draws)), np.arange(len(draws)))])
-
-
-def _small(move: Floats, found: Information) -> bool:
-    return not move.size or bool(np.sqrt(np.mean((move / found.sd) ** 2)) < _NEAR)
+    read = Readings(readings(history, robot.legs), weights(history.times_s), sensors(robot, errors))
+    loose = slack_wires(read, robot.legs)
+    mode = find_mode(known, read, way.white, loose) or find_mode(known, read, way.white, np.zeros_like(loose))
+    if mode is None:  # not even the mean wires hang in balance
+        return replace(way.followed(known.draws), converged=False, effective=0.0)
+    out = draw(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
+    left = _mean(read.residual(out.track, np.zeros_like(out.white)))
+    return replace(
+        Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count])),
+        misfit=float(np.nanmean((left / read.of.sd) ** 2)), converged=mode.converged, effective=out.effective,
+    )  # fmt: skip
 
 
 def _mean(left: Floats) -> Floats:
@@ -150,21 +113,9 @@ def readings(history: History, legs: int) -> Floats:
     return out
 
 
-def predicted(track: Track) -> Floats:
-    """What the sensors of every column should read, ``(n, t, w + 2)``."""
-    return np.concatenate([track.tension_N, roll_and_pitch(track.rotation)], -1)
-
-
 def weights(times_s: Floats) -> Floats:
     """How many readings the sensors of each row count as, ``(t,)``."""
     return np.array([weight(None)] + [weight(float(since)) for since in np.diff(times_s)])
-
-
-def _gathered(of: Sensors, slope: Floats, left: Floats, counts: Floats) -> Information:
-    out = Information.none(len(slope), slope.shape[-1], len(left))
-    for k, count in enumerate(counts):
-        out.add(of, slope[:, k], left[:, k], float(count))
-    return out
 
 
 def plain_track(known: Unknowns, history: History, start: tuple[Floats, Floats], progress: Progress) -> Track:
@@ -224,6 +175,14 @@ class _Way:
         starts = clock_starts(history, self.plain.tension_N[0])
         return follow(self.known.robot, wires, history, history.joint_m, self.start, starts, error_m,
                       lambda row: self.progress(name, row + 1, rows))  # fmt: skip
+
+    def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:
+        """White unknowns ``(n, d)`` followed, some wires ``(w,)`` without stiffness."""
+        wires, error = self.known.columns(white)
+        if without.any():
+            stiffness = np.where(without[:, None], _NONE * wires.theta["k1"], wires.theta["k1"])
+            wires = replace(wires, theta=dict(wires.theta) | {"k1": stiffness})
+        return self.track(wires, error, name)
 
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""

@@ -44,6 +44,23 @@ class Track:
         """(n, t) True where the platform hangs in an equilibrium."""
         return np.asarray(np.isfinite(self.position_m).all(-1))
 
+    def part(self, index: NDArray[np.intp]) -> "Track":
+        """Some of the columns."""
+        return replace(
+            self, position_m=self.position_m[index], rotation=self.rotation[index],
+            tension_N=self.tension_N[index], strain=self.strain[index],
+        )  # fmt: skip
+
+    def with_columns(self, at: NDArray[np.bool_], other: "Track") -> "Track":
+        """The columns of another in the places of some of its own."""
+        out = self.part(np.arange(len(at)))
+        for own, new in zip(
+            (out.position_m, out.rotation, out.tension_N, out.strain),
+            (other.position_m, other.rotation, other.tension_N, other.strain), strict=True,
+        ):  # fmt: skip
+            own[at] = new
+        return out
+
 
 def follow(
     robot: Robot,

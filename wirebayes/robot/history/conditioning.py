@@ -1,0 +1,226 @@
+"""Draws of the posterior given tensions and angles: the mode, draws moved there, and what weight each of them has.
+
+Each draw of the prior is moved to where it fits its own readings, with noise of their own ("randomise, then optimise",
+Bardsley et al., SIAM J. Sci. Comput. 36, 2014). Where the readings are linear in the unknowns that gives the posterior
+itself. Where they are not, a draw has the weight of what linear moves cannot explain: the squared residual that is left
+beside its own randomised one. The determinant of the change of slope is left out: it is near one where weights are.
+
+A wire that is read as slack is the worst of it: it is only known to be at least so long, and slopes jump where it gets
+taut. The mode is then that of the robot without it, its length is left as the prior has it, and draws that would be
+taut lose their weight.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.history.follow import Track
+from wirebayes.robot.history.history import roll_and_pitch
+from wirebayes.robot.history.readings import Information, Sensors
+from wirebayes.robot.history.unknowns import Unknowns, slopes
+from wirebayes.typing import Floats
+
+Way = Callable[[Floats, str, NDArray[np.bool_]], Track]  # of white unknowns (n, d), a name for the progress, no wires
+_MOST = 12  # passes to the mode; four or five are usual
+_PASSES = 5  # to move the draws; two or three are usual
+_NEAR = 0.2  # posterior sd, in whatever direction it is largest: less than a band of 200 draws can show
+_SLACK = 3.0  # standard errors of a tension: nearer to zero, a wire may be slack
+_BATCHES = 4  # at most, of as many draws, where weights differ
+_ENOUGH = 0.5  # effective share of the draws from which on another batch is not worth its time
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What was read.
+
+    Attributes
+    ----------
+    values : (t, m) array
+        Tensions, roll and pitch; NaN where nothing was read.
+    counts : (t,) array
+        How many readings those of a row count as.
+    of : Sensors
+    """
+
+    values: Floats
+    counts: Floats
+    of: Sensors
+
+    def residual(self, track: Track, white: Floats) -> Floats:
+        """What unknowns with the sensors' offsets, ``(n, d + m)``, leave of the readings, ``(n, t, m)``."""
+        offset = white[:, None, white.shape[1] - len(self.of.offset) :] * self.of.offset
+        return np.asarray(self.values - predicted(track) - offset)
+
+    def cost(self, residual: Floats, white: Floats) -> Floats:
+        """Twice the negative log of the posterior density, ``(n,)``; infinite where a platform fell that was read."""
+        scaled = self.counts[:, None] * (residual / self.of.noise) ** 2
+        lost = (np.isnan(residual) & np.isfinite(self.values)).any((1, 2))
+        return np.asarray(np.where(lost, np.inf, np.nansum(scaled, (1, 2)) + (white**2).sum(1)))
+
+    def gathered(self, slope: Floats, residual: Floats) -> Information:
+        """All rows' information about unknowns and offsets."""
+        out = Information.none(len(slope), slope.shape[-1], len(residual))
+        for k, count in enumerate(self.counts):
+            out.add(self.of, slope[:, k], residual[:, k], float(count))
+        return out
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Where the posterior is highest.
+
+    Attributes
+    ----------
+    white : (d + m,) array
+    slope : (d, t, m) array
+        Of the predicted readings there.
+    found : Information
+        Of one draw that is there.
+    converged : bool
+    """
+
+    white: Floats
+    slope: Floats
+    found: Information
+    converged: bool
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Draws of the posterior, all of the same weight.
+
+    Attributes
+    ----------
+    white : (n, d + m) array
+    track : Track
+    effective : float
+        How many independent draws they are worth; 0 where none agrees with its readings.
+    """
+
+    white: Floats
+    track: Track
+    effective: float
+
+
+def predicted(track: Track) -> Floats:
+    """What the sensors of every column should read, ``(n, t, w + 2)``."""
+    return np.concatenate([track.tension_N, roll_and_pitch(track.rotation)], -1)
+
+
+def slack_wires(read: Readings, legs: int) -> NDArray[np.bool_]:
+    """Wires ``(w,)`` that all readings say are slack, as far as a sensor can tell."""
+    tension = read.values[:, :legs]
+    loose = ~(tension > _SLACK * read.of.sd[:legs]) & np.isfinite(tension).any(0)
+    return np.asarray(loose.all(0))
+
+
+def find_mode(known: Unknowns, read: Readings, way: Way, without: NDArray[np.bool_]) -> Mode | None:
+    """The mode by Gauss-Newton; None where mean wires do not hold the platform.
+
+    Parameters
+    ----------
+    known : Unknowns
+    read : Readings
+    way : function of white unknowns (n, d), a name, and wires that are left out
+    without : (w,) bool array
+        Wires that are left out.
+    """
+    d, m = known.count, len(read.of.offset)
+    z, last, cost, best = np.zeros(d + m), np.zeros(d + m), np.inf, None
+    for number in range(_MOST):
+        track = way(known.differences(z[:d]), f"mode, pass {number + 1}", without)
+        h = predicted(track)
+        residual = (read.values - h[0] - read.of.offset * z[d:])[None]
+        new = float(read.cost(residual, z[None])[0]) if track.held[0].all() else np.inf
+        if not new <= cost:  # no better, or not in balance: go half as far
+            z = 0.5 * (z + last)
+            continue
+        slope = slopes(h)
+        found, cost, last = read.gathered(slope, residual), new, z
+        move = found.moves(-z[None], None)
+        near = bool(_length(move, found)[0] < _NEAR)
+        best = Mode(z, slope, found, near)
+        if near:
+            break
+        z = z + move[0]
+    return best
+
+
+def draw(known: Callable[[], Unknowns], read: Readings, mode: Mode, way: Way, rng: np.random.Generator) -> Draws:
+    """Draws of the posterior: moved from draws of the prior, weighted, and drawn again by their weights.
+
+    Parameters
+    ----------
+    known : function
+        Gives the unknowns with new draws of the prior.
+    read : Readings
+    mode : Mode
+    way : function of white unknowns (n, d), a name, and wires that are left out
+    rng : numpy Generator
+    """
+    white, tracks, logs = [], [], []
+    for _ in range(_BATCHES):
+        prior = known().draws
+        n = len(prior)
+        one, track, weight = _moved(prior, read, mode, way, rng)
+        white.append(one)
+        tracks.append(track)
+        logs.append(weight)
+        share, effective = _shares(np.concatenate(logs))
+        if effective >= _ENOUGH * n:
+            break
+    if not effective:
+        return Draws(white[0], tracks[0], 0.0)
+    steps = (rng.random() + np.arange(n)) / n
+    pick = np.minimum(np.searchsorted(np.cumsum(share), steps), len(share) - 1)
+    return Draws(np.concatenate(white)[pick], _joined(tracks).part(pick), min(effective, float(n)))
+
+
+def _shares(logs: Floats) -> tuple[Floats, float]:
+    """Normalised weights of their logarithms, and how many equal ones they are worth."""
+    if not np.isfinite(logs).any():
+        return np.zeros(len(logs)), 0.0
+    weight = np.exp(logs - logs.max())
+    share = weight / weight.sum()
+    return np.asarray(share), float(1.0 / (share**2).sum())
+
+
+def _moved(
+    prior: Floats, read: Readings, mode: Mode, way: Way, rng: np.random.Generator
+) -> tuple[Floats, Track, Floats]:
+    """Draws ``(n, d + m)`` that fit readings of their own, their way, and the logarithms of their weights."""
+    (n, d), m, every = prior.shape, len(read.of.offset), np.zeros(1, bool)
+    noise = rng.standard_normal((n, d + m))
+    prior = np.concatenate([prior, rng.standard_normal((n, m))], 1)
+    draws = mode.white + replace(mode.found, vector=np.tile(mode.found.vector, (n, 1))).moves(prior - mode.white, noise)
+    track = way(draws[:, :d], "poses", every)
+    residual = read.residual(track, draws)
+    todo, before = np.ones(n, bool), np.full(n, np.inf)
+    for number in range(_PASSES):
+        found = read.gathered(mode.slope, residual)
+        move = found.moves(prior - draws, noise)
+        size = _length(move, found)
+        size[np.isnan(residual[:, np.isfinite(read.values)]).any(1)] = np.inf
+        todo &= (size > _NEAR) & (size < before)  # one that goes astray is left where it is
+        before = size
+        if number == _PASSES - 1 or not todo.any():
+            break
+        draws[todo] += move[todo]
+        track = track.with_columns(todo, way(draws[todo, :d], "poses", every))
+        residual = read.residual(track, draws)
+    explained = _length(found.moves(-draws, None), found) ** 2
+    logs = -0.5 * (read.cost(residual, draws) - explained)
+    return draws, track, np.where(size <= _NEAR, logs, -np.inf)
+
+
+def _length(move: Floats, found: Information) -> Floats:
+    """Length of moves ``(n, d + m)`` in posterior standard deviations, whatever their direction."""
+    return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", move, found.matrix + np.eye(move.shape[1]), move)))
+
+
+def _joined(tracks: list[Track]) -> Track:
+    """The columns of all."""
+    names = ("position_m", "rotation", "tension_N", "strain")
+    return replace(tracks[0], **{name: np.concatenate([getattr(t, name) for t in tracks]) for name in names})
