@@ -1,6 +1,6 @@
 """Readings divided into holds: by a column of hold numbers, by the displacement, or by times that start again.
 
-Times of the whole test become times since each hold began, which is its first reading; moves take none.
+Times of the whole test become times since each hold began: its first reading, or the middle of a move that is recorded.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,6 +20,7 @@ Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expec
 CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
+PAUSE = 1.5  # of the usual interval between readings: a longer one is a pause in the recording
 STEADY = 0.25  # of the smallest step: less scatter in a hold is the encoder's
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
@@ -152,8 +153,11 @@ def _in_groups(readings: Readings, groups: list[NDArray[np.int64]], time_since: 
             raise readings.complain(row, "time", found, "times that rise; a later hold needs another number or place")
     of_test = _since(readings, times, time_since) == "test"
     if of_test:
-        notes.append("times of the whole test: each hold begins at its first reading")
-        times = [of_hold - of_hold[0] for of_hold in times]
+        zeros = _between_readings(times)
+        at_first = all(zero == of_hold[0] for zero, of_hold in zip(zeros, times, strict=True))
+        begins = "at its first reading" if at_first else "between the last reading before it and its first"
+        notes.append(f"times of the whole test: each hold begins {begins}")
+        times = [of_hold - zero for of_hold, zero in zip(times, zeros, strict=True)]
     levels = [float(x[rows[0]]) for rows in groups]
     if any(np.ptp(x[rows]) > 0 for rows in groups):
         largest = max(float(np.ptp(x[rows])) for rows in groups)
@@ -163,6 +167,16 @@ def _in_groups(readings: Readings, groups: list[NDArray[np.int64]], time_since: 
     if readings.hold is None:
         notes.append(f"{len(groups)} holds: a new one wherever the displacement changes or the time starts again")
     return Cut(groups, number, levels, times, of_test, notes)
+
+
+def _between_readings(times: list[Floats]) -> list[float]:
+    """When each hold began: between two readings of a device that never paused, else at its first reading."""
+    zeros = [float(of_hold[0]) for of_hold in times]
+    for i, (before, after) in enumerate(zip(times, times[1:], strict=False), 1):
+        gap = float(after[0] - before[-1])
+        if len(after) >= CONTINUOUS and gap <= PAUSE * float(np.median(np.diff(after))):
+            zeros[i] -= 0.5 * gap
+    return zeros
 
 
 def _since(readings: Readings, times: list[Floats], stated: TimeSince | None) -> TimeSince:
@@ -199,8 +213,9 @@ def _by_plateaus(readings: Readings, note: str) -> Cut:
         found = f"a displacement that stays in {share}, {len(found_holds)} time{'s' * (len(found_holds) != 1)}"
         expected = "at least two displacements that are held while tension is read (or a column of hold numbers)"
         raise readings.complain(row, "displacement", found, expected)
-    ends = [0, *(p.left - 1 for p in found_holds[:-1])]
-    moves = [float(time[p.begin] - time[end]) for p, end in zip(found_holds, ends, strict=True)]
+    lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
+    moves = [float(time[p.begin] - time[left]) for p, left in zip(found_holds, lefts, strict=True)]
+    zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
     rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
     noise = noise_of(x, readings.displacement_step_mm)
     notes = [note] if note else []
@@ -209,11 +224,27 @@ def _by_plateaus(readings: Readings, note: str) -> Cut:
         f"{noise:.2g} mm or so, {len(x) - kept} readings of moves dropped"
     )
     notes.append(
-        f"each hold begins when its displacement is reached; moves took {np.median(moves):.3g} s (median) and "
-        "count as no time, so readings as soon after a move are left out: the wire crept while it moved"
+        f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
+        f"{np.median(moves):.3g} s (median), and readings as soon after one are left out"
     )
-    since = [time[r] - time[p.begin] for r, p in zip(rows, found_holds, strict=True)]
+    since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
     return Cut(rows, list(range(1, len(rows) + 1)), [_level(x[r]) for r in rows], since, True, notes)
+
+
+def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:
+    """When the wire was moved to a hold: the mean time of the displacement's change, from the last reading before it.
+
+    Creep that follows each small part of a move adds up, to first order in the move's duration, to that of the whole
+    move made at this moment.
+    """
+    if hold.begin == left:
+        return float(time[left])
+    on_the_way = x[left : hold.begin + 1].copy()
+    on_the_way[-1] = hold.level
+    whole = hold.level - on_the_way[0]
+    to_go = np.trapezoid(hold.level - on_the_way, time[left : hold.begin + 1])
+    lasts = float(time[hold.begin] - time[left])
+    return float(time[left]) + (float(np.clip(to_go / whole, 0.0, lasts)) if whole else 0.5 * lasts)
 
 
 def _after_move(time: Floats, hold: Plateau, move_s: float) -> NDArray[np.int64]:

@@ -16,7 +16,7 @@ LEAN = 3.0  # noise levels of drift along a hold; a piece of a move leans by mor
 STAIRS = 0.5  # of the way to the pieces beside it: pieces of a slow move lean by all of it
 EDGE = 5  # readings averaged at either end of a hold, to see a move that noise hides
 ARRIVED = 2.5  # standard errors of that mean from the level of the hold: nearer is at rest
-LONG = 10  # times the edge: a hold of more readings can spare one at its end, where the next move may have begun
+LONG = 10  # times the edge: a hold of more readings can spare some at its end, where the next move may have begun
 RANGE_SHARE = 0.0025  # of the whole range: no bench that is read holds better, and settling is no step
 SHORTEST_SHARE = 0.05  # of the usual hold: shorter ones are pauses of a move
 FEWEST = 3  # readings of a hold
@@ -73,7 +73,7 @@ def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
         if end - begin < FEWEST or _drift(x[begin:end]) > min(LEAN * noise, STAIRS * apart):
             continue
         begin, end = _trimmed(x, begin, end, scatter)
-        left, end = end, end - EDGE if end - begin > LONG * EDGE else end
+        left, end = end, end - _hidden(x, begin, end, scatter) if end - begin > LONG * EDGE else end
         if end - begin >= FEWEST and lasts >= SHORTEST_SHARE * usual:
             found.append(Plateau(begin, end, float(np.median(x[begin:end])), left))
     return found
@@ -129,14 +129,26 @@ def _trimmed(x: Floats, begin: int, end: int, scatter: float) -> tuple[int, int]
     """A piece without the ends of the moves beside it: from the first few readings at its level to the last few."""
     edge = min(EDGE, end - begin)
     off = x[begin:end] - np.median(x[begin:end])
-    settled = SAME_LEVEL * RANGE_SHARE * float(np.ptp(x))
-    level = np.abs(np.convolve(off, np.full(edge, 1.0 / edge), "valid")) <= settled + ARRIVED * scatter / np.sqrt(edge)
-    alone = np.abs(off) <= settled + ARRIVED * scatter  # where there is little noise, the mean is not as sharp
+    level = np.abs(np.convolve(off, np.full(edge, 1.0 / edge), "valid")) <= _away(x, scatter / np.sqrt(edge))
+    alone = np.abs(off) <= _away(x, scatter)  # where there is little noise, the mean is not as sharp
     first, last = np.flatnonzero(level & alone[: len(level)]), np.flatnonzero(level & alone[edge - 1 :])
     if not len(first) or not len(last):
         return begin, begin
     begin, end = begin + int(first[0]), begin + int(last[-1]) + edge
     return begin, end
+
+
+def _away(x: Floats, error: float) -> float:
+    """How far from its hold a displacement with this error may be and still count as at rest."""
+    return SAME_LEVEL * RANGE_SHARE * float(np.ptp(x)) + ARRIVED * error
+
+
+def _hidden(x: Floats, begin: int, end: int, scatter: float) -> int:
+    """Readings at the end of a hold in which the next move may have begun: the slower it is, the more."""
+    later = x[end : end + EDGE]
+    speed = abs(later[-1] - np.median(x[begin:end])) / EDGE if len(later) == EDGE else 0.0
+    unseen = 2.0 * _away(x, scatter)  # as far again, for a move that gains speed
+    return int(np.ceil(unseen / speed)) if EDGE * speed > unseen else EDGE
 
 
 def _drift(x: Floats) -> float:
