@@ -154,26 +154,100 @@ class Climbed:
     norm: Array
 
 
-def climb(block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence[Array] | None = None) -> Climbed:
+@dataclass(frozen=True)
+class Start:
+    """Where ladders begin.
+
+    Attributes
+    ----------
+    z : (places n, d) array
+        Places without the effect of n data sets, in the coordinates that are sampled.
+    log_density : (places n,) array
+        Log marginal density, each in the units of its place.
+    largest : (places n,) array
+        The largest among the places of each data set, in the same units.
+    data_sets : int
+    readings : sequence of (H, R, n) arrays or None
+        Theirs, a sample; None for the measured ones.
+    degrees : int
+        Readings less parameters.
+    """
+
+    z: Array
+    log_density: Array
+    largest: Array
+    data_sets: int
+    readings: Sequence[Array] | None
+    degrees: int
+
+
+def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) -> Start:
+    """The best places without an effect, of the same density and by the same steps as on a ladder.
+
+    The plain fit is the best with its own noise; with the noise integrated out some place nearby is better by up to
+    half a nat, which an effect would be credited with.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+    z : (n, d) array
+        The plain fits of n data sets, sampled coordinates. Steps also begin at the best fit with setting errors as
+        expected.
+    readings : sequence of (H, R, n) arrays, optional
+        Their readings, a sample; the measured ones when left out.
+    """
+    target, n = block.target, len(z)
+    free = moving_columns(target.problem)
+    y = np.concatenate([z, *(np.broadcast_to(s, z.shape) for s in block.modes_with_expected_setting_error)])
+    units = _log_units(target, y)
+    best, height, rows = y.copy(), np.full(len(y), -np.inf), np.arange(len(y))
+    for step in range(_STEPS + 1):
+        own = None if readings is None else [r[..., rows % n] for r in readings]
+        with np.errstate(all="ignore"):
+            x = tangent(target, y[rows], own, free)
+        here = _weigh(x, np.zeros_like(x.residual), 0.0, 0.0, x.degrees)
+        value = np.nan_to_num(here.height + x.prior, nan=-np.inf)
+        with np.errstate(invalid="ignore"):
+            gain = value - height[rows]
+        better = gain > 0
+        best[rows[better]], height[rows[better]] = y[rows[better]], value[better]
+        go = np.flatnonzero(gain >= _SETTLED)
+        if step == _STEPS or not len(go):
+            break
+        rows, own = rows[go], None if own is None else [r[..., go] for r in own]
+        y[rows] = _follow(target, y[rows], own, x.of(go), here.of(go), free, x.degrees)
+    largest = (height - units).reshape(-1, n).max(axis=0)
+    return Start(best, height, np.tile(largest, len(y) // n) + units, n, readings, x.degrees)
+
+
+def _log_units(target: LogPosterior, z: Array) -> Array:
+    """(n,) log of the units in which readings are weighed, their standard deviations, summed over all readings."""
+    theta, total = target.coordinates.to_natural(z), np.zeros(len(z))
+    for sample in target.problem.samples:
+        own = target.problem.parameters(theta, sample)
+        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+        total += 0.5 * sample.protocol.mask.sum() * np.log(variance)
+    return total
+
+
+def climb(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> Climbed:
     """Lead an effect through its amplitudes.
 
     Parameters
     ----------
     block : LaplaceFit
     ladder : AmplitudePath
-    z : (n, d) array
-        The plain fits of n data sets, sampled coordinates. The ladder is also begun at the best fit with setting
-        errors as expected.
-    readings : sequence of (H, R, n) arrays, optional
-        Their readings, a sample; the measured ones when left out.
+    begin : Start
+        Of n data sets.
     """
-    ascent, y = _begin(block, ladder, z, readings)
+    n = begin.data_sets
+    ascent, y = _begin(block, ladder, begin)
     moving = [i for i in moving_columns(ascent.target.problem) if i != ascent.column]
     shapes = set(ladder.effect.columns()[1:])
     rigid = [i for i in moving if ascent.target.problem.names[i].split("[")[0] not in shapes]
-    every = np.tile(ladder.amplitudes, len(y) // (len(ladder.probes) * len(z))).repeat(len(z), axis=1)
+    every = np.tile(ladder.amplitudes, len(y) // (len(ladder.probes) * n)).repeat(n, axis=1)
     unseen = _Places.unseen(y)
-    best, found, alive = _Places.unseen(y), list[_Places](), np.ones(len(z), bool)
+    best, found, alive = _Places.unseen(y), list[_Places](), np.ones(n, bool)
     for amplitudes in every:
         # Shape constants mean nothing while the amplitude is small, and would wander.
         is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(every[-1]) * _FIRST / _LAST).all())
@@ -182,13 +256,13 @@ def climb(block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence
         found.append(rung)
         best.improve(np.arange(len(y)), rung)
         if not is_low:
-            alive = alive & (ascent.best_start(rung.log_bayes) >= _HOPELESS)
+            alive = alive & (ascent.best_start(rung.log_bayes + ascent.behind) >= _HOPELESS)
         if ascent.is_beyond(amplitudes) or not alive.any():
             found += [unseen] * (len(ladder.amplitudes) - len(found))
             break
-    found.append(ascent.look(best.z, best.amplitude, np.ones(len(z), bool), moving, _STEPS))
+    found.append(ascent.look(best.z, best.amplitude, np.ones(n, bool), moving, _STEPS))
     rungs = ([getattr(rung, name) for rung in found] for name in ("log_bayes", "amplitude", "norm"))
-    return Climbed(*(np.array(values).reshape(-1, len(z)) for values in rungs))
+    return Climbed(*(np.array(values).reshape(-1, n) for values in rungs))
 
 
 @dataclass(frozen=True)
@@ -229,7 +303,9 @@ class _Ascent:
     readings : sequence of (H, R, n) arrays or None
     data_sets, degrees : int
     nothing : (starts n,) array
-        Log marginal density without the effect.
+        The largest log marginal density without the effect.
+    behind : (starts n,) array
+        How much less it is where the start is.
     half : (starts n,) array
         Ratio of an amplitude to where the stretch of its rung ends.
     """
@@ -243,6 +319,7 @@ class _Ascent:
     data_sets: int
     degrees: int
     nothing: Array
+    behind: Array
     half: Array
 
     def best_start(self, values: Array) -> Array:
@@ -302,22 +379,21 @@ class _Ascent:
         return best
 
 
-def _begin(
-    block: LaplaceFit, ladder: AmplitudePath, z: Array, readings: Sequence[Array] | None
-) -> tuple[_Ascent, Array]:
+def _begin(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> tuple[_Ascent, Array]:
     """What a climb needs, and the points (starts n, d) at which it begins."""
-    places = [z, *(np.broadcast_to(s, z.shape) for s in block.modes_with_expected_setting_error)]
-    target, column, y = _with_effect(block, ladder, places)
-    plain = tangent(block.target, z, readings, moving_columns(block.target.problem))
-    nothing = _weigh(plain, np.zeros_like(plain.residual), 0.0, 0.0, plain.degrees).height + plain.prior
+    n, places = begin.data_sets, len(begin.z) // begin.data_sets
+    target, column, y = _with_effect(block, ladder, np.split(begin.z, places))
     # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
-    nothing -= 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - len(block.target.problem.names))
-    nothing = np.tile(np.where(np.isfinite(nothing), nothing, np.inf), len(y) // len(z))
+    nothing = begin.largest - 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - begin.z.shape[1])
+    behind = np.stack([np.where(np.isfinite(nothing), nothing, np.inf), begin.largest - begin.log_density])
+    nothing, behind = behind.reshape(2, places, n).repeat(len(ladder.probes), axis=1).reshape(2, -1)
     # From where to where a rung speaks: half way, by ratio, to its neighbours.
-    apart = np.tile(ladder.amplitudes[1] / ladder.amplitudes[0], len(places)).repeat(len(z))
+    apart = np.tile(ladder.amplitudes[1] / ladder.amplitudes[0], places).repeat(n)
     main = ladder.effect.amplitudes[0]
     low, high = (float(v) for v in main.prior.support())
-    ascent = _Ascent(target, column, main.neutral, low, high, readings, len(z), plain.degrees, nothing, np.sqrt(apart))
+    ascent = _Ascent(
+        target, column, main.neutral, low, high, begin.readings, n, begin.degrees, nothing, behind, np.sqrt(apart)
+    )
     return ascent, y
 
 
@@ -531,9 +607,11 @@ class Continuation:
         return out
 
     def _strengths(self, ways: Sequence[AmplitudePath], plain: Sequence[tuple[Array, Any]]) -> dict[Candidate, Array]:
-        return strengths(ways, list(self._each(_climbs, ways, repeat(self._blocks), repeat(plain))))
+        z, readings = zip(*plain, strict=True)
+        begin = list(self._each(start, self._blocks, z, readings))
+        return strengths(ways, list(self._each(_climbs, ways, repeat(self._blocks), repeat(begin))))
 
 
-def _climbs(way: AmplitudePath, blocks: Sequence[LaplaceFit], plain: Sequence[tuple[Array, Any]]) -> dict[int, Climbed]:
-    """A ladder climbed on all its blocks, from plain fits and their readings, a block each."""
-    return {b: climb(blocks[b], way, *plain[b]) for b in way.blocks}
+def _climbs(way: AmplitudePath, blocks: Sequence[LaplaceFit], begin: Sequence[Start]) -> dict[int, Climbed]:
+    """A ladder climbed on all its blocks."""
+    return {b: climb(blocks[b], way, begin[b]) for b in way.blocks}
