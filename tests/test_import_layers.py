@@ -8,6 +8,7 @@ import wirebayes
 ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors", "typing"},
+    {"json_files"},
     {"linear_algebra"},
     {"units", "interrupt", "user_files"},
     {"workers"},
@@ -24,7 +25,7 @@ LAYERS: list[set[str]] = [
     {"workflows"},
     {"cli"},
 ]
-ROBOT_MAY_USE = {"errors", "typing", "linear_algebra", "units", "user_files", "wire", "robot"}
+ROBOT_MAY_USE = {"errors", "typing", "json_files", "linear_algebra", "units", "user_files", "wire", "robot"}
 MAY_USE_ROBOT = {"report", "reproduce", "workflows", "cli", "__init__"}
 
 

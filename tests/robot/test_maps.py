@@ -16,8 +16,8 @@ def test_a_turned_platform_drifts_in_the_map_as_it_does_alone():
     wires, turn = draws.for_robot(robot, line), np.array([0.05, -0.03, 0.1])
     asked = maps.Slices(np.array([0.5, 0.65]), np.stack([np.zeros(3), turn]))
     level, turned = maps.map_slices(robot, line, asked)
-    assert np.unique(turned.asked_m[:, 2]).tolist() == [0.5, 0.65]
-    assert len(turned.asked_m) == 2 * 49
+    assert np.unique(turned.requested_m[:, 2]).tolist() == [0.5, 0.65]
+    assert len(turned.requested_m) == 2 * 49
     for i in (3, len(turned.drift.position_m) - 2):
         x, R = turned.drift.position_m[i], rotation.matrix(turn)
         alone = drift.from_command(robot, wires, x, R, np.array([60.0]))
@@ -26,7 +26,7 @@ def test_a_turned_platform_drifts_in_the_map_as_it_does_alone():
         angle = np.arccos((alone.rotation[:, 0] @ R.T @ np.array([0, 0, 1.0]) @ [0, 0, 1.0]).clip(-1, 1))
         np.testing.assert_allclose(turned.drift.tilt_rad[i], angle, rtol=0.3, atol=3e-5)
         np.testing.assert_allclose(turned.drift.tension_N[i], inverse.tensions(robot, x[None], R[None])[0])
-    plain = claim.over_workspace(robot, wires, level.asked_m)
+    plain = claim.over_workspace(robot, wires, level.requested_m)
     np.testing.assert_array_equal(level.drift.distance_m, plain.distance_m)
 
 

@@ -25,7 +25,7 @@ PAGE = "report.html"
 _NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
 
 
-def conclude(result: Result, *, as_json: bool = False, quiet: bool = False) -> None:
+def conclude(result: Result[Any], *, as_json: bool = False, quiet: bool = False) -> None:
     """Write the page of a command's results and print the answer.
 
     Parameters
@@ -42,7 +42,7 @@ def conclude(result: Result, *, as_json: bool = False, quiet: bool = False) -> N
     print_answer(result, as_json=as_json, quiet=quiet)
 
 
-def print_answer(result: Result, *, as_json: bool = False, quiet: bool = False, kept: bool = True) -> None:
+def print_answer(result: Result[Any], *, as_json: bool = False, quiet: bool = False, kept: bool = True) -> None:
     """Print the answer of a command, as `conclude` does; for results without a page, or not `kept` in a folder, too."""
     folder = result.place.path
     if as_json:
@@ -53,7 +53,7 @@ def print_answer(result: Result, *, as_json: bool = False, quiet: bool = False, 
         print("\n".join([*answer(result), *where, f"Next: {next_step(result)}"]))
 
 
-def answer(result: Result) -> list[str]:
+def answer(result: Result[Any]) -> list[str]:
     """The answer, a line or two for each experiment, model or wire."""
     if isinstance(result, Posteriors):
         return [line for posterior in result.values() for line in answer(posterior)]
@@ -79,12 +79,17 @@ def answer(result: Result) -> list[str]:
     return [repr(result)]
 
 
-def next_step(result: Result) -> str:
+def _check_failed(fit: Posterior) -> bool:
+    check = fit.summary().get("model_check")
+    return check is not None and check["passed"] is False
+
+
+def next_step(result: Result[Any]) -> str:
     """What a person would do with this result."""
     folder = result.place.path
     if isinstance(result, Posterior | Posteriors):
         fits = result.values() if isinstance(result, Posteriors) else [result]
-        failed = [f for f in fits if (f.summary().get("model_check") or {}).get("passed") is False]
+        failed = [f for f in fits if _check_failed(f)]
         if failed:
             return "wirebayes discover FILE.toml --output DIR, to find out what the model is missing"
         return f"wirebayes predict {folder} PROTOCOL.csv --output FILE.csv, or wirebayes pose ROBOT.toml --wires DIR"

@@ -15,6 +15,17 @@ from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
+from wirebayes.json_files.comparison import (
+    ComparedModel,
+    ComparedModels,
+    Difference,
+    Differences,
+    HeldOutHolds,
+    Judgement,
+    LeaveOneHoldOut,
+    ModelJson,
+    PredictionScores,
+)
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out, standard_error
 from wirebayes.typing import Floats
@@ -51,7 +62,7 @@ class Task:
         return Path(self.experiment.name) / "models" / f"{self.candidate.name.replace('@', '-')}.json"
 
 
-def judge(task: Task, seed: int, policy: Policy = POLICY) -> dict[str, Any]:
+def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
     """Fit one model and score it; a failure is a result too.
 
     Parameters
@@ -67,20 +78,22 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> dict[str, Any]:
         Plain values; ``failed`` holds the reason, or None.
     """
     candidate = task.candidate
-    content: dict[str, Any] = {
+    content: ModelJson = {
         "name": candidate.name, "question": candidate.question, "sentence": candidate.sentence,
         "elastic_law": candidate.law, "history": candidate.history, "likelihood": candidate.likelihood,
         "scored": "all readings" if candidate.likelihood == "chain" else "later readings given each hold's first",
+        "failed": None,
     }  # fmt: skip
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # of proposals where the model cannot be computed
-            return content | _scores(task, seed, policy) | {"failed": None}
+            return {**content, **_scores(task, seed, policy)}
     except Exception as error:  # a model that cannot be fitted stays in the table, with its reason
-        return content | {"failed": f"{type(error).__name__}: {error}"}
+        content["failed"] = f"{type(error).__name__}: {error}"
+    return content
 
 
-def _scores(task: Task, seed: int, policy: Policy) -> dict[str, Any]:
+def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
     candidate, known = task.candidate, catalogue(task.own_effects)
     whole = task.experiment if candidate.unrecorded else task.experiment.without_unrecorded()
     recorded = len(whole.recorded_holds)
@@ -95,7 +108,7 @@ def _scores(task: Task, seed: int, policy: Policy) -> dict[str, Any]:
     again = replace(policy, ess=policy.ess / 2, most_steps=min(policy.most_steps, 400))
     left = leave_each_hold_out(full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again)
     early = full if task.train_holds else fitted(first)
-    content: dict[str, Any] = {
+    content: Judgement = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],
         "parameters": len(full.problem.names),
         "converged": full.chains.converged and early.chains.converged and left.converged,
@@ -108,8 +121,7 @@ def _scores(task: Task, seed: int, policy: Policy) -> dict[str, Any]:
     }  # fmt: skip
     if first < recorded:
         rng = np.random.default_rng(seed_of(seed, task.experiment.name, "held out"))
-        content["held_out"] = _held_out(held_out(early, whole, rng))
-        content["held_out"]["effects"] = [e.key for e in early.problem.samples[0].model.effects]
+        content["held_out"] = _held_out(held_out(early, whole, rng), early)
     return content
 
 
@@ -117,16 +129,17 @@ def _keys(known: Mapping[str, Any], fitted: Fit) -> list[str]:
     return [e.key for e in fitted.problem.samples[0].model.effects if e.name in known]
 
 
-def _held_out(result: HeldOut) -> dict[str, Any]:
+def _held_out(result: HeldOut, trained: Fit) -> HeldOutHolds:
     return {
         "trained_on": result.trained,
         "holds": np.unique(result.given.hold),
         "free": None if result.free is None else scores_dict(result.free),
         "given_first": scores_dict(result.given),
+        "effects": [e.key for e in trained.problem.samples[0].model.effects],
     }
 
 
-def scores_dict(scores: Scores) -> dict[str, Any]:
+def scores_dict(scores: Scores) -> PredictionScores:
     """Scores as plain values, with what the pictures need."""
     return {
         "rmse_N": scores.rmse_N, "elpd": float(scores.elpd.sum()), "per_hold": scores.elpd,
@@ -172,7 +185,7 @@ def _store(task: Task, directory: Path, seed: int, policy: Policy) -> None:
     write_json(directory / task.file, judge(task, seed, policy))
 
 
-def side_by_side(models: Sequence[dict[str, Any]], base: str) -> dict[str, Any]:
+def side_by_side(models: Sequence[ModelJson], base: str) -> ComparedModels:
     """The table of one experiment: differences, weights and what they mean.
 
     Parameters
@@ -194,50 +207,62 @@ def side_by_side(models: Sequence[dict[str, Any]], base: str) -> dict[str, Any]:
     if reference["failed"] is None:
         per_hold = np.array([m["leave_one_hold_out"]["per_hold"] for m in alike], float).T
         weights = dict(zip((m["name"] for m in alike), stacking(per_hold), strict=True))
-    rows = []
+    rows: list[ComparedModel] = []
     for m in models:
-        row = {k: v for k, v in m.items() if k != "held_out"}
-        row["weight"] = weights.get(m["name"])
-        row["difference"] = row["held_out_difference"] = row["given_first_difference"] = None
+        row: ComparedModel = {
+            **m, "weight": weights.get(m["name"]), **_differences(m, reference), "meaning": ""
+        }  # fmt: skip
         if m["failed"] is None:
             row["held_out"] = _without_readings(m["held_out"])
-            if reference["failed"] is None:
-                row |= _differences(m, reference)
         row["meaning"] = _meaning(row, base)
         rows.append(row)
     rows.sort(key=lambda r: (r["failed"] is not None, r["weight"] is None, -(_elpd(r) if r["failed"] is None else 0.0)))
     return {"base": base, "models": rows}
 
 
-def _elpd(row: dict[str, Any]) -> float:
-    return float(row["leave_one_hold_out"]["elpd"])
+def _elpd(row: ComparedModel) -> float:
+    return row["leave_one_hold_out"]["elpd"]
 
 
-def _without_readings(held: dict[str, Any] | None) -> dict[str, Any] | None:
+def _without_readings(held: HeldOutHolds | None) -> HeldOutHolds | None:
+    """The scores alone."""
     if held is None:
         return None
-    long = ("readings", "pit_band")
-    return {k: {n: x for n, x in v.items() if n not in long} if isinstance(v, dict) else v for k, v in held.items()}
+    short = held.copy()
+    short["free"], short["given_first"] = _short(held["free"]), _short(held["given_first"])
+    return short
 
 
-def _differences(m: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
-    out: dict[str, Any] = {}
+def _short(scores: PredictionScores | None) -> PredictionScores | None:
+    if scores is None:
+        return None
+    short = scores.copy()
+    short.pop("readings", None)
+    short.pop("pit_band", None)
+    return short
+
+
+def _differences(m: ModelJson, reference: ModelJson) -> Differences:
+    out: Differences = {"difference": None, "held_out_difference": None, "given_first_difference": None}
+    if m["failed"] is not None or reference["failed"] is not None:
+        return out
     if m["scored"] == reference["scored"]:
-        per_hold = (x["leave_one_hold_out"]["per_hold"] for x in (m, reference))
-        out["difference"] = _difference(*per_hold)
-    if m["held_out"] and reference["held_out"]:
-        for key, way in (("held_out_difference", "free"), ("given_first_difference", "given_first")):
-            if m["held_out"][way] and reference["held_out"][way]:
-                out[key] = _difference(m["held_out"][way]["per_hold"], reference["held_out"][way]["per_hold"])
+        out["difference"] = _difference(m["leave_one_hold_out"], reference["leave_one_hold_out"])
+    one, other = m["held_out"], reference["held_out"]
+    if one and other:
+        if one["free"] and other["free"]:
+            out["held_out_difference"] = _difference(one["free"], other["free"])
+        if one["given_first"] and other["given_first"]:
+            out["given_first_difference"] = _difference(one["given_first"], other["given_first"])
     return out
 
 
-def _difference(one: Sequence[float], other: Sequence[float]) -> dict[str, float]:
-    gained = np.asarray(one, float) - np.asarray(other, float)
+def _difference(one: LeaveOneHoldOut | PredictionScores, other: LeaveOneHoldOut | PredictionScores) -> Difference:
+    gained = np.asarray(one["per_hold"], float) - np.asarray(other["per_hold"], float)
     return {"elpd": float(gained.sum()), "se": standard_error(gained)}
 
 
-def _meaning(row: dict[str, Any], base: str) -> str:
+def _meaning(row: ComparedModel, base: str) -> str:
     if row["failed"] is not None:
         return f"could not be judged ({row['failed']})"
     if row["name"] == base:

@@ -11,7 +11,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.run_folder import write_json
+from wirebayes.json_files.discovery import GrossError
+from wirebayes.json_files.summary import ModelCheckResult
 from wirebayes.results.jobs import Job
 from wirebayes.workers import ParallelMap, workers
 
@@ -54,7 +56,7 @@ class ModelCheck:
     alpha: float
     simulations: int = 0
     surprising: tuple[str, ...] = ()
-    gross_errors: tuple[dict[str, Any], ...] = ()
+    gross_errors: tuple[GrossError, ...] = ()
     reason: str = ""
     with_effects: bool = False
 
@@ -87,7 +89,7 @@ class ModelCheck:
             f"{other}; the readings deviate most in the direction of {directions}.{gross}"
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ModelCheckResult:
         """Plain values for JSON."""
         return {
             "passed": self.passed,
@@ -141,7 +143,15 @@ def check_model(
     order = sorted(surprises, key=lambda name: -surprises[name])
     names = tuple("a smooth discrepancy" if name == "unknown" else name for name in order[:_SHOWN])
     failed = p <= alpha
-    return ModelCheck(p, alpha, len(gate.test.null), names if failed else (), tuple(gate.struck), "", bool(effects))
+    return ModelCheck(
+        p,
+        alpha,
+        len(gate.test.null),
+        names if failed else (),
+        tuple(cast(list[GrossError], gate.struck)),
+        "",
+        bool(effects),
+    )
 
 
 def write_checks(

@@ -6,7 +6,6 @@ simulated at the rough fit and refitted (`wirebayes.discovery.power`).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from wirebayes.discovery.linear_scan import expand
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
+from wirebayes.json_files.check import EffectSize, ParameterRange
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, taught
 from wirebayes.typing import Array
@@ -40,8 +40,8 @@ class Preview:
         What is suspicious about what was fitted.
     """
 
-    parameters: dict[str, dict[str, Any]]
-    effects: dict[str, dict[str, Any]]
+    parameters: dict[str, ParameterRange]
+    effects: dict[str, EffectSize]
     warnings: list[str]
 
 
@@ -65,7 +65,7 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     return Preview(parameters, _effects(block, kinds, rng), [sentence for sentence in said if sentence])
 
 
-def _range(draws: Array, before: Array) -> dict[str, Any]:
+def _range(draws: Array, before: Array) -> ParameterRange:
     """One parameter: its range after and before the test, and what determines it."""
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
     prior_low, prior_high = np.quantile(before, [0.05, 0.95])
@@ -75,9 +75,7 @@ def _range(draws: Array, before: Array) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _effects(
-    block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.random.Generator
-) -> dict[str, dict[str, Any]]:
+def _effects(block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> dict[str, EffectSize]:
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
     trials, candidates = screening.candidate_probes([block], kinds)
     if expand(block.target, block.modes.z[:1], []).degrees < 1:
@@ -92,7 +90,7 @@ def _effects(
     }
 
 
-def _shown(kind: type[Effect], amplitude: float | None) -> dict[str, Any]:
+def _shown(kind: type[Effect], amplitude: float | None) -> EffectSize:
     if amplitude is None:
         return _hidden(kind, "taken up by the model's own parameters")
     main = kind.amplitudes[0]
@@ -100,5 +98,5 @@ def _shown(kind: type[Effect], amplitude: float | None) -> dict[str, Any]:
     return {"shows": shows, "amplitude_80": amplitude, "unit": main.unit, "reason": None}
 
 
-def _hidden(kind: type[Effect], reason: str) -> dict[str, Any]:
+def _hidden(kind: type[Effect], reason: str) -> EffectSize:
     return {"shows": "no", "amplitude_80": None, "unit": kind.amplitudes[0].unit, "reason": reason}

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from wirebayes.discovery.linear_scan import Scan
+from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.typing import Array
 
@@ -112,7 +112,7 @@ def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
     return out
 
 
-def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names: str) -> list[dict[str, Any]]:
+def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names: str) -> list[Disagreement]:
     """The covariates along which the data disagree, most improbable first.
 
     Parameters
@@ -124,7 +124,7 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
     names : str
         The experiments, for the sentence.
     """
-    out = []
+    out: list[Disagreement] = []
     for covariate in dict.fromkeys(p.covariate for p in listed):
         columns = [skip + i for i, p in enumerate(listed) if p.covariate == covariate]
         here, chance = data.effects[0, columns], null.effects[:, columns].max(axis=1)

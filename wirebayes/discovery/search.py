@@ -8,7 +8,7 @@ detected.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -25,7 +25,17 @@ from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
-from wirebayes.typing import Amplitude, Answer, ExperimentFindings, HeldOutReport, Outlook, Remainder, Verdict
+from wirebayes.json_files.discovery import (
+    Amplitude,
+    Answer,
+    Disagreement,
+    ExperimentFindings,
+    GrossError,
+    HeldOutReport,
+    Outlook,
+    Remainder,
+    Verdict,
+)
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
 
@@ -175,7 +185,7 @@ def _own_reports(
             "steps": check.steps,
             "held_out": check.held_out,
             "residual_rms_N": shrinking.left_over(block, e.name),
-            "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
+            "gross_errors": [g for g in cast(list[GrossError], gate.struck) if g["experiment"] == e.name],
         }
         for e, check in zip(block.experiments, checks, strict=True)
     }
@@ -261,7 +271,7 @@ class _Answer:
 
 def _answer(
     plain: list[LaplaceFit], decision: Decision | None, explored: Explored | None, i: int,
-    where: list[dict[str, Any]], rng: np.random.Generator,
+    where: list[Disagreement], rng: np.random.Generator,
 ) -> _Answer:  # fmt: skip
     """The verdict on block `i`, and its fits with what was accepted."""
     if decision is None or explored is None:
@@ -296,7 +306,7 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
 
 
 def _common(
-    answers: Sequence[_Answer], i: int, plain: list[LaplaceFit], p: float, where: list[dict[str, Any]],
+    answers: Sequence[_Answer], i: int, plain: list[LaplaceFit], p: float, where: list[Disagreement],
     alike: dict[tuple[str, str], float],
 ) -> Answer:  # fmt: skip
     """What the experiments of one block share in the report."""

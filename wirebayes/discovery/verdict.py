@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,8 @@ from wirebayes.discovery.settings import (
 from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet, Key
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.typing import Array, Verdict
+from wirebayes.json_files.discovery import Disagreement, Verdict
+from wirebayes.typing import Array
 from wirebayes.workers import ParallelMap
 
 
@@ -44,7 +44,7 @@ class Retest:
     """
 
     p: float | None
-    where: list[list[dict[str, Any]]]
+    where: list[list[Disagreement]]
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 from arviz_stats.base import array_stats
 
 from wirebayes.inference.fit import Fit
+from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability
 from wirebayes.model.prior import fast_logpdf
 from wirebayes.results.contraction import contraction, source
 from wirebayes.typing import Array
@@ -114,7 +115,7 @@ def identifiability(fitted: Fit) -> list[Taught]:
     return out
 
 
-def to_dict(taught: Sequence[Taught]) -> dict[str, Any]:
+def to_dict(taught: Sequence[Taught]) -> dict[str, Identifiability]:
     """The same as plain values, for JSON."""
     return {
         t.name: {
@@ -190,12 +191,8 @@ class Extrapolation:
         with np.errstate(invalid="ignore"):
             return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ExtrapolatedCreep:
         """The same as plain values, for JSON, with a sentence for the longest time."""
-        bands = {
-            name: dict(zip(("q05", "q50", "q95"), getattr(self, name), strict=True))
-            for name in ("posterior_mm", "weaker_prior_mm", "prior_mm")
-        }
         share, hours = float(self.prior_share[-1]), self.time_s[-1] / 3600.0
         if not np.isfinite(share):
             verdict = "more than a twentieth of the draws do not creep at this tension"
@@ -208,8 +205,15 @@ class Extrapolation:
                 f"it hardly depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
             )
         sentence = f"Creep after {hours:g} h at {self.tension_N:g} N: {verdict}."
-        return {"tension_N": self.tension_N, "time_s": self.time_s, **bands, "prior_share": self.prior_share,
-                "pareto_k": self.pareto_k, "sentence": sentence, "warning": self.warning}  # fmt: skip
+        return {"tension_N": self.tension_N, "time_s": self.time_s, "posterior_mm": _quantiles(self.posterior_mm),
+                "weaker_prior_mm": _quantiles(self.weaker_prior_mm), "prior_mm": _quantiles(self.prior_mm),
+                "prior_share": self.prior_share, "pareto_k": self.pareto_k, "sentence": sentence,
+                "warning": self.warning}  # fmt: skip
+
+
+def _quantiles(values: Array) -> CreepBand:
+    low, middle, high = values
+    return {"q05": low, "q50": middle, "q95": high}
 
 
 # from within a hold to the day that robots ask for; evenly spread on a logarithmic axis

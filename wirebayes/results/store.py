@@ -19,6 +19,8 @@ from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
 from wirebayes.io.run_folder import stored_results, write_bytes, write_json
+from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.json_files.values import Statistics
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
@@ -42,7 +44,7 @@ _CHUNK = 2000  # draws at a time: bounds the memory
 
 def save(
     fit: Fit, folder: Path, provenance: Mapping[str, Any], *, seed: int = 0, sample: Sample | None = None
-) -> dict[str, Any]:
+) -> SummaryJson:
     """Write ``posterior.nc`` and ``summary.json`` into an existing folder and return the summary.
 
     Parameters
@@ -476,7 +478,7 @@ def derived(wire: FreshSample, tension_N: float) -> dict[str, Array]:
     }
 
 
-def band(values: Array) -> dict[str, float] | None:
+def band(values: Array) -> Statistics | None:
     """Mean, sd and quantiles of draws; None where a draw has no finite value (creep that never ends)."""
     if not np.isfinite(values).all():
         return None
@@ -484,7 +486,7 @@ def band(values: Array) -> dict[str, float] | None:
     return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
 
 
-def statistics(values: Array) -> dict[str, float]:
+def statistics(values: Array) -> Parameter:
     """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
     q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
     with np.errstate(invalid="ignore"):
@@ -504,9 +506,9 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
     return [f"{s.name}: {said}" for s in fit.problem.samples for said in posterior_checks.warnings(fit, s)]
 
 
-def _summary(fit: Fit, sample: Sample | None, tree: Any) -> dict[str, Any]:
+def _summary(fit: Fit, sample: Sample | None, tree: Any) -> SummaryJson:
     first = sample or fit.problem.samples[0]
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Parameter] = {}
     for name, variable in tree["posterior"].data_vars.items():
         if variable.ndim == 2:
             parameters[str(name)] = statistics(variable.values)

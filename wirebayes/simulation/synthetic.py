@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold, frozen
 from wirebayes.io.run_folder import write_csv, write_json, write_text
+from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.typing import Array
@@ -180,7 +180,8 @@ def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: 
         _write_readings(folder / f"{bench.name}.csv", bench.experiment(), sample)
     write_text(folder / FILE, "\n".join(_table(bench) for bench in benches))
     truths = {sample.name: _truth(made, i) for i, sample in enumerate(made.problem.samples)}
-    write_json(folder / TRUTH, {"seed": seed, "experiments": truths})
+    content: TruthJson = {"seed": seed, "experiments": truths}
+    write_json(folder / TRUTH, content)
     return made
 
 
@@ -258,7 +259,7 @@ def _table(bench: Bench) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _truth(made: Simulated, i: int) -> dict[str, Any]:
+def _truth(made: Simulated, i: int) -> TrueWire:
     sample = made.problem.samples[i]
     return {
         "material": sample.material,

@@ -18,6 +18,7 @@ from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
+from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.problem import MATERIAL, SAMPLE, build
 from wirebayes.results.outliers import Outlier, outliers
 from wirebayes.wire.laws import ElasticLaw, History
@@ -143,8 +144,8 @@ def batch(
     with without_script():
         _compute(read, task, place.path, configuration, scheduler, progress or silent)
     with open_run(place.path, configuration) as run:
-        rows = [read_json(place.path / e.name / _ROW) for e, _ in read]
-        rows += [_empty(file) | {"error": said} for file, said in unreadable.items()]
+        rows: list[Row] = [read_json(place.path / e.name / _ROW) for e, _ in read]
+        rows += [_empty(file, said) for file, said in unreadable.items()]
         _tabulate(rows, outliers(rows), place.path)
         run.finish()
     return Batch(place, own)
@@ -262,13 +263,16 @@ def _store(done: Done, folder: Path) -> None:
     write_json(folder / _ROW, done.row)
 
 
-def _empty(file: str) -> dict[str, Any]:
+def _empty(file: str, said: str) -> Row:
     """The row of a file that could not be read."""
-    nothing = dict.fromkeys((*_FIRST, *_LAST))
-    return nothing | {"name": Path(file).stem, "file": file, "parameters": {}, "effects": [], "warnings": []}
+    return {
+        "name": Path(file).stem, "material": None, "file": file, "length_mm": None, "holds": None, "readings": None,
+        "converged": None, "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None,
+        "check": None, "warnings": [], "error": said,
+    }  # fmt: skip
 
 
-def _tabulate(rows: Sequence[Mapping[str, Any]], far: Sequence[Outlier], folder: Path) -> None:
+def _tabulate(rows: Sequence[Row], far: Sequence[Outlier], folder: Path) -> None:
     """``batch.json``, ``summary.csv`` and, where pyarrow is installed, ``summary.parquet``."""
     names = [n for n in (*MATERIAL, *SAMPLE) if any(n in row["parameters"] for row in rows)]
     header = [*_FIRST, *(f"{n}_{q}" for n in names for q in QUANTITIES), *_LAST]
@@ -277,12 +281,16 @@ def _tabulate(rows: Sequence[Mapping[str, Any]], far: Sequence[Outlier], folder:
         lying.setdefault(outlier.experiment, []).append(outlier.parameter)
     table = []
     for row in rows:
-        own = row["parameters"]
+        own: dict[str, Any] = dict(row["parameters"])
         listed = {"effects": row["effects"], "outlier": lying.get(row["name"], []), "warnings": row["warnings"]}
         cells = {**row, **{key: "; ".join(value) or None for key, value in listed.items()}}
         values = [own.get(n, {}).get(q) for n in names for q in QUANTITIES]
         table.append([*(cells[c] for c in _FIRST), *values, *(cells[c] for c in _LAST)])
     write_csv(folder / TABLE, header, table)
     write_parquet(folder / PARQUET, header, table)
-    found = [{**vars(o), "sentence": o.sentence} for o in far]
-    write_json(folder / Batch._content, {"version": 1, "experiments": rows, "outliers": found})
+    found: list[OutlierRow] = [
+        {"experiment": o.experiment, "material": o.material, "parameter": o.parameter, "value": o.value,
+         "median": o.median, "z": o.z, "specimens": o.specimens, "sentence": o.sentence} for o in far
+    ]  # fmt: skip
+    content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": found}
+    write_json(folder / Batch._content, content)

@@ -1,7 +1,5 @@
 """What was understood of an experiment file, what is suspicious in it, and what such a test can determine."""
 
-from typing import Any
-
 import numpy as np
 
 from wirebayes import __version__
@@ -11,6 +9,7 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.io import data_checks
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, write_json
+from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.workflows.options import PathLike, Progress, Source, check_seed, experiments_of, path_of, silent
 from wirebayes.workflows.results import CHECKED, Check, Place
 
@@ -76,24 +75,26 @@ def check(
         if run.state != "done":
             from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
-            found = {}
+            found: dict[str, CheckedExperiment] = {}
             for done, e in enumerate(experiments):
                 report("check", done, len(experiments))
                 previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
                 warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *previewed.warnings]
-                found[e.name] = _understood(e) | {
-                    "warnings": warnings, "parameters": previewed.parameters, "effects": previewed.effects,
+                found[e.name] = {
+                    **_understood(e), "warnings": warnings, "parameters": previewed.parameters,
+                    "effects": previewed.effects,
                 }  # fmt: skip
                 understood(e, place.path / f"{e.name}.svg")
             report("check", len(experiments), len(experiments))
-            write_json(place.path / CHECKED, {"experiments": found})
+            content: CheckJson = {"experiments": found}
+            write_json(place.path / CHECKED, content)
             run.finish()
     return Check(place, own, computed=run.state != "done")
 
 
-def _understood(e: Experiment) -> dict[str, Any]:
+def _understood(e: Experiment) -> Understood:
     """What the files say, as plain values."""
-    holds = [
+    holds: list[HoldUnderstood] = [
         {
             "number": hold.number, "displacement_mm": hold.displacement_mm, "start_s": hold.start_s,
             "duration_s": hold.duration_s, "readings": int(hold.time_s.size),

@@ -14,6 +14,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.data_checks import of_experiments
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
+from wirebayes.json_files.comparison import ComparisonJson
 from wirebayes.model.problem import Likelihood
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import without_script
@@ -213,12 +214,12 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
             run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
         from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
 
-        content: dict[str, Any] = {"version": 1, "seed": plan.seed, "experiments": {}}
+        content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}}
         for one in plan.experiments:
             with stored_results(place.path / one.name):
                 models = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
                 content["experiments"][one.name] = side_by_side(models, BASE)
-            pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
+            pictures.save_pictures(place.path / one.name, one.name, dict(content["experiments"][one.name]), models)
         write_json(place.path / "comparison.json", content)
         opened.finish()
     return Comparison(place, plan.own_effects, warnings=plan.warnings)

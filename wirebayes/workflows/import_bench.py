@@ -11,6 +11,7 @@ from wirebayes.io import data_checks
 from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
 from wirebayes.io.bench.undecided import Choices, Decimal, TimeSince, Undecided
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
+from wirebayes.json_files.imported import ImportJson
 from wirebayes.user_files import read_bytes
 from wirebayes.workflows.options import PathLike, above_zero, check_choice, words
 from wirebayes.workflows.results import IMPORTED, ImportedTests, Place
@@ -141,14 +142,15 @@ def _decided(
 def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> None:
     from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
-    found, tables = {}, []
+    tables: list[str] = []
+    content: ImportJson = {"experiments": {}}
     for path, test in zip(paths, tests, strict=True):
         experiment = test.experiment
         write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
         sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {path.name}", *test.notes)]
         tables.append(toml_of(experiment, sentences))
         understood(experiment, folder / f"{experiment.name}.svg", test.recording)
-        found[experiment.name] = {
+        content["experiments"][experiment.name] = {
             "raw": path.name, "length_mm": experiment.length_mm, "material": experiment.material,
             "resolution_N": experiment.resolution_N or None, "holds": len(experiment.holds),
             "readings": len(test.rows), "notes": test.notes, "warnings": data_checks.of_experiments([experiment]),
@@ -156,4 +158,4 @@ def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> N
         write_text(folder / f"{experiment.name}.toml", tables[-1])
     if len(tests) > 1:
         write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))
-    write_json(folder / IMPORTED, {"experiments": found})
+    write_json(folder / IMPORTED, content)

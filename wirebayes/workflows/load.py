@@ -27,7 +27,7 @@ from wirebayes.workflows.results import (
     SimulatedTests,
 )
 
-_KINDS: dict[str, type[Result]] = {
+_KINDS: dict[str, type[Result[Any]]] = {
     "batch": Batch,
     "compare": Comparison,
     "discover": Findings,
@@ -84,5 +84,5 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
         folders = [path.parent.name for path in sorted(place.path.glob(f"*/{POSTERIOR}"))]
         order: list[str] = list(configuration.get("data_sha256", ()))
         return fits_in(place, sorted(folders, key=lambda name: order.index(name) if name in order else 0), own)
-    kind: Callable[..., Result] = _KINDS[str(command)]
+    kind: Callable[..., Result[Any]] = _KINDS[str(command)]
     return kind(place, own, computed=False)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
-from typing import Any
 
 from wirebayes import __version__
 from wirebayes.discovery.model_check import write_checks
@@ -19,6 +18,9 @@ from wirebayes.effects import catalogue
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
+from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.values import Statistics
 from wirebayes.results.jobs import Job, one
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import one_thread_each
@@ -70,7 +72,7 @@ class Task:
 class Done:
     """What came of one experiment: its row of the table and the content of its files by their path."""
 
-    row: dict[str, Any]
+    row: Row
     files: dict[str, bytes]
 
 
@@ -101,7 +103,10 @@ def do(work: bytes) -> Done:
         with TemporaryDirectory(prefix="wirebayes-", dir=task.scratch) as scratch:
             folder = Path(scratch)
             try:
-                row |= _discovered(experiment, task, folder) if task.discover else _fitted(experiment, task, folder)
+                if task.discover:
+                    row = {**row, **_discovered(experiment, task, folder)}
+                else:
+                    row = {**row, **_fitted(experiment, task, folder)}
             except OSError:  # a full disk is not the specimen's fault
                 raise
             except Exception as error:  # no specimen may lose the others
@@ -110,7 +115,7 @@ def do(work: bytes) -> Done:
             return Done(row, _files(folder, experiment.name, task.posteriors))
 
 
-def first_columns(experiment: Experiment, file: str) -> dict[str, Any]:
+def first_columns(experiment: Experiment, file: str) -> Row:
     """A row before anything is known of its posterior."""
     recorded = experiment.recorded_holds
     return {
@@ -121,18 +126,18 @@ def first_columns(experiment: Experiment, file: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fitted(experiment: Experiment, task: Task, folder: Path) -> dict[str, Any]:
+def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.law, task.history, provenance=about)
     one(job, folder, task.seed, task.policy)
     if task.check:
         write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
-    summary = read_json(folder / experiment.name / SUMMARY)
-    check = summary.get("model_check", {"passed": None, "p": None})
-    return _columns(summary) | {"p_global": check["p"], "check": _word(check["passed"])}
+    summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
+    check = summary.get("model_check")
+    return _columns(summary, check and check["p"], check and check["passed"])
 
 
-def _discovered(experiment: Experiment, task: Task, folder: Path) -> dict[str, Any]:
+def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.law, task.history, kinds, task.simulations), task.seed)
     for job in jobs_of(found, task.law, task.history, task.own_effects):
@@ -141,20 +146,26 @@ def _discovered(experiment: Experiment, task: Task, folder: Path) -> dict[str, A
     report = found.report["experiments"][experiment.name]
     # the check of a fit is this global test
     p = report["p_global"]
-    return _columns(read_json(folder / experiment.name / "plain" / SUMMARY)) | {
+    return {
+        **_columns(read_json(folder / experiment.name / "plain" / SUMMARY), p, p > ALPHA),
         "verdict": report["verdict"], "effects": report["effects"], "best_effect": report["best"],
-        "p_global": p, "check": _word(p > ALPHA),
     }  # fmt: skip
 
 
-def _columns(summary: dict[str, Any]) -> dict[str, Any]:
-    parameters = {n: {q: p[q] for q in QUANTITIES} for n, p in summary["parameters"].items()}
+def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitColumns:
+    parameters: dict[str, Statistics] = {
+        n: {"mean": v["mean"], "sd": v["sd"], "q05": v["q05"], "q50": v["q50"], "q95": v["q95"]}
+        for n, v in summary["parameters"].items()
+    }
     said = [s for s in cautions(summary) if s.startswith("warning: ")]
-    return {"converged": summary["converged"], "parameters": parameters, "warnings": said}
-
-
-def _word(passed: bool | None) -> str | None:
-    return None if passed is None else "passed" if passed else "failed"
+    check = None if passed is None else "passed" if passed else "failed"
+    return {
+        "converged": summary["converged"],
+        "parameters": parameters,
+        "warnings": said,
+        "p_global": p,
+        "check": check,
+    }
 
 
 def _hash(experiment: Experiment) -> dict[str, str]:

@@ -17,11 +17,13 @@ from wirebayes.io.experiment import Experiment, read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
 from wirebayes.io.readings import Hold, frozen
 from wirebayes.io.run_folder import open_run, plain, read_json, write_json
+from wirebayes.json_files.plan import EffectSeen, ExpectedWidth, JudgedProtocol, PlanJson, RobotDrift
+from wirebayes.json_files.values import Statistics
 from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked, too_long
-from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
-from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
+from wirebayes.planning.sensitivity import SIMULATIONS, EffectPower, sensitivity
+from wirebayes.planning.widths import HOUR_S, Width, at_centre, expected_widths, typical_tension
 from wirebayes.results import store
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
@@ -172,7 +174,7 @@ def plan(
         report("protocols", len(request.tests), len(request.tests))
         order = ranked(judged, request.aim, request.budget_min)
         rows = [_row(j, request, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
-        summary = {
+        summary: PlanJson = {
             "version": 1, "aim": list(request.aim), "budget_min": request.budget_min, "best": rows[0]["name"],
             "guess": {"source": request.guess.source, "length_mm": request.guess.length_mm,
                       "parameters": {n: _statistics(v) for n, v in request.guess.draws.items()}},
@@ -299,10 +301,10 @@ def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
 
 def _row(
     judged: Judged, request: _Request, rank: int, machine: Robot | None, law: ElasticLaw, history: History
-) -> dict[str, Any]:
+) -> JudgedProtocol:
     """A protocol as it stands in ``plan.json``."""
     test, expected, seen = judged.test, judged.expected, judged.sensitivity
-    quantities = {name: vars(width) for name, width in expected.widths.items()}
+    quantities = {name: _width(width) for name, width in expected.widths.items()}
     cosines = {f"{a} {b}": cos for (a, b), cos in seen.cosines.items() if a < b}
     recorded = test.recorded_holds
     return {
@@ -311,15 +313,32 @@ def _row(
         "within_budget": not too_long(judged, request.budget_min), "score": judged.score(request.aim),
         "information_bits": expected.information_bits, "simulated_tests": expected.tests,
         "parameters": {n: q for n, q in quantities.items() if n in (*MATERIAL, *SAMPLE)},
-        "creep": {n: getattr(expected, n) for n in ("tension_N", "length_mm", "longest_hold_s")}
-                 | {n: q for n, q in quantities.items() if n not in (*MATERIAL, *SAMPLE)},
-        "effects": {name: vars(effect) for name, effect in seen.effects.items()},
+        "creep": {
+            "tension_N": expected.tension_N, "length_mm": expected.length_mm,
+            "longest_hold_s": expected.longest_hold_s, "creep_longest_hold_mm": quantities["creep_longest_hold_mm"],
+            "creep_1h_mm": quantities["creep_1h_mm"],
+        },
+        "effects": {name: _seen(effect) for name, effect in seen.effects.items()},
         "cosines": cosines, "not_identifiable": list(seen.hidden),
         "robot": None if machine is None else _drift(judged, request.guess, machine, law, history),
     }  # fmt: skip
 
 
-def _drift(judged: Judged, guess: GuessedWire, machine: Robot, law: ElasticLaw, history: History) -> dict[str, Any]:
+def _width(width: Width) -> ExpectedWidth:
+    return {
+        "sd": width.sd, "sd_se": width.sd_se, "sd_median": width.sd_median, "width_90": width.width_90,
+        "width_90_low": width.width_90_low, "width_90_high": width.width_90_high, "guess_sd": width.guess_sd,
+    }  # fmt: skip
+
+
+def _seen(effect: EffectPower) -> EffectSeen:
+    return {
+        "amplitude_80": effect.amplitude_80, "unit": effect.unit, "delta_80": effect.delta_80,
+        "delta_prior": effect.delta_prior, "confused_with": list(effect.confused_with),
+    }  # fmt: skip
+
+
+def _drift(judged: Judged, guess: GuessedWire, machine: Robot, law: ElasticLaw, history: History) -> RobotDrift:
     """How well the drift of a robot within an hour would be known, and how well it is at the guess."""
 
     def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
@@ -339,7 +358,7 @@ def _drift(judged: Judged, guess: GuessedWire, machine: Robot, law: ElasticLaw, 
     }  # fmt: skip
 
 
-def _statistics(values: Any) -> dict[str, float]:
+def _statistics(values: Any) -> Statistics:
     low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
     return {"mean": float(values.mean()), "sd": float(values.std()), "q05": float(low), "q50": float(middle),
             "q95": float(high)}  # fmt: skip

@@ -8,11 +8,21 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
+from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
+from wirebayes.json_files.calibrate import CalibrateJson
+from wirebayes.json_files.check import CheckJson
+from wirebayes.json_files.comparison import ComparisonJson
+from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.json_files.imported import ImportJson
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson
+from wirebayes.json_files.pose import PoseJson
+from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.truth import TruthJson
 from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.typing import Floats
@@ -23,6 +33,7 @@ if TYPE_CHECKING:
 
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
 IMPORTED, CHECKED = "import.json", "check.json"
+Content = TypeVar("Content")  # what the JSON file of a result holds
 _MESSAGES = 20  # lines on standard error: what a terminal shows at once
 _FIGURES = 4  # digits that a short form shows
 
@@ -49,7 +60,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result:
+class Result(Generic[Content]):
     """What all results have in common.
 
     Attributes
@@ -78,11 +89,11 @@ class Result:
         """What the command says on standard error."""
         return ()
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> Content:
         """The results as plain values, as they stand in the JSON file."""
         path = self.folder / self._content
         with stored_results(path):
-            return dict(read_json(path))
+            return cast(Content, dict(read_json(path)))
 
     def save(self, folder: PathLike) -> Path:
         """Store the results as the command would have stored them.
@@ -119,7 +130,7 @@ class Result:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Posterior(Result):
+class Posterior(Result[SummaryJson]):
     """A posterior: draws of the parameters given the readings, of one experiment or of several fitted together.
 
     Attributes
@@ -231,7 +242,7 @@ class Posterior(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Posteriors(Result, Mapping[str, Posterior]):
+class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
     """The posteriors of several experiments by name.
 
     Attributes
@@ -258,7 +269,7 @@ class Posteriors(Result, Mapping[str, Posterior]):
     def __len__(self) -> int:
         return len(self.members)
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, SummaryJson]:
         """The summary of each, by name."""
         return {name: posterior.summary() for name, posterior in self.members.items()}
 
@@ -279,7 +290,7 @@ class Posteriors(Result, Mapping[str, Posterior]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Findings(Result):
+class Findings(Result[DiscoveryJson]):
     """What the plain model is missing in each experiment of a file.
 
     Examples
@@ -293,7 +304,7 @@ class Findings(Result):
     _content: ClassVar[str] = "discovery.json"
 
     @cached_property
-    def report(self) -> dict[str, Any]:
+    def report(self) -> DiscoveryJson:
         """The content of ``discovery.json``."""
         return self.summary()
 
@@ -341,7 +352,7 @@ class Findings(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Batch(Result):
+class Batch(Result[BatchJson]):
     """Many experiments, each fitted and discovered on its own.
 
     Examples
@@ -357,12 +368,12 @@ class Batch(Result):
     _content: ClassVar[str] = "batch.json"
 
     @cached_property
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[Row]:
         """What ``summary.csv`` says, a row an experiment."""
         return list(self.summary()["experiments"])
 
     @cached_property
-    def outliers(self) -> list[dict[str, Any]]:
+    def outliers(self) -> list[OutlierRow]:
         """Parameters of specimens that lie far from those of their material's others, farthest first."""
         return list(self.summary()["outliers"])
 
@@ -411,7 +422,7 @@ class Batch(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(Result):
+class Plan(Result[PlanJson]):
     """What each of several tests would teach, the best first.
 
     Examples
@@ -423,12 +434,12 @@ class Plan(Result):
     _content: ClassVar[str] = "plan.json"
 
     @cached_property
-    def protocols(self) -> list[dict[str, Any]]:
+    def protocols(self) -> list[JudgedProtocol]:
         """Each test with its expected widths and what it would show, the best first."""
         return list(self.summary()["protocols"])
 
     @property
-    def best(self) -> dict[str, Any]:
+    def best(self) -> JudgedProtocol:
         """The first of them."""
         return self.protocols[0]
 
@@ -446,7 +457,10 @@ class Plan(Result):
     def _repr_html_(self) -> str:
         rows = [
             [row["name"], _figure(row["duration_min"]), _figure(row["information_bits"])]
-            + [_figure(row["parameters"].get(n, {}).get("sd_median")) for n in ("k1", "B", "k2")]
+            + [
+                _figure(row["parameters"][n]["sd_median"] if n in row["parameters"] else None)
+                for n in ("k1", "B", "k2")
+            ]
             for row in self.protocols
         ]
         header = ["protocol", "minutes", "bits", "sd of k1, N", "sd of B", "sd of k2"]
@@ -454,7 +468,7 @@ class Plan(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
+class Comparison(Result[ComparisonJson]):
     """Models side by side on readings that their fits have not seen.
 
     Attributes
@@ -497,7 +511,7 @@ class Comparison(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pose(Result):
+class Pose(Result[PoseJson]):
     """A pose of a robot on creeping wires: kinematics, drift and pose error with bands.
 
     Examples
@@ -537,7 +551,7 @@ class Pose(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Result):
+class Calibration(Result[CalibrateJson]):
     """Zero-tension lengths of a robot's wires, estimated from its own sensors.
 
     Examples
@@ -551,10 +565,10 @@ class Calibration(Result):
     @property
     def messages(self) -> tuple[str, ...]:
         """That the lengths should not be used, if so."""
-        models = {"with_creep_model": "the creep model", "by_hooke_alone": "Hooke's law alone"}
         with stored_results(self.folder / self._content):
             found = self.summary()
-            astray = [called for key, called in models.items() if not found[key]["converged"]]
+            models = (("the creep model", found["with_creep_model"]), ("Hooke's law alone", found["by_hooke_alone"]))
+            astray = [called for called, lengths in models if not lengths["converged"]]
         advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
         return (f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}",) if astray else ()
 
@@ -573,7 +587,7 @@ class Calibration(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Export(Result):
+class Export(Result[dict[str, Any]]):
     """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.
 
     Examples
@@ -615,7 +629,7 @@ class Export(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulatedTests(Result):
+class SimulatedTests(Result[TruthJson]):
     """Synthetic tests with known truth.
 
     Examples
@@ -641,7 +655,7 @@ class SimulatedTests(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImportedTests(Result):
+class ImportedTests(Result[ImportJson]):
     """Experiments out of raw files of a bench.
 
     Examples
@@ -675,7 +689,7 @@ class ImportedTests(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check(Result):
+class Check(Result[CheckJson]):
     """What was understood of experiments, what is suspicious, and what such tests can determine.
 
     Examples
@@ -707,7 +721,7 @@ class Check(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Reproduction(Result):
+class Reproduction(Result[dict[str, Any]]):
     """The paper's tables and figures, with posteriors.
 
     Attributes
@@ -749,13 +763,13 @@ class Reproduction(Result):
         return [str(self.folder / "report.html"), f"{len(self.posteriors)} fits"]
 
 
-def cautions(summary: dict[str, Any]) -> list[str]:
+def cautions(summary: SummaryJson) -> list[str]:
     """What the ``summary.json`` of a fit says against it."""
     out = [f"warning: {said}" for said in summary["warnings"]]
     if not summary["converged"]:
         out.append(summary["convergence"])
-    check = summary.get("model_check", {})
-    if check.get("passed") is False or check.get("gross_errors"):
+    check = summary.get("model_check")
+    if check and (check["passed"] is False or check["gross_errors"]):
         out.append(check["sentence"])
     return out
 

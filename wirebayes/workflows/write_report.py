@@ -1,12 +1,13 @@
 """One page of a folder of results."""
 
 from pathlib import Path
+from typing import Any
 
 from wirebayes.workflows.options import PathLike
 from wirebayes.workflows.results import Result
 
 
-def write_report(folder: PathLike | Result) -> Path:
+def write_report(folder: PathLike | Result[Any]) -> Path:
     """Write one self-contained page from a folder of results.
 
     Parameters

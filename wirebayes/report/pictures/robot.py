@@ -1,6 +1,6 @@
 """Pictures of a robot's pose: in 3-D with its drift exaggerated, errors against time, error budget."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -190,7 +190,7 @@ def round_factor(value: float) -> float:
     return float(max(1.0, decade * max(f for f in (1, 2, 5) if f * decade <= max(value, 1.0))))
 
 
-def in_time(drifts: Sequence[dict[str, Any]], key: str, label: str, title: str) -> Figure:
+def in_time(drifts: Sequence[Mapping[str, Any]], key: str, label: str, title: str) -> Figure:
     """One quantity against time with 90 % bands, one colour a specimen spread.
 
     Parameters
@@ -217,7 +217,7 @@ def in_time(drifts: Sequence[dict[str, Any]], key: str, label: str, title: str) 
     return figure
 
 
-def error_in_time(errors: Sequence[dict[str, Any]]) -> Figure:
+def error_in_time(errors: Sequence[Mapping[str, Any]]) -> Figure:
     """Pose error of the controllers against time, specimens alike; the tolerance dashed."""
     figure, axes = panel("time, s", "pose error, mm", "Pose error by controller")
     alike = [e for e in errors if e["specimen_spread"] == 0]
@@ -236,7 +236,7 @@ def _since(axes: Any) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _banded(axes: Any, entry: dict[str, Any], key: str, colour: str, label: str) -> None:
+def _banded(axes: Any, entry: Mapping[str, Any], key: str, colour: str, label: str) -> None:
     band = entry[key]
     if band["mean"] is None:
         return
@@ -244,7 +244,7 @@ def _banded(axes: Any, entry: dict[str, Any], key: str, colour: str, label: str)
     axes.fill_between(entry["times_s"], band["q05"], band["q95"], color=colour, alpha=0.22, lw=0)
 
 
-def error_budget(result: dict[str, Any]) -> Figure:
+def error_budget(result: Mapping[str, Any]) -> Figure:
     """Shares of the drift's variance by parameter."""
     label = f"share of the variance of the drift\nafter {result['time_s']:g} s, %"
     figure, axes = panel(label, "", "Sources of uncertainty", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))

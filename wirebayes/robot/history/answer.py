@@ -197,7 +197,7 @@ def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) ->
 
 def _bands(values: Floats) -> dict[str, Any]:
     """Bands at each time of ``(n, r, ...)`` over the draws whose platform still hangs then."""
-    each = [band(values[:, i]) for i in range(values.shape[1])]
+    each = [dict(band(values[:, i])) for i in range(values.shape[1])]
     empty = np.full(values.shape[2:], np.nan)
     return {key: np.array([empty if one[key] is None else one[key] for one in each]) for key in each[0]}
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.json_files.pose import WiresUsed
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
@@ -203,7 +204,7 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
     raise KeyError(name)
 
 
-def summary(robot: Robot, line: WireDraws) -> dict[str, Any]:
+def summary(robot: Robot, line: WireDraws) -> WiresUsed:
     """Which wires an answer is for, as ``pose.json`` says it."""
     kept = line.material()
     return {

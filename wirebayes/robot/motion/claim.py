@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.json_files.pose import ClaimNumbers
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
@@ -155,15 +156,17 @@ def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
     return replace(robot, mass_kg=mass_kg, rule=rule, pulleys=pulleys, drums=drums, **grown)
 
 
-def summary(out: WorkspaceDrift) -> dict[str, float]:
+def summary(out: WorkspaceDrift) -> ClaimNumbers:
     """The claim in numbers: quantiles over workspace and draws, and how probable it is, somewhere and everywhere."""
     inside = (out.distance_m < DISTANCE_M) & (out.tilt_rad < TILT_RAD)
-    numbers: dict[str, float] = {}
-    for name, unit, value in (("drift", "mm", 1e3 * out.distance_m), ("tilt", "deg", np.degrees(out.tilt_rad))):
-        held = value[np.isfinite(value)]
-        low, middle, high = np.quantile(held, [0.05, 0.5, 0.95]) if held.size else [np.nan] * 3
-        numbers |= {f"q05_{name}_{unit}": low, f"q50_{name}_{unit}": middle, f"q95_{name}_{unit}": high}
-    return {key: float(value) for key, value in numbers.items()} | {
+    distance, tilt = _quantiles(1e3 * out.distance_m), _quantiles(np.degrees(out.tilt_rad))
+    return {
+        "q05_drift_mm": distance[0],
+        "q50_drift_mm": distance[1],
+        "q95_drift_mm": distance[2],
+        "q05_tilt_deg": tilt[0],
+        "q50_tilt_deg": tilt[1],
+        "q95_tilt_deg": tilt[2],
         "probability": float(inside.mean()),
         "probability_everywhere": float(inside.all(0).mean()),
         "lowest_tension_N": float(out.tension_N.min()),
@@ -171,6 +174,11 @@ def summary(out: WorkspaceDrift) -> dict[str, float]:
         "feasible": out.feasible,
         "solved": out.found,
     }
+
+
+def _quantiles(values: Floats) -> list[float]:
+    held = values[np.isfinite(values)]
+    return [float(q) for q in np.quantile(held, [0.05, 0.5, 0.95])] if held.size else [np.nan] * 3
 
 
 def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.05, steps: int = 9) -> float:

@@ -1,10 +1,22 @@
 """Everything that `pose` reports about one robot, one line and one pose, as plain numbers with bands."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from wirebayes.json_files.pose import (
+    Claim,
+    ClaimHolds,
+    DriftBands,
+    Equilibria,
+    EquilibriumPose,
+    ForwardKinematics,
+    InverseKinematics,
+    MotorAngles,
+    PoseJson,
+    VarianceShares,
+)
+from wirebayes.json_files.values import Band
 from wirebayes.robot.mechanics import draws, drums, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
@@ -33,7 +45,7 @@ class Answer:
         A minute's drift over slices of the workspace.
     """
 
-    content: dict[str, Any]
+    content: PoseJson
     courses: dict[float, drift.Course]
     maps: tuple[Map, ...] = ()
 
@@ -53,11 +65,53 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     -------
     Answer
     """
-    rng = np.random.default_rng(request.seed)
-    shared = draws.for_robot(robot, line)
     x, R = request.position_m, request.rotation
     tau = inverse.tensions(robot, x[None], R[None])
-    content: dict[str, Any] = {
+    content = _requested(robot, line, x, R, feasible=bool(np.isfinite(tau).all()))
+    if not content["feasible"]:
+        content["sentence"] = "No tensions within the bounds hold the platform at this pose."
+        if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
+            content["sentence"] = "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
+        return Answer(content, {})
+    shared = draws.for_robot(robot, line)
+    commands = inverse.commands(robot, shared, x[None], R[None], tau)
+    content["feasible_draws"] = float(commands.feasible.mean())
+    if not commands.feasible.any():
+        content["feasible"] = False
+        content["sentence"] = "These wires cannot pull as hard as the pose requires, however far stretched."
+        return Answer(content, {})
+    rng = np.random.default_rng(request.seed)
+    content["inverse"] = _inverse(robot, commands, tau[0])
+    content["forward"] = _round_trip(robot, shared, commands, x, R)
+    content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
+    proved = proofs.alone(robot, shared, x, R)
+    courses = {}
+    for spread in request.spreads:
+        wires = draws.for_robot(robot, line, spread, rng)
+        courses[spread] = drift.from_command(robot, wires, x, R, request.times_s)
+    content["certificate"] = {**proved, **proofs.enclosed(robot, shared, courses[0.0], x, R)}
+    content["drift"] = [{"specimen_spread": s, **_drift(c, x, R)} for s, c in courses.items()]
+    content["stability"] = [{"specimen_spread": s, **stability.summary(c)} for s, c in courses.items()]
+    content["claim"] = _claim(courses, x, R, request)
+    content["pose_error"] = controllers.errors(robot, line, request, rng, other)
+    content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
+    content["variance_shares"] = _shares(line, courses, x, R)
+    falls = [
+        said
+        for spread, course in courses.items()
+        for said in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
+    ]
+    content["warnings"] = [*_weak(commands), *falls, *_untested(robot, line, request, commands, tau)]
+    spaces = map_slices(robot, line, request.slices)
+    held = [one for one in spaces if len(one.drift.position_m)]
+    # the first orientation as a whole, then every slice of each
+    content["workspace"] = {**claim.summary(held[0].drift), "slices": summaries(spaces)} if held else None
+    return Answer(content, courses, spaces)
+
+
+def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible: bool) -> PoseJson:
+    """What was asked of which robot and wires."""
+    return {
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
@@ -66,56 +120,32 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         "tension_distribution": {
             "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
         },
-        "feasible": bool(np.isfinite(tau).all()),
+        "feasible": feasible,
     }  # fmt: skip
-    if not content["feasible"]:
-        said = "No tensions within the bounds hold the platform at this pose."
-        if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
-            said = "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
-        return Answer(content | {"sentence": said}, {})
-    commands = inverse.commands(robot, shared, x[None], R[None], tau)
-    content["feasible_draws"] = float(commands.feasible.mean())
-    if not commands.feasible.any():
-        content["feasible"] = False
-        said = "These wires cannot pull as hard as the pose requires, however far stretched."
-        return Answer(content | {"sentence": said}, {})
-    content["inverse"] = {
-        "tension_N": tau[0],
+
+
+def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> InverseKinematics:
+    found: InverseKinematics = {
+        "tension_N": tension_N,
         "zero_tension_length_m": band(commands.zero_m),
         "joint_value_m": band(commands.joint_m),
     }
-    if robot.drums is not None:
-        content["inverse"] |= _motors(robot.drums, commands.joint_m)
-    content["forward"] = _round_trip(robot, shared, commands, x, R)
-    content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
-    stable = content["equilibria"]["commanded_stable"]
-    content["certificate"] = proofs.alone(robot, shared, x, R)
-    courses = {}
-    content["drift"], losses = [], []
-    for spread in request.spreads:
-        wires = draws.for_robot(robot, line, spread, rng)
-        courses[spread] = drift.from_command(robot, wires, x, R, request.times_s)
-        content["drift"].append({"specimen_spread": spread} | _drift(courses[spread], x, R))
-        losses += stability.warnings(courses[spread], spread, stable)
-    content["stability"] = [{"specimen_spread": s} | stability.summary(c) for s, c in courses.items()]
-    content["certificate"] |= proofs.enclosed(robot, shared, courses[0.0], x, R)
-    content["claim"] = _claim(courses, x, R, request)
-    content["pose_error"] = controllers.errors(robot, line, request, rng, other)
-    content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
-    content["variance_shares"] = _shares(line, courses, x, R)
-    if content["feasible_draws"] < 1:
-        weak = 100 * (1 - content["feasible_draws"])
-        losses.insert(0, f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched")
-    content["warnings"] = losses + draws.warnings(robot, line, tau, float(request.times_s[-1]), commands.zero_m)
-    content["warnings"] += sag.warnings(robot, x, R, tau[0])
-    if robot.drums is not None:
-        content["warnings"] += _emptied(robot.drums, commands.joint_m[commands.feasible])
-    spaces = map_slices(robot, line, request.slices)
-    content["workspace"] = None
-    held = [one for one in spaces if len(one.drift.position_m)]
-    if held:  # the first orientation as a whole, then every slice of each
-        content["workspace"] = claim.summary(held[0].drift) | {"slices": summaries(spaces)}
-    return Answer(content, courses, spaces)
+    return found if robot.drums is None else {**found, **_motors(robot.drums, commands.joint_m)}
+
+
+def _weak(commands: inverse.Commands) -> list[str]:
+    weak = 100 * (1 - float(commands.feasible.mean()))
+    said = f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched"
+    return [said] if weak > 0 else []
+
+
+def _untested(
+    robot: Robot, line: WireDraws, request: PoseRequest, commands: inverse.Commands, tension_N: Floats
+) -> list[str]:
+    """A sentence for each way in which the pose leaves what was tested or what the model knows."""
+    said = draws.warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
+    said += sag.warnings(robot, request.position_m, request.rotation, tension_N[0])
+    return said if robot.drums is None else said + _emptied(robot.drums, commands.joint_m[commands.feasible])
 
 
 def _emptied(known: Drums, joint_m: Floats) -> list[str]:
@@ -126,19 +156,21 @@ def _emptied(known: Drums, joint_m: Floats) -> list[str]:
     ]
 
 
-def _motors(known: Drums, joint_m: Floats) -> dict[str, Any]:
+def _motors(known: Drums, joint_m: Floats) -> MotorAngles:
     """Motor angles and the wire that a radian pays out there; null for legs without a drum of known radius."""
     angle = drums.motor_angle(known, joint_m)
     return {"motor_angle_rad": _by_leg(angle), "wire_per_motor_angle_m_rad": _by_leg(drums.paid_out(known, angle)[1])}
 
 
-def _by_leg(values: Floats) -> dict[str, Any]:
+def _by_leg(values: Floats) -> Band:
     """Bands of legs one by one: what one leg does not have is no gap in the others."""
     bands = [band(values[:, [i]]) for i in range(values.shape[1])]
-    return {key: [None if b[key] is None else b[key][0] for b in bands] for key in bands[0]}
+    columns = zip(*(b.values() for b in bands), strict=True)
+    mean, sd, low, middle, high = ([None if v is None else v[0] for v in column] for column in columns)
+    return {"mean": mean, "sd": sd, "q05": low, "q50": middle, "q95": high}
 
 
-def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> dict[str, Any]:
+def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> ForwardKinematics:
     """Forward kinematics of the commands, from a start beside the pose, must return to it."""
     back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, x + 0.01 * robot.size_m, R)
     n = len(commands.zero_m)
@@ -153,7 +185,7 @@ def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Float
     }
 
 
-def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.random.Generator) -> dict[str, Any]:
+def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.random.Generator) -> Equilibria:
     """The commanded pose, and every stable pose that the same lengths of the mean wire allow, from many starts."""
     mean = control.known(wires)
     tau = inverse.tensions(robot, x[None], R[None])
@@ -168,7 +200,7 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     own = np.maximum(
         np.abs(found.position_m - x).max(1), robot.size_m * np.abs(found.rotation - R).max((1, 2))
     ) < near_m  # fmt: skip
-    poses = [
+    poses: list[EquilibriumPose] = [
         {"position_m": p, "rotation_vector_rad": v, "slack_wires": int((t <= 0).sum()), "commanded": bool(c),
          "stable": True}
         for p, v, t, c in zip(found.position_m, turning.vector(found.rotation), found.tension_N, own, strict=True)
@@ -184,7 +216,7 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     }
 
 
-def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
+def _drift(course: drift.Course, x: Floats, R: Floats) -> DriftBands:
     shift, angle = drift.moved(course, x, R)
     shift = np.where(course.found[:, None, None], shift, np.nan)
     return {
@@ -199,10 +231,9 @@ def _drift(course: drift.Course, x: Floats, R: Floats) -> dict[str, Any]:
     }
 
 
-def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, request: PoseRequest) -> dict[str, Any]:
+def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, request: PoseRequest) -> Claim:
     """Probability, at this pose, of the paper's figures."""
-    out: dict[str, Any] = {"time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD))}
-    probability = []
+    probability: list[ClaimHolds] = []
     for spread, course in courses.items():
         k = np.flatnonzero(course.times_s == TIME_S)
         value = None
@@ -210,10 +241,12 @@ def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, request: Po
             distance = np.linalg.norm(course.position_m[:, k[0]] - x, axis=-1)
             value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]], R) < TILT_RAD)).mean())
         probability.append({"specimen_spread": spread, "probability": value})
-    return out | {"holds": probability}
+    return {
+        "time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD)), "holds": probability
+    }  # fmt: skip
 
 
-def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: Floats) -> dict[str, Any]:
+def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     held = np.isfinite(size[0.0])
@@ -223,9 +256,10 @@ def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: F
         names += [name for name in (draws.LENGTH_EXPONENT,) if name in one.parameters]
         own = f"{wire} " if line.others else ""
         kept |= {f"{own}{name}": one.parameters[name][held] for name in names}
-    result: dict[str, Any] = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
+    result: VarianceShares = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if held.sum() < 30:
-        return result | {"sentence": "Fewer than 30 draws that hold the platform: no shares are computed."}
+        result["sentence"] = "Fewer than 30 draws that hold the platform: no shares are computed."
+        return result
     result["shared_draw"] = variance_shares.shares(kept, size[0.0][held])
     sd = {s: float(v[np.isfinite(v)].std()) if np.isfinite(v).any() else None for s, v in size.items()}
     result["sd_mm"] = [{"specimen_spread": s, "sd_mm": None if v is None else 1e3 * v} for s, v in sd.items()]

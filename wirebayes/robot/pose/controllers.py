@@ -1,9 +1,8 @@
 """Pose error under controllers with different models of the wires, and how long a calibration lasts."""
 
-from typing import Any
-
 import numpy as np
 
+from wirebayes.json_files.pose import BetweenCalibrations, ControllerError, TimeWithin, Tolerances
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -19,7 +18,7 @@ _DRAWS = 300  # each drifts through all of these times; a 95 % probability is th
 
 def errors(
     robot: Robot, line: WireDraws, request: PoseRequest, rng: np.random.Generator, other: WireDraws | None = None
-) -> list[dict[str, Any]]:
+) -> list[ControllerError]:
     """Pose error under controllers that know the posterior, and how long each stays within tolerance.
 
     Parameters
@@ -40,7 +39,7 @@ def errors(
     if other is not None:
         less = draws.for_robot(robot, other)
         schedules["creep_aware_other_fit"] = control.creep_aware(robot, less, request.position_m, request.rotation)
-    out = []
+    out: list[ControllerError] = []
     for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for name, schedule in schedules.items():
@@ -60,7 +59,7 @@ def errors(
 
 def between_calibrations(
     robot: Robot, line: WireDraws, request: PoseRequest, rng: np.random.Generator
-) -> list[dict[str, Any]]:
+) -> list[BetweenCalibrations]:
     """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
 
     The pose is exact when the calibration ends; before it the wires carried the same tensions for a time.
@@ -82,7 +81,7 @@ def between_calibrations(
     x, R = request.position_m, request.rotation
     line = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
     load = np.repeat(inverse.tensions(robot, x[None], R[None]).T, line.count, 1)
-    out: list[dict[str, Any]] = []
+    out: list[BetweenCalibrations] = []
     for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for loaded_s in HISTORIES_S:
@@ -94,17 +93,22 @@ def between_calibrations(
                 control.after_calibration(robot, wires, state, x, R, _SINCE_S),
                 strict=True,
             ):
-                row: dict[str, Any] = {"specimen_spread": spread, "loaded_before_s": loaded_s, "controller": name}
-                row["solved"] = float(error.found.mean())
-                out.append(row | _tolerances(request) | _lasts(error, request))
+                out.append({
+                    "specimen_spread": spread,
+                    "loaded_before_s": loaded_s,
+                    "controller": name,
+                    "solved": float(error.found.mean()),
+                    **_tolerances(request),
+                    **_lasts(error, request),
+                })  # fmt: skip
     return out
 
 
-def _tolerances(request: PoseRequest) -> dict[str, float]:
+def _tolerances(request: PoseRequest) -> Tolerances:
     return {"tolerance_mm": 1e3 * request.tolerance_m, "tolerance_deg": float(np.degrees(request.tolerance_rad))}
 
 
-def _lasts(error: control.PoseError, request: PoseRequest) -> dict[str, Any]:
+def _lasts(error: control.PoseError, request: PoseRequest) -> TimeWithin:
     within = control.longest_interval(error, request.tolerance_m, request.tolerance_rad)
     at_end = not np.isfinite(within)
     return {

@@ -1,10 +1,10 @@
 """Maps of a minute's drift over slices of the workspace: which slices, their numbers, and a row for every point."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from wirebayes.json_files.pose import SliceOfWorkspace
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -46,20 +46,20 @@ class Map:
     Attributes
     ----------
     rotation_rad : (3,) array
-    asked_m : (p, 3) array
+    requested_m : (p, 3) array
         All positions of the grid.
     drift : WorkspaceDrift
         At those that tensions hold.
     """
 
     rotation_rad: Floats
-    asked_m: Floats
+    requested_m: Floats
     drift: WorkspaceDrift
 
     @property
     def slice_axis(self) -> int:
         """The axis through the slices: of a flat workspace the one across it, else the vertical."""
-        flat = np.flatnonzero(np.ptp(self.asked_m, axis=0) == 0)
+        flat = np.flatnonzero(np.ptp(self.requested_m, axis=0) == 0)
         return 2 if not flat.size or 2 in flat else int(flat[0])
 
 
@@ -88,19 +88,18 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
     )
 
 
-def summaries(found: tuple[Map, ...]) -> list[dict[str, Any]]:
+def summaries(found: tuple[Map, ...]) -> list[SliceOfWorkspace]:
     """Every slice in numbers: where it lies, and `claim.summary` of its points."""
-    out = []
+    out: list[SliceOfWorkspace] = []
     for one in found:
         through = one.slice_axis
-        for level in np.unique(one.asked_m[:, through]):
+        for level in np.unique(one.requested_m[:, through]):
             here = one.drift.position_m[:, through] == level
-            entry: dict[str, Any] = {
-                "rotation_vector_rad": one.rotation_rad, "axis": "xyz"[through], "at_m": float(level)
+            share = float(here.sum() / (one.requested_m[:, through] == level).sum())
+            where: SliceOfWorkspace = {
+                "rotation_vector_rad": one.rotation_rad, "axis": "xyz"[through], "at_m": float(level), "feasible": 0.0
             }  # fmt: skip
-            share = float(here.sum() / (one.asked_m[:, through] == level).sum())
-            numbers = claim.summary(one.drift.part(here, share)) if here.any() else {"feasible": 0.0}
-            out.append(entry | numbers)
+            out.append({**where, **claim.summary(one.drift.part(here, share))} if here.any() else where)
     return out
 
 
@@ -110,7 +109,7 @@ def rows(found: tuple[Map, ...]) -> list[tuple[float, ...]]:
     for one in found:
         where = {tuple(x): i for i, x in enumerate(one.drift.position_m)}
         inside = one.drift.holds()
-        for x in one.asked_m:
+        for x in one.requested_m:
             i = where.get(tuple(x))
             values = [0.0] + [np.nan] * 9
             if i is not None:

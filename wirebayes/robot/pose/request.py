@@ -1,10 +1,10 @@
 """What is requested of a robot and a line, and how draws become a band."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from wirebayes.json_files.values import Band
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
 from wirebayes.robot.pose.maps import LEVEL, Slices
 from wirebayes.typing import Floats
@@ -46,11 +46,10 @@ class PoseRequest:
         return 0.0, self.specimen_spread
 
 
-def band(values: Floats) -> dict[str, Any]:
+def band(values: Floats) -> Band:
     """Mean, sd and quantiles over the first axis (the draws); NaN draws are left out."""
     good = values[np.isfinite(values).all(axis=tuple(range(1, values.ndim)))]
     if not len(good):
-        return dict.fromkeys(("mean", "sd", *QUANTILES), None)
-    quantiles = np.quantile(good, list(QUANTILES.values()), axis=0)
-    named = dict(zip(QUANTILES, quantiles, strict=True))
-    return {"mean": good.mean(0), "sd": good.std(0)} | named
+        return {"mean": None, "sd": None, "q05": None, "q50": None, "q95": None}
+    low, middle, high = np.quantile(good, list(QUANTILES.values()), axis=0)
+    return {"mean": good.mean(0), "sd": good.std(0), "q05": low, "q50": middle, "q95": high}

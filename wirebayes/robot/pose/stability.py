@@ -1,10 +1,9 @@
 """Reports of falls: how probable, when, by which wire, and how close a platform that holds comes to one."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.json_files.pose import FallsReport, Times
 from wirebayes.robot.motion.drift import Course, Falls
 from wirebayes.robot.pose.request import band
 from wirebayes.typing import Floats
@@ -12,7 +11,7 @@ from wirebayes.typing import Floats
 NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these
 
 
-def summary(course: Course) -> dict[str, Any]:
+def summary(course: Course) -> FallsReport:
     """Falls, slack wires and margins over the draws whose hold began in a stable pose.
 
     Probabilities are shares of the draws that began; wires are numbered from 1 in the order of the robot's legs.
@@ -41,7 +40,7 @@ def summary(course: Course) -> dict[str, Any]:
     }
 
 
-def _spread(values: Floats) -> dict[str, float] | None:
+def _spread(values: Floats) -> Times | None:
     if not len(values):
         return None
     return {"first": float(values.min()), "median": float(np.median(values)), "last": float(values.max())}
@@ -76,8 +75,8 @@ def warnings(course: Course, spread: float, stable: bool = True) -> list[str]:
         out.append(f"{_percent(1 - found['began'])} of the draws cannot begin at the pose ({who}): {reason}")
     if not found["began"]:
         return out
-    if found["fall_probability"]:
-        times, drop = found["fall_time_s"], found["fall_distance_mm"]
+    times, drop = found["fall_time_s"], found["fall_distance_mm"]
+    if times is not None:
         wire = int(np.argmax(found["fall_wires"])) + 1
         fall = f"; it drops {drop['median']:.3g} mm" if drop else "; nothing catches it nearby"
         out.append(

@@ -1,9 +1,8 @@
 """What interval arithmetic proves about a robot at a pose: a single equilibrium, and a box of it for all wires."""
 
-from typing import Any
-
 import numpy as np
 
+from wirebayes.json_files.pose import Certificate, EnclosedBand
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, forward, inverse
@@ -18,7 +17,7 @@ _STEP = 0.1  # how far, of the whole creep, wires may be out of step
 SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of the bands, the largest that can be proved
 
 
-def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> dict[str, Any]:
+def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> Certificate:
     """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed.
 
     Parameters
@@ -50,7 +49,7 @@ def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> d
     return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}
 
 
-def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rotation: Floats) -> dict[str, Any]:
+def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rotation: Floats) -> EnclosedBand:
     """Where the platform surely is at the last time while every wire's stiffness and creep lie in their 90 % bands.
 
     Each wire may lie anywhere in the bands on its own: a box that holds more than the joint posterior does. Commanded
@@ -78,7 +77,7 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
     if wires.at("strain"):
         return {}
     end_s = course.times_s[-1]
-    nothing = {"band": {"time_s": end_s, "share": 0.0, "low_mm": None, "high_mm": None}}
+    nothing: EnclosedBand = {"band": {"time_s": end_s, "share": 0.0, "low_mm": None, "high_mm": None}}
     if not course.found.any() or (course.falls is not None and course.falls.fell.any()):
         return nothing
     mean = control.known(wires)

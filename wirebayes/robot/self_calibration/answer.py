@@ -1,11 +1,11 @@
 """Everything that `calibrate` reports: lengths with intervals, Hooke alone, what cannot be observed, what next."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.stats import norm
 
+from wirebayes.json_files.calibrate import CalibratedPoses, CalibrateJson, CalibrationPrior, EstimatedLengths, Observed
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import control, inverse
@@ -17,7 +17,7 @@ from wirebayes.typing import Floats
 CANDIDATES, NEXT = 200, 5
 
 
-def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0) -> dict[str, Any]:
+def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0) -> CalibrateJson:
     """Calibrate one robot and say how far the answer can be trusted.
 
     Parameters
@@ -36,36 +36,42 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
     """
     known = calibrate(robot, prior, session, readings[None])
     plain = calibrate(robot, replace(prior, creeps=False), session, readings[None])
-    content: dict[str, Any] = {
+    given: CalibrationPrior = {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread}
+    if prior.bias_sd_N > 0:
+        given["tension_bias_sd_N"] = prior.bias_sd_N
+        given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
+    return {
         "version": 1,
         "robot": robot.name,
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
-        "prior": {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread},
+        "prior": given,
         "with_creep_model": _lengths(robot, prior, known),
         "by_hooke_alone": _lengths(robot, prior, plain),
+        **_poses(robot, prior, known),
+        **_observed(robot, prior, session, np.random.default_rng(seed)),
     }
-    if prior.bias_sd_N > 0:
-        content["prior"] |= {
-            "tension_bias_sd_N": prior.bias_sd_N,
-            "tension_bias_sign": "constant" if session.motion is None else "motion",
-        }
-    content["pose_now"] = content["joint_values_for_home_m"] = None
-    if known.converged[0]:  # else nobody should send the robot anywhere by it
-        turn = rotation.vector(known.rotation)[0]
-        content["pose_now"] = {"position_m": known.position_m[0], "rotation_vector_rad": turn}
-        home = rotation.matrix(robot.home_rotation_rad)
-        joint = corrected(robot, prior, known, robot.home_m, home)[0]
-        content["joint_values_for_home_m"] = joint
-        if robot.drums is not None:
-            content["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
-    return content | _observed(robot, prior, session, np.random.default_rng(seed))
 
 
-def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
+def _poses(robot: Robot, prior: Prior, known: Calibration) -> CalibratedPoses:
+    """Where the robot is, and the joint values of its home; none where the search did not converge."""
+    if not known.converged[0]:  # nobody should send the robot anywhere by it
+        return {"pose_now": None, "joint_values_for_home_m": None}
+    turn = rotation.vector(known.rotation)[0]
+    joint = corrected(robot, prior, known, robot.home_m, rotation.matrix(robot.home_rotation_rad))[0]
+    found: CalibratedPoses = {
+        "pose_now": {"position_m": known.position_m[0], "rotation_vector_rad": turn},
+        "joint_values_for_home_m": joint,
+    }
+    if robot.drums is not None:
+        found["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
+    return found
+
+
+def _lengths(robot: Robot, prior: Prior, known: Calibration) -> EstimatedLengths:
     half = float(norm.ppf(0.95)) * known.length_sd_m[0]
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
-    found = {
+    found: EstimatedLengths = {
         "converged": bool(known.converged[0]),
         "misfit": float(known.misfit[0]),
         "length_m": {
@@ -83,7 +89,7 @@ def _lengths(robot: Robot, prior: Prior, known: Calibration) -> dict[str, Any]:
     return found
 
 
-def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator) -> dict[str, Any]:
+def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator) -> Observed:
     """Rank and sentence for the poses that were read; poses worth reading next."""
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
     wires = control.known(wires)

@@ -1,0 +1,57 @@
+"""``batch.json``: a row for each of many experiments; ``row.json`` in an experiment's folder is its row."""
+
+from typing import TypedDict
+
+from wirebayes.json_files.discovery import Verdict
+from wirebayes.json_files.values import Statistics
+
+
+class FitColumns(TypedDict):
+    """What a fit adds to a row."""
+
+    converged: bool | None
+    parameters: dict[str, Statistics]
+    warnings: list[str]
+    p_global: float | None
+    check: str | None
+
+
+class DiscoveryColumns(FitColumns):
+    """What a search for missing effects adds to a row."""
+
+    verdict: Verdict | None
+    effects: list[str]
+    best_effect: str | None
+
+
+class Row(DiscoveryColumns):
+    """One experiment; None where nothing was fitted or looked for."""
+
+    name: str
+    material: str | None
+    file: str
+    length_mm: float | None
+    holds: int | None
+    readings: int | None
+    error: str | None
+
+
+class OutlierRow(TypedDict):
+    """A parameter of a specimen far from those of the others; `results.outliers.Outlier` says what each value is."""
+
+    experiment: str
+    material: str
+    parameter: str
+    value: float
+    median: float
+    z: float
+    specimens: int
+    sentence: str
+
+
+class BatchJson(TypedDict):
+    """The whole file."""
+
+    version: int
+    experiments: list[Row]
+    outliers: list[OutlierRow]

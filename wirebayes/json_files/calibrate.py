@@ -1,0 +1,75 @@
+"""``calibrate.json``: the zero-tension lengths of a robot's wires."""
+
+from typing import NotRequired, TypedDict
+
+from wirebayes.json_files.values import MeanAndSd, Numbers
+
+
+class CalibrationPrior(TypedDict):
+    """What was known before; `tension_bias_sign` is constant, or that of the wire's last motion."""
+
+    reference_sd_mm: float
+    specimen_spread: float
+    tension_bias_sd_N: NotRequired[float]
+    tension_bias_sign: NotRequired[str]
+
+
+class LengthInterval(MeanAndSd):
+    """With the 90 % interval."""
+
+    q05: Numbers
+    q95: Numbers
+
+
+class EstimatedLengths(TypedDict):
+    """What one model of the wires makes of the readings, a value a wire."""
+
+    converged: bool
+    misfit: float
+    length_m: LengthInterval
+    creep_strain: Numbers
+    reference_error_mm: MeanAndSd
+    tension_bias_N: NotRequired[MeanAndSd]
+
+
+class PoseNow(TypedDict):
+    """Where the platform is."""
+
+    position_m: Numbers
+    rotation_vector_rad: Numbers
+
+
+class Observability(TypedDict):
+    """How many combinations of lengths the poses determine, and which one worst."""
+
+    rank: int
+    of: int
+    weakest_combination: Numbers
+    sentence: str
+
+
+class Observed(TypedDict):
+    """What the poses can determine, and which to read next."""
+
+    observability: Observability
+    next_positions_m: Numbers
+
+
+class CalibratedPoses(TypedDict):
+    """None where the search did not converge."""
+
+    pose_now: PoseNow | None
+    joint_values_for_home_m: Numbers | None
+    motor_angles_for_home_rad: NotRequired[Numbers]
+
+
+class CalibrateJson(CalibratedPoses, Observed):
+    """The whole file."""
+
+    version: int
+    robot: str
+    holds: int
+    read: int
+    prior: CalibrationPrior
+    with_creep_model: EstimatedLengths
+    by_hooke_alone: EstimatedLengths

@@ -1,0 +1,63 @@
+"""``check.json``: what was understood of an experiment, and what such a test can determine."""
+
+from typing import TypedDict
+
+from wirebayes.json_files.values import Quantiles
+
+
+class HoldUnderstood(TypedDict):
+    """A hold; an unrecorded one has no first reading."""
+
+    number: int | None
+    displacement_mm: float
+    start_s: float
+    duration_s: float
+    readings: int
+    first_s: float | None
+    first_N: float | None
+    last_N: float | None
+
+
+class Understood(TypedDict):
+    """What the files say."""
+
+    material: str
+    length_mm: float
+    resolution_N: float | None
+    holds: list[HoldUnderstood]
+    recorded_holds: int
+    unrecorded_holds: int
+    readings: int
+    duration_s: float
+    temperature_C: list[float] | None
+
+
+class ParameterRange(Quantiles):
+    """A parameter by a rough fit, its prior's range, and which of both determines it."""
+
+    prior_q05: float
+    prior_q95: float
+    determined_by: str
+
+
+class EffectSize(TypedDict):
+    """Whether the test shows an effect (yes, if unusually large, no) and the smallest it would detect, 80 % power."""
+
+    shows: str
+    amplitude_80: float | None
+    unit: str
+    reason: str | None
+
+
+class CheckedExperiment(Understood):
+    """All that is said of one experiment."""
+
+    warnings: list[str]
+    parameters: dict[str, ParameterRange]
+    effects: dict[str, EffectSize]
+
+
+class CheckJson(TypedDict):
+    """The whole file."""
+
+    experiments: dict[str, CheckedExperiment]

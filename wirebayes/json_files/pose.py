@@ -1,0 +1,328 @@
+"""``pose.json``: a robot's pose on creeping wires, or poses over time."""
+
+from typing import NotRequired, TypedDict
+
+from wirebayes.json_files.calibrate import PoseNow
+from wirebayes.json_files.values import Band, Numbers
+
+
+class WiresUsed(TypedDict):
+    """Which posterior the answer is for; `legs` has the line of each wire."""
+
+    draws: int
+    tested_length_mm: float
+    elastic_law: str
+    history: str
+    effects: list[str]
+    left_out: list[str]
+    legs: list[str]
+    lines: list[str]
+
+
+class TensionDistribution(TypedDict):
+    """How the tensions are chosen."""
+
+    choice: str
+    lowest_N: float
+    highest_N: float
+
+
+class MotorAngles(TypedDict):
+    """None for legs without a drum of known radius."""
+
+    motor_angle_rad: Band
+    wire_per_motor_angle_m_rad: Band
+
+
+class InverseKinematics(TypedDict):
+    """What the pose asks of the wires."""
+
+    tension_N: Numbers
+    zero_tension_length_m: Band
+    joint_value_m: Band
+    motor_angle_rad: NotRequired[Band]
+    wire_per_motor_angle_m_rad: NotRequired[Band]
+
+
+class ForwardKinematics(TypedDict):
+    """The pose found again from those lengths."""
+
+    solved: float
+    statuses: dict[str, int]
+    largest_round_trip_error_m: float
+    slack_wires: int
+    lowest_stiffness_N_m: Band
+
+
+class EquilibriumPose(PoseNow):
+    """A pose that the same lengths allow."""
+
+    slack_wires: int
+    commanded: bool
+    stable: bool
+
+
+class Equilibria(TypedDict):
+    """All that were found from many starts."""
+
+    stable_found: int
+    starts: int
+    commanded_stable: bool
+    poses: list[EquilibriumPose]
+
+
+class ProvedBand(TypedDict):
+    """A box that holds the platform while the wires lie in a share of their bands, from the commanded position."""
+
+    time_s: float
+    share: float
+    low_mm: Numbers | None
+    high_mm: Numbers | None
+
+
+class EnclosedBand(TypedDict, total=False):
+    """Empty where no proof can be tried."""
+
+    band: ProvedBand
+
+
+class Certificate(EnclosedBand):
+    """What interval arithmetic proves; `proved` is None where nothing was tried, for the reason in `sentence`."""
+
+    proved: bool | None
+    sentence: NotRequired[str]
+    enclosure_m: NotRequired[Numbers]
+    alone_within_m: NotRequired[float]
+
+
+class DriftBands(TypedDict):
+    """From the commanded pose, a value a time."""
+
+    times_s: Numbers
+    solved: float
+    displacement_mm: Band
+    distance_mm: Band
+    tilt_deg: Band
+    from_vertical_deg: Band
+    rotation_deg: Band
+    tension_N: Band
+
+
+class Drift(DriftBands):
+    """Drift of wires that differ from specimen to specimen by so much."""
+
+    specimen_spread: float
+
+
+class Times(TypedDict):
+    """Of what some draws go through."""
+
+    first: float
+    median: float
+    last: float
+
+
+class FallsReport(TypedDict):
+    """Falls, slack wires and margins over the draws that began; `pose.stability` says what each value is."""
+
+    began: float
+    fall_probability: NotRequired[float]
+    fall_probability_at: NotRequired[Numbers]
+    fall_time_s: NotRequired[Times | None]
+    fall_wires: NotRequired[Numbers]
+    fall_distance_mm: NotRequired[Times | None]
+    caught_probability: NotRequired[float | None]
+    slack_probability: NotRequired[Numbers]
+    slack_time_s: NotRequired[list[Times | None]]
+    least_tension_wire: NotRequired[int]
+    least_tension_share: NotRequired[Band]
+    stiffness_share: NotRequired[Band]
+
+
+class Stability(FallsReport):
+    """For one spread of specimens."""
+
+    specimen_spread: float
+
+
+class ClaimHolds(TypedDict):
+    """Probability that the paper's figures are kept; None where its time was not asked for."""
+
+    specimen_spread: float
+    probability: float | None
+
+
+class Claim(TypedDict):
+    """The paper's figures, and whether they are kept here."""
+
+    time_s: float
+    distance_mm: float
+    tilt_deg: float
+    holds: list[ClaimHolds]
+
+
+class Tolerances(TypedDict):
+    """Of the pose."""
+
+    tolerance_mm: float
+    tolerance_deg: float
+
+
+class TimeWithin(TypedDict):
+    """How long the pose stays within tolerance with a probability of 95 %."""
+
+    longest_time_within_s: float
+    still_within_at_the_end: bool
+
+
+class ControllerError(Tolerances, TimeWithin):
+    """Pose error under one controller."""
+
+    specimen_spread: float
+    controller: str
+    times_s: Numbers
+    solved: float
+    distance_mm: Band
+    rotation_deg: Band
+
+
+class BetweenCalibrations(Tolerances, TimeWithin):
+    """How long a calibration lasts after a load history."""
+
+    specimen_spread: float
+    loaded_before_s: float
+    controller: str
+    solved: float
+
+
+class SpreadOfDrift(TypedDict):
+    """Standard deviation of the drift's size."""
+
+    specimen_spread: float
+    sd_mm: float | None
+
+
+class VarianceShares(TypedDict):
+    """Each parameter's share of the variance of the drift's size at the last time."""
+
+    time_s: float
+    output: str
+    sentence: NotRequired[str]
+    shared_draw: NotRequired[dict[str, float]]
+    sd_mm: NotRequired[list[SpreadOfDrift]]
+
+
+class ClaimNumbers(TypedDict):
+    """The drift of a minute over part of a workspace, and how probable it is that the paper's figures are kept."""
+
+    q05_drift_mm: float
+    q50_drift_mm: float
+    q95_drift_mm: float
+    q05_tilt_deg: float
+    q50_tilt_deg: float
+    q95_tilt_deg: float
+    probability: float
+    probability_everywhere: float
+    lowest_tension_N: float
+    highest_tension_N: float
+    feasible: float
+    solved: float
+
+
+class SliceOfWorkspace(TypedDict):
+    """A slice across `axis` at one place; without numbers where no tensions hold the platform anywhere in it."""
+
+    rotation_vector_rad: Numbers
+    axis: str
+    at_m: float
+    feasible: float
+    q05_drift_mm: NotRequired[float]
+    q50_drift_mm: NotRequired[float]
+    q95_drift_mm: NotRequired[float]
+    q05_tilt_deg: NotRequired[float]
+    q50_tilt_deg: NotRequired[float]
+    q95_tilt_deg: NotRequired[float]
+    probability: NotRequired[float]
+    probability_everywhere: NotRequired[float]
+    lowest_tension_N: NotRequired[float]
+    highest_tension_N: NotRequired[float]
+    solved: NotRequired[float]
+
+
+class Workspace(ClaimNumbers):
+    """The first orientation as a whole, then every slice of each."""
+
+    slices: list[SliceOfWorkspace]
+
+
+class HistoryOfRobot(TypedDict):
+    """What the robot went through; `target` is what drift is counted from."""
+
+    kind: str
+    rows: int
+    duration_s: float
+    highest_payload_kg: float
+    restart_share: float | None
+    specimen_spread: float
+    reference_sd_mm: NotRequired[float]
+    target: NotRequired[str]
+    holds: NotRequired[int]
+
+
+class HistoryReadings(TypedDict):
+    """Tensions and tilts that were read on the way, and how well they agree with joint values and wires."""
+
+    tensions: int
+    tilts: int
+    tension_sd_N: float
+    tilt_sd_rad: float
+    misfit: NotRequired[float | None]
+    converged: NotRequired[bool]
+
+
+class Corrections(TypedDict):
+    """Changes of the joint values that bring the platform back, and what they leave."""
+
+    times_s: Numbers
+    change_mm: Band
+    left_mm: Band
+
+
+class Clock(TypedDict):
+    """How far poses move if the wires' clocks run on instead of starting anew."""
+
+    largest_mm: float
+    at_the_end_mm: float
+
+
+class PoseJson(TypedDict):
+    """The whole file; where nothing holds the platform, `sentence` says so and ends it."""
+
+    version: int
+    robot: str
+    mass_kg: float
+    pose: NotRequired[PoseNow]
+    wires: WiresUsed
+    tension_distribution: NotRequired[TensionDistribution]
+    feasible: bool
+    sentence: NotRequired[str]
+    feasible_draws: NotRequired[float]
+    inverse: NotRequired[InverseKinematics]
+    forward: NotRequired[ForwardKinematics]
+    equilibria: NotRequired[Equilibria]
+    certificate: NotRequired[Certificate]
+    drift: NotRequired[list[Drift]]
+    stability: NotRequired[list[Stability]]
+    claim: NotRequired[Claim]
+    pose_error: NotRequired[list[ControllerError]]
+    between_calibrations: NotRequired[list[BetweenCalibrations]]
+    variance_shares: NotRequired[VarianceShares]
+    warnings: NotRequired[list[str]]
+    workspace: NotRequired[Workspace | None]
+    # over time
+    history: NotRequired[HistoryOfRobot]
+    readings: NotRequired[HistoryReadings]
+    position_m: NotRequired[Band]
+    rotation_vector_rad: NotRequired[Band | None]
+    corrections: NotRequired[Corrections]
+    clock: NotRequired[Clock]

@@ -1,0 +1,87 @@
+"""``summary.json`` of a fit."""
+
+from typing import NotRequired, TypedDict
+
+from wirebayes.json_files.discovery import GrossError
+from wirebayes.json_files.values import Numbers, Statistics
+
+
+class Parameter(Statistics):
+    """A parameter's posterior, and how well its draws have mixed."""
+
+    ess_bulk: float
+    ess_tail: float
+    r_hat: float
+
+
+class Identifiability(TypedDict):
+    """What the data taught about one parameter; `results.identifiability.Taught` says what each value is."""
+
+    contraction: float
+    prior_range_90: float
+    posterior_range_90: float
+    range_is_factor: bool
+    prior_sensitivity: float
+    likelihood_sensitivity: float
+    ridges: dict[str, float]
+    sentence: str
+
+
+class CreepBand(TypedDict):
+    """Quantiles of the creep at each time."""
+
+    q05: Numbers
+    q50: Numbers
+    q95: Numbers
+
+
+class ExtrapolatedCreep(TypedDict):
+    """Creep of a fresh sample against time, with the prior's part in it."""
+
+    tension_N: float
+    time_s: Numbers
+    posterior_mm: CreepBand
+    weaker_prior_mm: CreepBand
+    prior_mm: CreepBand
+    prior_share: Numbers
+    pareto_k: float
+    sentence: str
+    warning: str | None
+
+
+class ModelCheckResult(TypedDict):
+    """Whether the fitted model describes its own readings; None where that was not checked."""
+
+    passed: bool | None
+    p: float | None
+    alpha: float
+    simulations: int
+    most_surprising: list[str]
+    gross_errors: list[GrossError]
+    sentence: str
+
+
+class SummaryJson(TypedDict):
+    """The whole file."""
+
+    model_check: NotRequired[ModelCheckResult]
+    experiment: str
+    likelihood: str
+    elastic_law: str
+    history: str
+    effects: list[str]
+    converged: bool
+    convergence: str
+    warnings: list[str]
+    parameters: dict[str, Parameter]
+    derived: dict[str, float | Statistics | None]
+    identifiability: dict[str, Identifiability]
+    extrapolation: ExtrapolatedCreep
+    likelihood_evaluations: int
+    kept_evaluations: int
+    autocorrelation_steps: float
+    smallest_ess: float
+    largest_nested_r_hat: float
+    acceptance: float
+    learned_move: float
+    modes_found: int

@@ -1,0 +1,44 @@
+"""Values that several files hold."""
+
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.typing import Floats
+
+# an array where it is computed, a list where it is read
+Numbers = Floats | list[float]
+Integers = NDArray[np.int64] | list[int]
+
+
+class Quantiles(TypedDict):
+    """Of draws."""
+
+    q05: float
+    q50: float
+    q95: float
+
+
+class Statistics(Quantiles):
+    """Of draws."""
+
+    mean: float
+    sd: float
+
+
+class Band(TypedDict):
+    """Mean, sd and quantiles over the draws, each a number or array like one draw; None where no draw has a value."""
+
+    mean: Any
+    sd: Any
+    q05: Any
+    q50: Any
+    q95: Any
+
+
+class MeanAndSd(TypedDict):
+    """Of each wire."""
+
+    mean: Numbers
+    sd: Numbers
