@@ -67,21 +67,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("out/batch-on-cluster"))
     parser.add_argument("--experiments", type=int, default=200)
-    asked = parser.parse_args()
-    asked.output.mkdir(parents=True, exist_ok=True)
-    made = wb.simulate_tests(tests=asked.experiments, displacements=range(1, 6), times=[0, 30, 60], seed=1)
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    made = wb.simulate_tests(tests=options.experiments, displacements=range(1, 6), times=[0, 30, 60], seed=1)
     file = made.folder / "experiments.toml"
     options = {"discover": False, "check": False, "posteriors": False, "policy": SHORT}
 
     def run(name: str, **more: object) -> float:
         begin = time.monotonic()
-        wb.batch(file, **options, output=asked.output / name, **more)  # type: ignore[arg-type]
+        wb.batch(file, **options, output=options.output / name, **more)  # type: ignore[arg-type]
         return time.monotonic() - begin
 
     with patch("wirebayes.workers.cores", lambda: 1):
         alone = run("one-process")
     print(f"one process: {alone:.0f} s", flush=True)
-    with cluster(asked.output) as two:
+    with cluster(options.output) as two:
         both = run("two-workers", scheduler=two.address)
         print(f"two Dask workers: {both:.0f} s, {alone / both:.2f} times as fast", flush=True)
 
@@ -92,7 +92,8 @@ def main() -> int:
 
         lost = run("one-killed", scheduler=two.address, progress=kill)
         print(f"the same, one killed after a quarter: {lost:.0f} s, {len(two.workers)} workers started", flush=True)
-    same = [_content(asked.output / "one-process") == _content(asked.output / n) for n in ("two-workers", "one-killed")]
+    first = _content(options.output / "one-process")
+    same = [_content(options.output / name) == first for name in ("two-workers", "one-killed")]
     print(f"same bytes as one process: {same}")
     return 0 if all(same) else 1
 

@@ -175,8 +175,8 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
     stiff, value = (w.stiffness_N(tension) for w in wires)
     add("derived", "stiffness_N", float(value[0]), *map(float, np.quantile(stiff, [0.05, 0.95])))
 
-    asked = read_request(folder / "later.csv", stored)
-    rows = predicted_table(asked)
+    request = read_request(folder / "later.csv", stored)
+    rows = predicted_table(request)
     measured = truth.readings[-LATER:, :, 0][truth.protocol.mask[-LATER:]]
     for row, reading in zip(rows, measured, strict=True):
         add("predict", f"hold {row[1]}", float(reading), row[6], row[8])

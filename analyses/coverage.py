@@ -124,18 +124,18 @@ def main() -> int:
     parser.add_argument("--wires", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
-    asked.output.mkdir(parents=True, exist_ok=True)
-    path = asked.output / f"rows-seed{asked.seed}.jsonl"
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    path = options.output / f"rows-seed{options.seed}.jsonl"
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    missing = range(len(rows), asked.wires)
-    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(asked.workers) as pool:
-        for future in [pool.submit(one, asked.seed, index) for index in missing]:
+    missing = range(len(rows), options.wires)
+    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(options.workers) as pool:
+        for future in [pool.submit(one, options.seed, index) for index in missing]:
             rows.append(future.result())
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
-    result = summary(rows[: asked.wires])
-    write_json(asked.output / "coverage.json", result)
+    result = summary(rows[: options.wires])
+    write_json(options.output / "coverage.json", result)
     print(json.dumps(result, indent=2))
     return 0 if 0.83 <= result["interval_coverage"] <= 0.96 and 0.85 <= result["held_out_coverage"] <= 0.95 else 1
 

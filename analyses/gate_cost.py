@@ -39,7 +39,7 @@ def experiments_of(name: str) -> tuple[Any, int]:
         return read_experiments(Path(folder) / "cases" / spec.key / "experiment.toml"), int(spec.key, 16) % 2**31
 
 
-def asked(name: str, simulations: int) -> dict[str, Any]:
+def cost_of(name: str, simulations: int) -> dict[str, Any]:
     """One case in this process: processor time, p and the surprise of every name."""
     from analyses.model_check import case
     from wirebayes.discovery.global_test import examine
@@ -90,7 +90,7 @@ def main() -> None:
     parser.add_argument("--only", help="one case, in this process")
     options = parser.parse_args()
     if options.only:
-        print(json.dumps(asked(options.only, options.simulations)))
+        print(json.dumps(cost_of(options.only, options.simulations)))
         return
     kinds = ("chain", "additive", "together", "effect")
     names = [*PAPER, *(f"benchmark:{i}" for i in range(options.benchmark))]

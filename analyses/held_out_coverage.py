@@ -56,13 +56,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sets", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with workers() as parallel_map:
-        results = list(parallel_map(one, [(asked.seed, number) for number in range(asked.sets)]))
-    print(f"{asked.sets} simulated sets, {sum(not r[2] for r in results)} of them not converged")
+        results = list(parallel_map(one, [(options.seed, number) for number in range(options.sets)]))
+    print(f"{options.sets} simulated sets, {sum(not r[2] for r in results)} of them not converged")
     for name, place in (("free", 0), ("given the first reading", 1)):
         shares = 100 * np.array([r[place] for r in results])
-        errors = shares.std(axis=0, ddof=1) / np.sqrt(asked.sets)
+        errors = shares.std(axis=0, ddof=1) / np.sqrt(options.sets)
         for level, mean, se in zip(LEVELS, shares.mean(axis=0), errors, strict=True):
             print(f"{name}: {100 * level:g} % bands hold {mean:.1f} ± {1.96 * se:.1f} % of the readings")
 

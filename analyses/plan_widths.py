@@ -49,9 +49,9 @@ def guess(n: int, length_mm: float, rng: np.random.Generator) -> dict[str, Any]:
     return {name: d.rvs(n, random_state=rng) for name, d in about.items()}
 
 
-def fitted(asked: tuple[str, int]) -> dict[str, float]:
+def fitted(task: tuple[str, int]) -> dict[str, float]:
     """Lengths of the 90 % intervals, and standard deviations, of one simulated test of a protocol."""
-    name, number = asked
+    name, number = task
     test, truth = planned(name, seed_of(0, name, "truth", str(number)), 1)
     rng = np.random.default_rng(seed_of(0, name, "noise", str(number)))
     problem = build([test])
@@ -77,15 +77,15 @@ def main() -> int:
     parser.add_argument("--output", type=Path, default=Path("out/plan-widths"))
     parser.add_argument("--tests", type=int, default=120, help="simulated and sampled, of each protocol")
     parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
-    asked.output.mkdir(parents=True, exist_ok=True)
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
     result: dict[str, Any] = {}
-    with processes(asked.workers) as pool:
+    with processes(options.workers) as pool:
         for name in PROTOCOLS:
-            truths = [planned(name, seed_of(0, name, "truth", str(i)), 1) for i in range(asked.tests)]
+            truths = [planned(name, seed_of(0, name, "truth", str(i)), 1) for i in range(options.tests)]
             draws = {c: np.tile(np.concatenate([t[c] for _, t in truths]), REPEATS) for c in truths[0][1]}
             plan = expected_widths(truths[0][0], draws, np.random.default_rng(2))
-            work = [(i, (name, i)) for i in range(asked.tests)]
+            work = [(i, (name, i)) for i in range(options.tests)]
             rows = [future.result() for _, future in as_finished(pool, fitted, work)]
             kept = [row for row in rows if row["converged"]]
             ratios = {}
@@ -102,7 +102,7 @@ def main() -> int:
                 f"{c} {r['ratio']:.2f} ({r['se']:.2f}), {r['ratio_of_median_sds']:.2f}" for c, r in ratios.items()
             )
             print(f"{name}: {len(kept)} fits, {len(rows) - len(kept)} not converged: {said}", flush=True)
-    write_json(asked.output / "plan-widths.json", result)
+    write_json(options.output / "plan-widths.json", result)
     far = [r for p in result.values() for r in p["ratios"].values() if abs(r["ratio"] - 1.0) > 0.15]
     print(f"{len(far)} of {sum(len(p['ratios']) for p in result.values())} widths farther than 15 % from the fits'")
     return 0

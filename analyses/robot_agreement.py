@@ -63,9 +63,9 @@ def compare(robot, make, law, count, rng):
         there = max(there, back.max())
     slack = (found.tension_N == 0).any(1).sum()
     errors = np.array(errors)
-    told = found.found | (found.status == forward.NOT_HELD)  # a plate on two points in line is free, and said to be
+    answered = found.found | (found.status == forward.NOT_HELD)  # a plate on two points in line is free, and said to be
     free = int((found.status == forward.NOT_HELD).sum())
-    return len(found.status), told.mean(), blind.found.mean(), slack, np.mean(rested), errors, there, free
+    return len(found.status), answered.mean(), blind.found.mean(), slack, np.mean(rested), errors, there, free
 
 
 def main():

@@ -41,8 +41,8 @@ def plan(robot, line, rng):
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1)
     x, R, tau = x[good], R[good], tau[good]
-    told = inverse.commands(robot, mean, x, R, tau)
-    change = observability.sensitivity(robot, mean, x, R, told.zero_m, told.offset_m)[1]
+    commands = inverse.commands(robot, mean, x, R, tau)
+    change = observability.sensitivity(robot, mean, x, R, commands.zero_m, commands.offset_m)[1]
     pick = observability.choose_poses(change, POSES, TENSION_SD_N, REFERENCE_SD_M)
     home = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
     first = inverse.commands(robot, mean, *home, inverse.tensions(robot, *home)).joint_m
@@ -50,7 +50,7 @@ def plan(robot, line, rng):
     def session(chosen):
         return Session(
             np.concatenate([home[0], x[chosen]]), np.concatenate([home[1], R[chosen]]),
-            np.concatenate([first, told.joint_m[chosen]]), np.array([600.0] + [30.0] * POSES),
+            np.concatenate([first, commands.joint_m[chosen]]), np.array([600.0] + [30.0] * POSES),
             np.array([False] + [True] * POSES), TENSION_SD_N,
         )  # fmt: skip
 
@@ -109,10 +109,10 @@ def study(name, line, count, rng):
             continue
         plain = inverse.commands(robot, prior.wires(robot, centre)[0], x[None], R[None], tau)
         ahead = inverse.commands(robot, prior.wires(robot, centre)[0], x[None], R[None], tau, foreseen.creep.T)
-        told = {"before, Hooke": plain.joint_m, "before, creep foreseen": ahead.joint_m}
+        commands = {"before, Hooke": plain.joint_m, "before, creep foreseen": ahead.joint_m}
         for label, key in (("after, Hooke only", "Hooke only"), ("after, creep model", "creep model")):
-            told[label] = corrected(robot, results[key][0], results[key][1], x, R)
-        for label, joints in told.items():
+            commands[label] = corrected(robot, results[key][0], results[key][1], x, R)
+        for label, joints in commands.items():
             errors[label].append(pose_error(robot, prior, truth, real, joints, x, R))
     for label, values in errors.items():
         middle, high = np.quantile(values, [0.5, 0.95])

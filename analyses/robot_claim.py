@@ -37,12 +37,12 @@ def table(fits, count, rng):
             for spread, loaded_s in ((0.0, 0.0), (0.05, 0.0), (0.05, 3600.0)):
                 wires = draws.for_robot(robot, line, spread, rng)
                 out = claim.over_workspace(robot, wires, claim.grid(robot, GRID), loaded_s=loaded_s)
-                told = claim.summary(out)
+                numbers = claim.summary(out)
                 age = "1 h" if loaded_s else "new"
                 print(
                     f"{line_name:15s} {name:12s} {spread:4.2f} {age} {band(1e3 * out.distance_m):25s} "
-                    f"{band(np.degrees(out.tilt_rad)):26s} {told['probability']:.3f}  "
-                    f"{told['probability_everywhere']:.3f}       "
+                    f"{band(np.degrees(out.tilt_rad)):26s} {numbers['probability']:.3f}  "
+                    f"{numbers['probability_everywhere']:.3f}       "
                     f"{out.tension_N.min():.1f}-{out.tension_N.max():.1f}  {out.found:.4f}"
                 )
 

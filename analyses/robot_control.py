@@ -33,13 +33,13 @@ def errors(fits, count):
             x, R = robot.home_m, np.eye(3)
             for truth_name, truth in {line_name: line, **others}.items():
                 wires = draws.for_robot(robot, truth, 0.05, rng)
-                told = {
+                schedules = {
                     "Hooke only": control.hooke_only(robot, draws.for_robot(robot, truth), x, R),
                     "creep, plain model": control.creep_aware(robot, draws.for_robot(robot, line), x, R),
                 }
                 if truth_name != line_name:
-                    told["creep, with effects"] = control.creep_aware(robot, draws.for_robot(robot, truth), x, R)
-                for label, schedule in told.items():
+                    schedules["creep, with effects"] = control.creep_aware(robot, draws.for_robot(robot, truth), x, R)
+                for label, schedule in schedules.items():
                     error = control.error(robot, wires, schedule, x, R, TIMES)
                     mid, high = 1e3 * np.quantile(error.distance_m[error.found], [0.5, 0.95], axis=0)
                     cells = " ".join(f"{a:6.2f} [{b:7.2f}]" for a, b in zip(mid, high, strict=True))

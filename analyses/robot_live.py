@@ -41,12 +41,12 @@ def speed(robot: Robot, wires: WireDraws, reads: bool, steps: int, rate_Hz: floa
     times = np.arange(steps) / rate_Hz
     reach = 0.05 * robot.span_m
     way = robot.home_m + reach * np.stack([np.sin(times), np.cos(times) - 1.0, 0.3 * np.sin(2 * times)], 1)
-    told = joints(robot, wires, way)
+    commanded = joints(robot, wires, way)
     tension = np.full(robot.legs, 5.0)
     live = LiveEstimator(robot, wires, Uncertain(1e-3), (robot.home_m, np.eye(3)), reads)
-    live.step(-1.0, told[0])
+    live.step(-1.0, commanded[0])
     spent = np.empty(steps)
-    for k, (moment, joint) in enumerate(zip(times, told, strict=True)):
+    for k, (moment, joint) in enumerate(zip(times, commanded, strict=True)):
         begin = time.process_time()
         if reads:
             live.step(moment, joint, tension, np.zeros(2))
@@ -65,14 +65,15 @@ def hour(robot: Robot, wires: WireDraws, rate_Hz: float) -> None:
     times = np.arange(0.0, 3600.1, WAYPOINT_S)
     reach = 0.05 * robot.span_m
     way = robot.home_m + reach * rng.uniform(-1.0, 1.0, (len(times), 3)) * [1, 1, 0.5]
-    told = joints(robot, wires, np.repeat(way[::2], 2, 0)[: len(times)])  # a minute's stop after each minute's move
+    stops = np.repeat(way[::2], 2, 0)[: len(times)]  # a minute's stop after each minute's move
+    commanded = joints(robot, wires, stops)
     start = robot.home_m, np.eye(3)
-    history = History(times, told, None, None, np.zeros(len(times)), np.zeros((len(times), 3)))
+    history = History(times, commanded, None, None, np.zeros(len(times)), np.zeros((len(times), 3)))
     batch = estimate(robot, wires, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
     live = LiveEstimator(robot, wires, Uncertain(1e-3), start, reads=False)
     seen: list[LivePose] = []
     for moment in np.arange(0.0, 3600.0 + 0.5 / rate_Hz, 1.0 / rate_Hz):
-        joint = np.array([np.interp(moment, times, column) for column in told.T])
+        joint = np.array([np.interp(moment, times, column) for column in commanded.T])
         now = live.step(float(moment), joint)
         if len(seen) < len(times) and moment >= times[len(seen)] - 1e-9:
             seen.append(now)

@@ -42,9 +42,9 @@ def ignored(robot, wires, radius_m):
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1) & np.isfinite(inverse.tensions(real, x, R)).all(1)
     x, R, tau = x[good], R[good], tau[good]
-    told = inverse.commands(robot, wires, x, R, tau).joint_m
+    commanded = inverse.commands(robot, wires, x, R, tau).joint_m
     right = inverse.commands(real, wires, x, R, inverse.tensions(real, x, R)).joint_m
-    zeroed = told + right[0] - told[0]
+    zeroed = commanded + right[0] - commanded[0]
     length = np.stack([statics.geometry(r, x.T, np.moveaxis(R, 0, -1)).distance_m for r in (real, robot)])
     raw = np.abs(length[0] - length[1]) / length[0]
     change = length[0] - length[1] - (length[0] - length[1])[:, :1]

@@ -83,21 +83,21 @@ def speed():
             k: np.ones(SOLVES) for k in ("B", "U", "k2", "N")}, 1000.0)  # fmt: skip
         wires = draws.for_robot(robot, line)
         x, R = robot.home_m[None], np.eye(3)[None]
-        told = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
-        zero = told.zero_m + 1e-3 * rng.normal(size=told.zero_m.shape)
+        commands = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
+        zero = commands.zero_m + 1e-3 * rng.normal(size=commands.zero_m.shape)
         start = x + 2e-3 * rng.normal(size=(SOLVES, 3))
         turn = rng.normal(0, np.radians(0.5), (SOLVES, 3))
         R = rotation.matrix(turn)
         ours_s, rates, same = np.inf, {"hybr": np.inf, "lm": np.inf}, 0.0
         for _ in range(REPEATS):  # the best of a few: other work on the machine only ever slows
             began = time.perf_counter()
-            ours = forward.solve(robot, wires, zero, told.offset_m, start, R)
+            ours = forward.solve(robot, wires, zero, commands.offset_m, start, R)
             ours_s = min(ours_s, (time.perf_counter() - began) / SOLVES)
             for method in rates:
                 answers = []
                 began = time.perf_counter()
                 for i in range(SCIPY_SOLVES):
-                    f, J = equations(robot, wires.theta["k1"][0, i], zero[i], told.offset_m[i])
+                    f, J = equations(robot, wires.theta["k1"][0, i], zero[i], commands.offset_m[i])
                     answers.append(root(f, np.concatenate([start[i], turn[i]]), jac=J, method=method, tol=1e-12).x[:3])
                 rates[method] = min(rates[method], (time.perf_counter() - began) / SCIPY_SOLVES)
                 if method == "hybr":

@@ -15,7 +15,7 @@ from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.io.paper import experiments
 from wirebayes.model.pooling import SPREAD, pooled
 from wirebayes.model.problem import LENGTH_EXPONENT, MATERIAL, Problem, build
-from wirebayes.prediction.leave_one_hold_out import LeftOut, leave_each_hold_out
+from wirebayes.prediction.leave_one_hold_out import LeftOut, smoothed_leave_one_hold_out
 from wirebayes.results.identifiability import identifiability
 
 SEED = 0
@@ -48,17 +48,17 @@ def main() -> None:
     separate = [fitted(build([e]), e.name) for e in wires]
     together = fitted(build(wires, length_exponent=free), "together, B as L0^p")
     models = {
-        "separate": joined([leave_each_hold_out(f) for f in separate]),
-        "together, B as L0^p": leave_each_hold_out(together),
-        "together, creep a strain (p = 1)": leave_each_hold_out(fitted(build(wires), "together, p = 1")),
+        "separate": joined([smoothed_leave_one_hold_out(f) for f in separate]),
+        "together, B as L0^p": smoothed_leave_one_hold_out(together),
+        "together, creep a strain (p = 1)": smoothed_leave_one_hold_out(fitted(build(wires), "together, p = 1")),
     }
     for which in ("k1", "U", "N"):
         name = f"together, B as L0^p, {which} by length"
         result = fitted(build(wires, [named(f"length_dependence@{which}")], length_exponent=free), name)
-        models[name] = leave_each_hold_out(result)
+        models[name] = smoothed_leave_one_hold_out(result)
         print(f"  {which} as L0^p, p {interval(result.flat[:, result.problem.names.index('length_dependence.p')])}")
     specimens = fitted(pooled(build(wires, length_exponent=free)), "partially pooled, k1 and B by specimen")
-    models["partially pooled"] = leave_each_hold_out(specimens)
+    models["partially pooled"] = smoothed_leave_one_hold_out(specimens)
 
     print("\nparameter, each sample by itself, both together")
     for name in MATERIAL:

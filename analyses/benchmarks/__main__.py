@@ -12,7 +12,7 @@ import argparse
 import jax.numpy as jnp
 import numpy as np
 
-from analyses.benchmarks import asked, gradient, measure, model, plain
+from analyses.benchmarks import gradient, measure, model, parsed, plain
 from wirebayes.inference.modes import modes
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
@@ -56,7 +56,7 @@ def main():
     parser.add_argument("--likelihoods", nargs="*", default=["chain", "hold"])
     parser.add_argument("--peers", nargs="*", help="words that the names of wanted peers begin with")
     parser.add_argument("--seed", type=int, default=0)
-    options = asked(parser)
+    options = parsed(parser)
     cases = []
     for experiment in experiments():
         if options.wires and experiment.name not in options.wires:
@@ -71,8 +71,8 @@ def main():
                   and "ratio_all_costs_cpu" in c["peers"][name]]  # fmt: skip
         tried = sum(name in c["peers"] for c in cases)
         if tried:
-            told = f"{np.median(ratios):8.1f} {min(ratios):8.1f}" if ratios else "not converged"
-            print(f"  {name:36s} {told}   ({len(ratios)} of {tried} converged)")
+            cells = f"{np.median(ratios):8.1f} {min(ratios):8.1f}" if ratios else "not converged"
+            print(f"  {name:36s} {cells}   ({len(ratios)} of {tried} converged)")
 
 
 def run(problem, title, options):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analyses.benchmarks import asked
+from analyses.benchmarks import parsed
 from analyses.benchmarks.plain import ours
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference import transform
@@ -104,7 +104,7 @@ def draws(problem):
 
 
 def main():
-    options = asked(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
+    options = parsed(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
     out = {}
     sizes = [5, 15, 50, 150, 500]
     out["readings"] = growth("readings a hold", sizes, [build([staircase(12, r)]) for r in sizes])
@@ -131,8 +131,8 @@ def main():
     for experiment in experiments():
         for likelihood in ("chain", "hold"):
             found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(build([experiment], likelihood=likelihood))
-            told = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
-            print(f"  {experiment.name + ', ' + likelihood:24s} {told[0]}    {told[1]}", flush=True)
+            cells = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
+            print(f"  {experiment.name + ', ' + likelihood:24s} {cells[0]}    {cells[1]}", flush=True)
     write_json(options.output / "cost.json", out)
 
 

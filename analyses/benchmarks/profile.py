@@ -16,7 +16,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import wirebayes
-from analyses.benchmarks import asked
+from analyses.benchmarks import parsed
 from wirebayes.discovery.search import discover
 from wirebayes.inference.fit import fit
 from wirebayes.io.paper import experiments
@@ -81,7 +81,7 @@ def shares(profile):
 
 
 def main():
-    options = asked(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
+    options = parsed(argparse.ArgumentParser(description=__doc__.splitlines()[0]))
     out = {}
     for name, work in WORK.items():
         profile = cProfile.Profile()

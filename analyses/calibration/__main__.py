@@ -24,18 +24,18 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--scheduler", help="address of a Dask scheduler whose workers can import this checkout")
     parser.add_argument("--only", help="one study, such as paper-chain, without a verdict over all")
-    asked = parser.parse_args()
-    asked.output.mkdir(parents=True, exist_ok=True)
-    wanted = [(study, asked.data_sets) for study in STUDIES] + [(BROKEN, asked.broken)]
-    if asked.only:
-        wanted = [(study, count) for study, count in wanted if study.name == asked.only]
-    where = asked.output, asked.seed, asked.workers, asked.scheduler
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    wanted = [(study, options.data_sets) for study in STUDIES] + [(BROKEN, options.broken)]
+    if options.only:
+        wanted = [(study, count) for study, count in wanted if study.name == options.only]
+    where = options.output, options.seed, options.workers, options.scheduler
     lines = {study.name: run(study, count, *where) for study, count in wanted}
-    if asked.only:
+    if options.only:
         return 0
-    result = judged(lines, asked.seed)
-    write_json(asked.output / "calibration.json", result)
-    draw({name: shares(rows) for name, rows in lines.items()}, result, asked.output / "calibration.png")
+    result = judged(lines, options.seed)
+    write_json(options.output / "calibration.json", result)
+    draw({name: shares(rows) for name, rows in lines.items()}, result, options.output / "calibration.png")
     print(summary(result))
     return 0 if result["inside"] and result["broken_outside"] and result["share_not_converged"] <= 0.01 else 1
 

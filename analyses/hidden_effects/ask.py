@@ -49,8 +49,8 @@ def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...], simulati
         options |= {} if simulations is None else {"simulations": simulations}
         experiments = read_experiments(file)
         materials = {e.material: [x for x in experiments if x.material == e.material] for e in experiments}
-        asked = [experiments] if how == "api" else list(materials.values())
-        answers = [discover(members, without=without, seed=seed, **options) for members in asked]
+        groups = [experiments] if how == "api" else list(materials.values())
+        answers = [discover(members, without=without, seed=seed, **options) for members in groups]
         return answers[0] | {"experiments": {k: v for a in answers for k, v in a["experiments"].items()}}
     if how == "cli":
         with tempfile.TemporaryDirectory() as folder:

@@ -147,14 +147,14 @@ def rmse(y: Array, prediction: Array, mask: Mask) -> float:
 def oracle(rig: Rig, y: Array, hidden: tuple[tuple[Candidate, float], ...], held: Mask, bench: str) -> dict[str, float]:
     """Held-out rmse (N) of plain and true form, fitted to the other readings, and the noise floor, on one bench."""
     names = np.concatenate([np.full(b.n_readings, b.name == bench) for b in rig.benches])
-    asked = held & names
+    chosen = held & names
     plain = fit(rig, y, ~held)
-    result = {"plain": rmse(y, plain.prediction, asked)}
+    result = {"plain": rmse(y, plain.prediction, chosen)}
     true = plain
     if hidden:
         sizes = np.array([a for _, a in hidden])
         # the oracle knows the order of the size too: where the rest does not show the effect, least squares runs wild
         true = fit(rig, y, ~held, tuple(c for c, _ in hidden), sizes, size_prior_sd=1.0)
-    result["oracle"] = rmse(y, true.prediction, asked)
-    result["floor"] = float(np.sqrt(np.mean(np.diag(true.v)[asked])))
+    result["oracle"] = rmse(y, true.prediction, chosen)
+    result["floor"] = float(np.sqrt(np.mean(np.diag(true.v)[chosen])))
     return result

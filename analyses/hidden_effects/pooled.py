@@ -15,7 +15,7 @@ from .targets import Target, targets
 SIGNS = {">= ": "≥ ", "<= ": "≤ ", "delta ": "δ = "}
 
 
-def told(row: Target, bold: bool = False) -> str:
+def cell(row: Target, bold: bool = False) -> str:
     """What was found, as a share or, where no share is wanted, as a number."""
     found = row["found"]
     assert found
@@ -42,8 +42,8 @@ def main() -> None:
     for row, same in zip(targets(rows), seen, strict=True):
         if not row["found"]:
             continue
-        again = told(same) if same["found"] and same["found"]["n"] != row["found"]["n"] else ""
-        lines.append([row["target"], row["wanted"], told(row, row["passed"] is False), again])
+        again = cell(same) if same["found"] and same["found"]["n"] != row["found"]["n"] else ""
+        lines.append([row["target"], row["wanted"], cell(row, row["passed"] is False), again])
     for cells in lines:
         line = "   * - " + "\n     - ".join(cells).rstrip()
         for plain, sign in SIGNS.items():

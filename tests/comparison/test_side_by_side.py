@@ -117,7 +117,7 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
                                refitted=np.array([False, True]), converged=False)  # fmt: skip
 
     monkeypatch.setattr(compare, "fit", fit)
-    monkeypatch.setattr(compare, "leave_each_hold_out", leave)
+    monkeypatch.setattr(compare, "smoothed_leave_one_hold_out", leave)
     monkeypatch.setattr(compare, "held_out", lambda early, whole, rng: (early.holds, len(whole.recorded_holds)))
     monkeypatch.setattr(compare, "_held_out", lambda result, trained: {"found": result})
     found = compare._scores(Task(experiments()[1], PLAIN, train_holds), 0, Policy(ess=600.0, most_steps=1000))

@@ -214,8 +214,8 @@ def test_the_noise_ratio_of_a_fit_is_that_of_its_setting_and_sensor_errors(tmp_p
     by_setting = (up - down) / (2 * step)
     variance = float(reading_variance(own["sensor_sd"], sample.resolution_N)[0])
     covariance = variance * np.eye(mask.sum()) + float(own["setting_sd"][0]) ** 2 * by_setting @ by_setting.T
-    told = variance * (np.eye(mask.sum()) + x.ratio[0] * x.left[0] * x.singular[0] ** 2 @ x.left[0].T)
-    np.testing.assert_allclose(told, covariance, rtol=1e-4, atol=1e-6 * covariance.max())
+    implied = variance * (np.eye(mask.sum()) + x.ratio[0] * x.left[0] * x.singular[0] ** 2 @ x.left[0].T)
+    np.testing.assert_allclose(implied, covariance, rtol=1e-4, atol=1e-6 * covariance.max())
 
 
 @pytest.mark.statistical

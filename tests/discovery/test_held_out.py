@@ -61,7 +61,7 @@ def test_importance_weights_are_truncated(monkeypatch: pytest.MonkeyPatch) -> No
         samples=[SimpleNamespace(protocol=SimpleNamespace(recorded=recorded))],
     )
     monkeypatch.setattr(held_out, "_draws", lambda *_: (problem, np.zeros((1500, 1))))
-    found = held_out.leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
+    found = held_out.truncated_leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
     expected = []
     for p in density[:3]:
         weight = np.minimum(1 / p, np.mean(1 / p) * np.sqrt(1500))

@@ -123,9 +123,9 @@ def test_what_is_left_beside_a_name_counts_for_the_name_as_far_as_the_smooth_cur
 
 
 def test_shares_of_a_material_sum_to_one_though_effects_may_not_act_there() -> None:
-    acting = {"a": np.array([1.0, 0.3]), "b": np.array([1.0, 0.6])}
+    influence = {"a": np.array([1.0, 0.3]), "b": np.array([1.0, 0.6])}
     sets = [EffectSet((), 0.0, {}, np.full(2, -20.0))]
-    sets += [EffectSet((name,), 5.0, {name: acts}, np.full(2, -20.0)) for name, acts in acting.items()]
+    sets += [EffectSet((name,), 5.0, {name: acts}, np.full(2, -20.0)) for name, acts in influence.items()]
     found = posterior(sets, *log_weights(sets, 20, {}), blocks=2)
     assert [sum(shares.values()) for shares in found.shares] == pytest.approx([1.0, 1.0])
     assert found.shares[1]["b"] / found.shares[1]["a"] == pytest.approx(2.0)

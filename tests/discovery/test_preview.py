@@ -11,7 +11,7 @@ from wirebayes.workflows.check import check
 WIRE = {"k1": 700.0, "B": 0.5, "U": 0.8, "k2": 0.03, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
 
 
-def told(bench):
+def previewed(bench):
     """The preview of a simulated test."""
     sample = draw([bench], Truth(WIRE), seed=3)
     experiment = bench.experiment()
@@ -26,13 +26,13 @@ def told(bench):
 @pytest.fixture(scope="module")
 def loading():
     """Six holds upwards."""
-    return told(Bench(displacements_mm=(1, 2, 3, 4, 5, 6)))
+    return previewed(Bench(displacements_mm=(1, 2, 3, 4, 5, 6)))
 
 
 @pytest.fixture(scope="module")
 def unloading():
     """Six holds upwards and five back."""
-    return told(Bench(displacements_mm=(1, 2, 3, 4, 5, 6, 5, 4, 3, 2, 1)))
+    return previewed(Bench(displacements_mm=(1, 2, 3, 4, 5, 6, 5, 4, 3, 2, 1)))
 
 
 def test_what_a_protocol_cannot_show_is_said(loading, unloading):
@@ -63,7 +63,7 @@ def test_parameters_lie_where_the_truth_is_and_the_prior_is_named_where_it_answe
         assert away < 1.5 * width, name
         assert determined_by in ("data", "data and prior", "prior")
     assert parameters["k1"]["determined_by"] == "data"
-    short = told(Bench(displacements_mm=(1, 2), times_s=(0.0, 1.0, 2.0)))[1]
+    short = previewed(Bench(displacements_mm=(1, 2), times_s=(0.0, 1.0, 2.0)))[1]
     assert short.parameters["U"]["determined_by"] == "prior"
     assert short.parameters["N"]["determined_by"] != "data"
     assert {found["reason"] for found in short.effects.values()} == {"fewer readings than parameters"}

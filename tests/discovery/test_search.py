@@ -180,8 +180,8 @@ def test_what_two_lengths_leave_open_a_third_one_tells(tmp_path: Path) -> None:
     experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
     block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
     probes = {p.effect.name: p for p in screening.candidate_probes([block], CATALOGUE)[0]}
-    told = power.next_measurement(block, (probes["fixture_compliance"], probes["length_dependence"]), None)
-    assert "another length, 3600 mm" in told
+    proposal = power.next_measurement(block, (probes["fixture_compliance"], probes["length_dependence"]), None)
+    assert "another length, 3600 mm" in proposal
     possible = list(probes)
     assert not any("compliance" in s for s in power.not_identifiable(block, list(CATALOGUE.values()), possible))
 

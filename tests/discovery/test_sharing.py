@@ -29,8 +29,8 @@ def test_each_material_knows_what_a_fit_of_all_at_once_knows(tmp_path: Path, nam
     experiments = read_experiments(tmp_path / "experiments.toml")
     alone = [fit([e], name) for e in experiments]
     mean, sd = _known(fit(experiments, name), named(name))
-    told = informed(alone, dict.fromkeys((0, 1), named(name)), np.random.default_rng(1))
-    after = [_known(b, named(name)) for b in told]
+    shared = informed(alone, dict.fromkeys((0, 1), named(name)), np.random.default_rng(1))
+    after = [_known(b, named(name)) for b in shared]
     assert max(_known(b, named(name))[1] for b in alone) > 1.15 * sd  # there is something to be told
     for own_mean, own_sd in after:
         assert own_mean == pytest.approx(mean, abs=0.2 * sd)

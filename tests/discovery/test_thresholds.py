@@ -54,7 +54,7 @@ def test_weights_of_a_hold_left_out_are_truncated(monkeypatch: pytest.MonkeyPatc
     each, capped = (1.0 - weight) / 99, min(weight, 1 / np.sqrt(100))
     share = capped / (capped + 99 * each)
     expected = np.log(share * np.exp(-5.0) + (1.0 - share))
-    found = held_out.leave_one_hold_out(None, np.random.default_rng(0))  # type: ignore[arg-type]
+    found = held_out.truncated_leave_one_hold_out(None, np.random.default_rng(0))  # type: ignore[arg-type]
     assert weight > 0.5 and found == pytest.approx([expected], rel=1e-12)
 
 

@@ -153,8 +153,8 @@ def test_second_relaxation_and_steady_creep_run_beside_the_creep():
 
 def test_an_unrecorded_hold_is_the_same_as_an_entry_in_the_protocol():
     """T seconds before hold 3 at its displacement, its own clock running."""
-    told = protocol([1.0, 3.0, 5.0, 5.0, 2.0, 4.0], [TIMES, TIMES, [0.0, 200.0], TIMES, TIMES, TIMES], unrecorded={2})
-    expected = readings({}, p=told)[[0, 1, 3, 4, 5]]
+    stated = protocol([1.0, 3.0, 5.0, 5.0, 2.0, 4.0], [TIMES, TIMES, [0.0, 200.0], TIMES, TIMES, TIMES], unrecorded={2})
+    expected = readings({}, p=stated)[[0, 1, 3, 4, 5]]
     assert readings(strong("unrecorded_hold@3"), "unrecorded_hold@3") == pytest.approx(expected, rel=1e-12)
 
 

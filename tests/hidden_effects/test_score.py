@@ -129,9 +129,9 @@ def test_cases_the_refitted_plain_model_swallows_are_also_shown_apart():
     result = score(truths, {"a": judged(), "b": swallowed}, answers)
     assert found(result, "detected at delta 10")["found"]["value"] == 0.5
     assert found(result, "detected at delta 10", "targets_visible")["found"]["value"] == 1.0
-    told = "a test that knew the effect would detect, delta 10"
+    words = "a test that knew the effect would detect, delta 10"
     power = norm.sf(norm.isf(0.02) - 2.0)
-    assert found(result, told)["found"]["value"] == pytest.approx(0.5 * (1.0 + power), abs=1e-4)
+    assert found(result, words)["found"]["value"] == pytest.approx(0.5 * (1.0 + power), abs=1e-4)
 
 
 def test_a_case_that_failed_is_counted_as_failed():

@@ -11,7 +11,7 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
-from wirebayes.prediction.leave_one_hold_out import LeftOut, difference, leave_each_hold_out, log_mean, without_hold
+from wirebayes.prediction.leave_one_hold_out import LeftOut, difference, smoothed_leave_one_hold_out, log_mean, without_hold
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 
@@ -24,8 +24,8 @@ def fitted() -> Fit:
 
 @pytest.mark.statistical
 def test_importance_sampling_agrees_with_refitting_without_the_hold(fitted: Fit) -> None:
-    fast = leave_each_hold_out(fitted, policy=QUICK)
-    exact = leave_each_hold_out(fitted, policy=QUICK, exact=True)
+    fast = smoothed_leave_one_hold_out(fitted, policy=QUICK)
+    exact = smoothed_leave_one_hold_out(fitted, policy=QUICK, exact=True)
     assert exact.refitted.all() and not fast.refitted.all()
     assert list(fast.hold) == [1, 2, 3, 4, *range(6, 14)]
     easy = ~fast.refitted
@@ -44,7 +44,7 @@ def test_importance_weights_are_smoothed_as_arviz_smooths_them(monkeypatch: pyte
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
     stub = SimpleNamespace(problem=problem, flat=np.zeros((4000, len(problem.names))))
-    found = leave_each_hold_out(stub)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
     assert not found.refitted.any()
     one = {"posterior": {"x": np.zeros((1, 4000))}, "log_likelihood": {"y": log_p.T[None]}}
     reference = arviz_stats.loo(arviz_base.from_dict(one), pointwise=True, reff=1.0)

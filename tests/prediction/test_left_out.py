@@ -10,7 +10,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
 from wirebayes.prediction import leave_one_hold_out as module
-from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out, standard_error, thinned
+from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error, thinned
 
 
 @pytest.mark.parametrize(("tail", "refits"), [(0.49, False), (0.51, True), (np.nan, True)])
@@ -33,7 +33,7 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_a_refit(
     monkeypatch.setattr(module, "fit", fit_without)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
-    found = leave_each_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
     assert list(found.refitted) == [refits] * 4 and found.converged is not refits
     assert made == ([0, 1, 2, 3] if refits else [])
     assert shares == [0.25, 0.5, 0.75, 1.0]
@@ -45,7 +45,7 @@ def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch:
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.zeros((4, 500))])
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
-    found = leave_each_hold_out(stub)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
     assert found.elpd.tolist() == [0.0] * 4 and found.pareto_k.tolist() == [0.0] * 4 and not found.refitted.any()
 
 

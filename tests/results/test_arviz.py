@@ -17,7 +17,7 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out
+from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
 from wirebayes.results import store
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=12)
@@ -205,7 +205,7 @@ def test_loo_is_leaving_one_hold_out(
     """Before it refits: each hold given all others, not only those before it."""
     monkeypatch.setattr("wirebayes.prediction.leave_one_hold_out.LARGEST_K", np.inf)
     folder, fitted = stored[kind]
-    ours = leave_each_hold_out(fitted)
+    ours = smoothed_leave_one_hold_out(fitted)
     data = opened(stored, kind)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -28,8 +28,8 @@ def commanded(robot, law, count, rng):
     position, R, tau = position[good], R[good], tau[good]
     k1 = np.exp(rng.uniform(np.log(50), np.log(1000), len(position))) * np.maximum(tau.max(1), robot.mass_kg)
     wires = Wires(law, "saturating", {"k1": k1[None]}, np.full((robot.legs, 1), 1000.0))
-    told = inverse.commands(robot, wires, position, R, tau)
-    return Cases(wires, position, R, told.zero_m, told.offset_m)
+    commands = inverse.commands(robot, wires, position, R, tau)
+    return Cases(wires, position, R, commands.zero_m, commands.offset_m)
 
 
 def disturbed(robot, law, count, rng, amount=0.01):

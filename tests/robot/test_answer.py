@@ -19,12 +19,12 @@ def _line(n, k1, law="hooke"):
 def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
     robot = schema.read("cogiro-desk")
-    asked = PoseRequest(robot.home_m, np.eye(3), TIMES)
-    found = answer(robot, _line(40, 3.0, "modified"), asked)
+    request = PoseRequest(robot.home_m, np.eye(3), TIMES)
+    found = answer(robot, _line(40, 3.0, "modified"), request)
     content = found.content
     assert not content["feasible"]
     assert "cannot pull" in content["sentence"]
-    pictures.save_pose(tmp_path, robot, asked, found)
+    pictures.save_pose(tmp_path, robot, request, found)
     assert not list(tmp_path.iterdir())
     plain(content)
 
@@ -33,16 +33,16 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     robot = schema.read("cogiro-desk")
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
     both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
-    asked = PoseRequest(robot.home_m, np.eye(3), TIMES)
-    found = answer(robot, draws.WireDraws(both, 1000.0, "modified"), asked)
+    request = PoseRequest(robot.home_m, np.eye(3), TIMES)
+    found = answer(robot, draws.WireDraws(both, 1000.0, "modified"), request)
     content = found.content
     assert content["feasible_draws"] == 0.5
     assert content["forward"]["solved"] == 0.5
     assert [entry["solved"] for entry in content["drift"]] == [0.5, 0.5]
-    alone = answer(robot, strong, asked).content
+    alone = answer(robot, strong, request).content
     wanted = alone["drift"][0]["distance_mm"]["mean"]
     np.testing.assert_allclose(content["drift"][0]["distance_mm"]["mean"], wanted, rtol=1e-9)
-    pictures.save_pose(tmp_path, robot, asked, found)
+    pictures.save_pose(tmp_path, robot, request, found)
     assert (tmp_path / "drift.svg").exists()
 
 
@@ -79,12 +79,12 @@ def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
     robot = schema.read(name)
     line = _line(30, 800.0)
     exponent = np.linspace(0.5, 1.5, 30)
-    told = draws.WireDraws({**line.parameters, draws.LENGTH_EXPONENT: exponent}, 1000.0)
-    wires = draws.for_robot(robot, told)
+    scaled = draws.WireDraws({**line.parameters, draws.LENGTH_EXPONENT: exponent}, 1000.0)
+    wires = draws.for_robot(robot, scaled)
     elongation = line.parameters["B"] * (leg / 1.0) ** exponent  # of the leg's own wire at 1 N, mm
     tested = wires.theta["B"][-1] / wires.length_mm[-1] * 1e3 * leg
     np.testing.assert_allclose(tested, elongation, rtol=1e-5)
-    content = answer(robot, told, PoseRequest(robot.home_m, np.eye(3), TIMES)).content
+    content = answer(robot, scaled, PoseRequest(robot.home_m, np.eye(3), TIMES)).content
     assert content["variance_shares"]["shared_draw"][draws.LENGTH_EXPONENT] > 0.1
     assert any("exponent" in text for text in content["warnings"]) or name == "linear-6"
 

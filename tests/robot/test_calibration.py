@@ -27,10 +27,10 @@ def _session(robot, line, poses, rng, tilt_sd=None):
     R = rotation.matrix(0.1 * rng.normal(size=x.shape) * (robot.degrees == 6))
     tau = inverse.tensions(robot, x, R)
     good = np.flatnonzero(np.isfinite(tau).all(1))[: poses + 1]
-    told = inverse.commands(robot, mean, x[good], R[good], tau[good])
+    commands = inverse.commands(robot, mean, x[good], R[good], tau[good])
     duration, read = np.full(poses + 1, 30.0), np.ones(poses + 1, bool)
     duration[0], read[0] = 600.0, False
-    return Session(x[good], R[good], told.joint_m, duration, read, 0.02, tilt_sd)
+    return Session(x[good], R[good], commands.joint_m, duration, read, 0.02, tilt_sd)
 
 
 def test_sensitivity_is_the_derivative_of_the_equilibrium():
@@ -107,10 +107,10 @@ def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
     np.testing.assert_allclose(off, bias[:, None] * session.bias_sign, atol=1e-9)
     readings = real.readings + rng.normal(size=real.readings.shape)
     known = calibrate(robot, prior, session, readings)
-    told = known.unknowns[:, -robot.legs :]
+    estimated = known.unknowns[:, -robot.legs :]
     sd = np.sqrt(np.einsum("mdd->md", known.covariance))[:, -robot.legs :]
     assert known.converged.all()
-    assert 0.6 < np.mean(((told - bias) / sd) ** 2) < 1.6
+    assert 0.6 < np.mean(((estimated - bias) / sd) ** 2) < 1.6
     assert sd.mean() < 0.15  # half of what was known before
     low, high = known.interval(0.9)
     assert ((low <= real.length_m) & (real.length_m <= high)).mean() > 0.75
@@ -199,8 +199,8 @@ def test_chosen_poses_say_more_than_the_first_ones():
     x = rng.uniform(robot.lower_m, robot.upper_m, (60, 3))
     R = rotation.matrix(0.1 * rng.normal(size=x.shape))
     tau = inverse.tensions(robot, x, R)
-    told = inverse.commands(robot, wires, x, R, tau)
-    change = observability.sensitivity(robot, wires, x, R, told.zero_m, told.offset_m)[1]
+    commands = inverse.commands(robot, wires, x, R, tau)
+    change = observability.sensitivity(robot, wires, x, R, commands.zero_m, commands.offset_m)[1]
     pick = observability.choose_poses(change, 6, 0.02, 5e-3)
     chosen, first = (observability.observe(change[i], 0.02, 5e-3).sd_m.mean() for i in (pick, list(range(6))))
     assert chosen < 0.8 * first

@@ -194,9 +194,9 @@ def session_csv(tmp_path):
     x = robot.home_m + np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.05], [-0.1, -0.1, -0.05], [0.05, -0.15, 0.1]])
     R = rotation.matrix(np.zeros((len(x), 3)))
     tau = inverse.tensions(robot, x, R)
-    told = inverse.commands(robot, draws.for_robot(robot, line.centre()), x, R, tau)
+    commanded = inverse.commands(robot, draws.for_robot(robot, line.centre()), x, R, tau)
     read = np.arange(len(x)) > 0
-    session = Session(x, R, told.joint_m, np.full(len(x), 30.0), read, 0.02)
+    session = Session(x, R, commanded.joint_m, np.full(len(x), 30.0), read, 0.02)
     prior = Prior(line, 5e-3, 1e-6)
     truth = prior.moments(robot.legs)[0][None].copy()
     truth[0, : robot.legs] = 1e-3 * np.array([3, -2, 1, 4, -5, 0, 2])
@@ -204,7 +204,7 @@ def session_csv(tmp_path):
     tension = iter(real.readings.reshape(-1, robot.legs) * 0.02)
     rows = [session_file.columns(robot, False)]
     for k in range(len(x)):
-        cells = [str(v) for v in (k + 1, *x[k], 0, 0, 0, 30.0, *told.joint_m[k])]
+        cells = [str(v) for v in (k + 1, *x[k], 0, 0, 0, 30.0, *commanded.joint_m[k])]
         rows.append([*cells, *([str(v) for v in next(tension)] if read[k] else [""] * robot.legs)])
     file = tmp_path / "session.csv"
     file.write_text("\n".join(",".join(row) for row in rows) + "\n")

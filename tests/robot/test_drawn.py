@@ -37,11 +37,11 @@ def _statics(d, rng):
     assert tau.max() <= robot.rule.highest_N * (1 + 1e-8)
     assert np.abs(rig.wrench(q, zero)).max() < 1e-8  # in weights
     wires = draws.for_robot(robot, d.line)
-    told = inverse.commands(robot, wires, d.position_m[None], d.rotation[None], tau)
-    errors = [np.abs(told.zero_m - zero).max() / robot.span_m]
+    commands = inverse.commands(robot, wires, d.position_m[None], d.rotation[None], tau)
+    errors = [np.abs(commands.zero_m - zero).max() / robot.span_m]
     stable = rig.softest(q, zero)[0] > 0
     here = d.position_m, d.rotation
-    every = forward.equilibria(robot, wires, told.zero_m[0], told.offset_m[0], rng, 16, known=here)
+    every = forward.equilibria(robot, wires, commands.zero_m[0], commands.offset_m[0], rng, 16, known=here)
     own = np.abs(every.position_m - d.position_m).max(1).min(initial=np.inf) < 1e-6 * robot.span_m
     assert own == stable
     for x, R in zip(every.position_m, every.rotation, strict=True):
@@ -113,9 +113,9 @@ def test_falls_are_found_at_their_time_and_told(kind, seed):
     course = drift.from_command(d.robot, draws.for_robot(d.robot, d.line), d.position_m, d.rotation, TIMES)
     assert not course.found[0]
     assert np.isnan(course.position_m[0, -1]).all()
-    told = stability.summary(course)
-    assert told["fall_probability"] == 1.0
-    assert told["fall_time_s"]["first"] == ours
+    report = stability.summary(course)
+    assert report["fall_probability"] == 1.0
+    assert report["fall_time_s"]["first"] == ours
     said = stability.warnings(course, 0.0)
     assert "falls in 100 % of the draws" in said[0]
 
@@ -181,8 +181,8 @@ def _fallen_out(d, count, rng):
     # wires as the posterior draws them, through time, commanded the mean wire's lengths; those within the bands count
     some = replace(d.line, parameters={k: rng.choice(v, count) for k, v in d.line.parameters.items()})
     real = draws.for_robot(robot, some)
-    told = inverse.lengths(robot, bare)[0]
-    held = drift.hold(robot, real, told, times, x, R)
+    length_m = inverse.lengths(robot, bare)[0]
+    held = drift.hold(robot, real, length_m, times, x, R)
     ends = np.broadcast_to(held.end.strain(real), (robot.legs, count))
     inside = np.ones(count, bool)
     for v, (a, b) in zip((np.broadcast_to(real.theta["k1"], ends.shape), ends), edges, strict=True):

@@ -106,8 +106,8 @@ def test_drift_is_the_forward_solution_of_the_crept_lengths(name):
     assert course.found.all()
     np.testing.assert_allclose(course.position_m[:, 0], np.tile(robot.home_m, (3, 1)), atol=1e-11)
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
-    told = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
-    bare, offset = inverse.lengths(robot, told.joint_m)
+    commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
+    bare, offset = inverse.lengths(robot, commands.joint_m)
     crept = bare * (1 + course.end.strain(wires).T)
     again = forward.solve(robot, wires, crept, offset, robot.home_m + 0.01, np.eye(3))
     np.testing.assert_allclose(again.position_m, course.position_m[:, 1], atol=1e-11)
@@ -123,16 +123,16 @@ def test_a_hanging_platform_sinks_by_the_creep_of_its_wires():
     wires = draws.for_robot(robot, _line())
     centre = np.array([0.0, 0.0, 1.0])
     tau = 4.0 * 9.80665 / 6 / (2.0 / np.sqrt(4.0 + 12.0))
-    told = inverse.commands(robot, wires, centre[None], np.eye(3)[None], np.full((1, 6), tau))
+    commands = inverse.commands(robot, wires, centre[None], np.eye(3)[None], np.full((1, 6), tau))
     strain = 1e-3 * CORE["B"] * tau ** CORE["U"] * (1 - np.exp(-CORE["k2"] * 60.0 ** CORE["N"]))
     point = replace(robot, freedom="position")
-    course = drift.hold(point, wires, told.joint_m, np.array([60.0]), centre, np.eye(3), follow="start")
+    course = drift.hold(point, wires, commands.joint_m, np.array([60.0]), centre, np.eye(3), follow="start")
     S = np.sqrt(16.0) * (1 + strain)
     # the elastic stretch changes a little as the wires turn
     depth = np.sqrt(S**2 - 12.0)
     for _ in range(20):
         t = 4.0 * 9.80665 / 6 * np.sqrt(12.0 + depth**2) / depth
-        S = told.zero_m[0, 0] * (1 + strain) * (1 + t / CORE["k1"])
+        S = commands.zero_m[0, 0] * (1 + strain) * (1 + t / CORE["k1"])
         depth = np.sqrt(S**2 - 12.0)
     np.testing.assert_allclose(3.0 - course.position_m[0, 0, 2], depth, atol=1e-9)
 

@@ -73,8 +73,8 @@ def test_motor_angles_lead_to_the_pose_and_back():
     robot, line = _with_drums("hangprinter-4"), _line(20)
     wires = draws.for_robot(robot, line)
     x, R = robot.home_m[None] + 0.03, np.eye(3)[None]
-    told = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
-    angle = drums.motor_angle(robot.drums, told.joint_m)
+    commands = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
+    angle = drums.motor_angle(robot.drums, commands.joint_m)
     zero, offset = inverse.lengths(robot, drums.paid_out(robot.drums, angle)[0])
     found = forward.solve(robot, wires, zero, offset, x[0] + 0.01, R[0])
     assert found.found.all()
@@ -88,7 +88,7 @@ def test_motor_angles_lead_to_the_pose_and_back():
     said = [warning for warning in content["warnings"] if "wire_length_m" in warning]
     assert said == ["wire 1 is longer here than its drum's wire_length_m, 1 m"]
     big = claim.scaled(robot, 2.0, robot.mass_kg)
-    np.testing.assert_allclose(drums.motor_angle(big.drums, 2 * told.joint_m), angle)
+    np.testing.assert_allclose(drums.motor_angle(big.drums, 2 * commands.joint_m), angle)
 
 
 def test_a_session_may_give_motor_angles(tmp_path):

@@ -65,7 +65,7 @@ def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amp
     robot, line = schema.read(name), _line(law, effect, amplitudes)
     wires = draws.for_robot(robot, line.centre())
     x, R, tau = _home(robot)
-    told = inverse.commands(robot, wires, x, R, tau)
+    commands = inverse.commands(robot, wires, x, R, tau)
     text = files.mujoco(robot, line)
     assert "tangent stiffness of the home pose, where the wires carry " + f"{tau[0, 0]:.4g}, " in text
     springs = ElementTree.fromstring(text).findall("./tendon/spatial")
@@ -76,8 +76,8 @@ def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amp
 
     def pull(move):
         """Force of all lines of each wire on the platform, its point moved away by `move`."""
-        stretched = robot.lines * (distance + move) + told.offset_m[0]
-        return robot.lines * tension(wires, stretched[:, None], told.zero_m.T)[0][:, 0]
+        stretched = robot.lines * (distance + move) + commands.offset_m[0]
+        return robot.lines * tension(wires, stretched[:, None], commands.zero_m.T)[0][:, 0]
 
     step = 1e-7
     np.testing.assert_allclose(stiffness * (distance - rest), robot.lines * tau[0], rtol=1e-8)

@@ -112,12 +112,12 @@ def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
     robot = schema.read("ipanema-1")
     wires = Wires("hooke", "saturating", {"k1": np.array([[50000.0]])}, np.full((8, 1), 1000.0))
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
-    told = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
-    held = forward.solve(robot, wires, told.zero_m, told.offset_m, robot.home_m, np.eye(3))
+    commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
+    held = forward.solve(robot, wires, commands.zero_m, commands.offset_m, robot.home_m, np.eye(3))
     assert held.found.all()
-    loose = told.zero_m + np.array([1.0, 0, 1, 0, 1, 0, 1, 0])
+    loose = commands.zero_m + np.array([1.0, 0, 1, 0, 1, 0, 1, 0])
     turned = rotation.matrix(np.array([[0.02, 0.01, 0.03]]))
-    found = forward.solve(robot, wires, loose, told.offset_m, robot.home_m + 0.01, turned)
+    found = forward.solve(robot, wires, loose, commands.offset_m, robot.home_m + 0.01, turned)
     assert found.status.tolist() == [forward.NOT_HELD]
     assert found.residual_N[0] < 1e-6
 
@@ -148,11 +148,11 @@ def test_linear_actuator_keeps_its_wire_and_moves_through_the_ratio():
     robot = schema.read("linear-6")
     c = cases.commanded(robot, "hooke", 3, np.random.default_rng(6))
     tau = inverse.tensions(robot, c.position_m, c.rotation)
-    told = inverse.commands(robot, c.wires, c.position_m, c.rotation, tau)
-    np.testing.assert_allclose(told.zero_m, np.broadcast_to(robot.wire_m, told.zero_m.shape))
-    zero, offset = inverse.lengths(robot, told.joint_m)
+    commands = inverse.commands(robot, c.wires, c.position_m, c.rotation, tau)
+    np.testing.assert_allclose(commands.zero_m, np.broadcast_to(robot.wire_m, commands.zero_m.shape))
+    zero, offset = inverse.lengths(robot, commands.joint_m)
     doubled = replace(robot, ratio=2 * robot.ratio)
     half = inverse.commands(doubled, c.wires, c.position_m, c.rotation, tau)
-    np.testing.assert_allclose(half.joint_m, 0.5 * told.joint_m)
+    np.testing.assert_allclose(half.joint_m, 0.5 * commands.joint_m)
     found = forward.solve(robot, c.wires, zero, offset, c.position_m + 1e-3, rotation.matrix(np.zeros(3)))
     assert _distance(robot, found, c.position_m, c.rotation).max() < 1e-9

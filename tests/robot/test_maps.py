@@ -14,8 +14,8 @@ from wirebayes.workflows.pose import _slices
 def test_a_turned_platform_drifts_in_the_map_as_it_does_alone():
     robot, line = schema.read("linear-6"), _line(8)
     wires, turn = draws.for_robot(robot, line), np.array([0.05, -0.03, 0.1])
-    asked = maps.Slices(np.array([0.5, 0.65]), np.stack([np.zeros(3), turn]))
-    level, turned = maps.map_slices(robot, line, asked)
+    slices = maps.Slices(np.array([0.5, 0.65]), np.stack([np.zeros(3), turn]))
+    level, turned = maps.map_slices(robot, line, slices)
     assert np.unique(turned.requested_m[:, 2]).tolist() == [0.5, 0.65]
     assert len(turned.requested_m) == 2 * 49
     for i in (3, len(turned.drift.position_m) - 2):
@@ -35,18 +35,18 @@ def test_slices_and_rows_say_the_same():
     turn = np.array([0.0, 0.9, 0.0])  # too far for some positions
     found = maps.map_slices(robot, line, maps.Slices(np.array([0.4, 0.8]), np.stack([np.zeros(3), turn])))
     table = np.array(maps.rows(found))
-    told = maps.summaries(found)
-    assert len(table) == 2 * 2 * 49 and len(told) == 4
-    assert [(s["at_m"], s["rotation_vector_rad"][1]) for s in told] == [(0.4, 0), (0.8, 0), (0.4, 0.9), (0.8, 0.9)]
+    numbers = maps.summaries(found)
+    assert len(table) == 2 * 2 * 49 and len(numbers) == 4
+    assert [(s["at_m"], s["rotation_vector_rad"][1]) for s in numbers] == [(0.4, 0), (0.8, 0), (0.4, 0.9), (0.8, 0.9)]
     column = {name: table[:, i] for i, name in enumerate(maps.TABLE)}
-    for entry in told:
+    for entry in numbers:
         here = (column["z_m"] == entry["at_m"]) & (column["ry_rad"] == entry["rotation_vector_rad"][1])
         held = here & np.isfinite(column["lowest_tension_N"])
         assert held.sum() / here.sum() == pytest.approx(entry["feasible"])
         if held.any():
             assert column["lowest_tension_N"][held].min() == entry["lowest_tension_N"]
             assert column["probability"][held].mean() == pytest.approx(entry["probability"])
-    assert told[2]["feasible"] < 1 or told[3]["feasible"] < 1
+    assert numbers[2]["feasible"] < 1 or numbers[3]["feasible"] < 1
     assert (column["q05_drift_mm"] <= column["q50_drift_mm"])[column["held"] > 0].all()
 
 
@@ -55,9 +55,9 @@ def test_a_workspace_in_a_plane_has_one_slice():
 
     case = drawn.draw("planar-4", np.random.default_rng(4), count=3, sd=0.01)
     (one,) = maps.map_slices(case.robot, case.line, maps.LEVEL)
-    (told,) = maps.summaries((one,))
-    assert told["axis"] == "xyz"[one.slice_axis] in "xy"
-    assert told["feasible"] > 0
+    (numbers,) = maps.summaries((one,))
+    assert numbers["axis"] == "xyz"[one.slice_axis] in "xy"
+    assert numbers["feasible"] > 0
 
 
 def test_heights_and_rotations_that_mean_nothing_are_refused():

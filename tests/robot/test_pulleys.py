@@ -142,9 +142,9 @@ def test_a_platform_inside_a_pulley_is_not_held():
     assert np.isnan(inverse.tensions(inside, at[None], np.eye(3)[None])).all()
     along = robot.exit_m[3] - [1.0, 0.0, 0.0]  # on the swivel axis: the pulley may turn anyhow
     assert np.isnan(inverse.tensions(inside, along[None], np.eye(3)[None])).all()
-    asked = PoseRequest(at, np.eye(3), np.array([0.0, 60.0]))
+    request = PoseRequest(at, np.eye(3), np.array([0.0, 60.0]))
     line = draws.WireDraws({k: np.ones(3) for k in draws.CORE} | {"k1": np.full(3, 3000.0)}, 1000.0)
-    assert "inside a pulley" in answer(inside, line, asked).content["sentence"]
+    assert "inside a pulley" in answer(inside, line, request).content["sentence"]
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -187,9 +187,9 @@ def fake(draws):
     return state, SimpleNamespace(coordinates=gaussian(d).coordinates, problem=gaussian(d).problem)
 
 
-def looked(draws, **asked):
+def looked(draws, **settings):
     state, target = fake(draws)
-    return kept.looked(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **asked))
+    return kept.looked(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **settings))
 
 
 def test_a_chain_that_gives_enough_draws_is_believed_and_one_with_too_few_is_not():

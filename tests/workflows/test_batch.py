@@ -306,12 +306,12 @@ def test_a_batch_on_a_cluster_is_killed_loses_a_worker_and_goes_on(tmp_path):
             f"import wirebayes as wb; wb.batch({str(file)!r}, discover=False, check=False, policy=wb.{FEW!r}, "
             f"output='out', scheduler={address!r})"
         )
-        asking = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, env={**os.environ, "PYTHONPATH": ROOT})
+        caller = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, env={**os.environ, "PYTHONPATH": ROOT})
         while len(list((tmp_path / "out").glob("*/row.json"))) < 3:
-            assert asking.poll() is None
+            assert caller.poll() is None
             time.sleep(0.05)
-        asking.kill()
-        asking.wait()
+        caller.kill()
+        caller.wait()
         workers[1].kill()
         assert not (tmp_path / "out" / "complete.json").exists()
         wb.batch(file, **QUICK, output=tmp_path / "out", scheduler=address)

@@ -119,13 +119,13 @@ def test_readings_are_planned_again_and_otherwise(measured):
 def test_a_fits_posterior_is_the_guess(fitted, measured, plan_file, tmp_path):
     posterior = wb.load(fitted).draws()["k1"]
     planned = wb.plan(fitted, tests=4)
-    told = planned.summary()["guess"]
-    assert told["source"] == f"the posterior of wire in {fitted.name}"
-    assert told["parameters"]["k1"]["q50"] == pytest.approx(float(sorted(posterior)[len(posterior) // 2]), rel=0.05)
+    guess = planned.summary()["guess"]
+    assert guess["source"] == f"the posterior of wire in {fitted.name}"
+    assert guess["parameters"]["k1"]["q50"] == pytest.approx(float(sorted(posterior)[len(posterior) // 2]), rel=0.05)
     head, _, rest = PLAN.partition("[guess]")
     text = f'{head}posterior = "{fitted}"\n[[protocol]]{rest.partition("[[protocol]]")[2]}'
     plan_file.write_text(text.replace('robot = "linear-7"\n', ""))
-    assert wb.plan(plan_file, tests=4).summary()["guess"]["parameters"] == told["parameters"]
+    assert wb.plan(plan_file, tests=4).summary()["guess"]["parameters"] == guess["parameters"]
 
 
 def test_findings_that_could_not_decide_say_what_to_tell_apart(fitted, tmp_path):

@@ -175,8 +175,8 @@ def _application(called: str | None) -> "typer.Typer":
     # rich_markup_mode None: errors are plain lines, also for a program that reads them
     application = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
 
-    def print_version(asked: bool) -> None:
-        if asked:
+    def print_version(wanted: bool) -> None:
+        if wanted:
             print(f"wirebayes {__version__}")
             raise typer.Exit
 

@@ -27,7 +27,7 @@ from wirebayes.json_files.comparison import (
     PredictionScores,
 )
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
-from wirebayes.prediction.leave_one_hold_out import leave_each_hold_out, standard_error
+from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
 from wirebayes.typing import Floats
 from wirebayes.workers import workers
 
@@ -106,7 +106,9 @@ def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
 
     full = fitted(task.train_holds or recorded)
     again = replace(policy, ess=policy.ess / 2, most_steps=min(policy.most_steps, 400))
-    left = leave_each_hold_out(full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again)
+    left = smoothed_leave_one_hold_out(
+        full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again
+    )
     early = full if task.train_holds else fitted(first)
     content: Judgement = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],

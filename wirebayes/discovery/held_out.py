@@ -122,11 +122,13 @@ def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:
     return None if excess <= 0 else float(1.0 - (final.squares - final.floor) / excess)
 
 
-def leave_one_hold_out(block: LaplaceFit, rng: np.random.Generator) -> Array:
+def truncated_leave_one_hold_out(block: LaplaceFit, rng: np.random.Generator) -> Array:
     """(H,) log predictive density of each recorded hold of a block from all its others, by importance sampling.
 
-    Weights are truncated at the square root of their number; a weight that would need more is a hold that the others
-    do not predict, which its small density says already.
+    A search scores many fits by rough draws about their modes: there is no time for refits, and a tail fitted to such
+    draws would say little. Weights are truncated at their mean times the square root of their number (Ionides 2008); a
+    weight that would need more is a hold that the others do not predict, which its small density says already.
+    Posteriors are scored by `wirebayes.prediction.leave_one_hold_out.smoothed_leave_one_hold_out`.
     """
     problem, theta = _draws(block, rng, 1500)
     values = np.concatenate(

@@ -153,7 +153,7 @@ def _gain(
     fits: Sequence[LaplaceFit], named: int, n: int, remains: bool, rng: np.random.Generator, parallel_map: ParallelMap
 ) -> _Gain:
     """Leave out each hold of the fits: plain, with the effects (`named` is 1 or 0), then n of each smooth lot."""
-    elpd = list(parallel_map(held_out.leave_one_hold_out, fits, rng.spawn(len(fits))))
+    elpd = list(parallel_map(held_out.truncated_leave_one_hold_out, fits, rng.spawn(len(fits))))
     plain, smooth = elpd[0], np.concatenate(elpd[1 + named : 1 + named + n])
     difference = (np.concatenate(elpd[-n:]) if remains else elpd[1]) - plain
     spread = float(difference.std(ddof=1) * np.sqrt(len(difference)))

@@ -194,7 +194,7 @@ def _gain(
     before = plain if earlier is None else earlier.blocks
     on = list(best.accepted[-1].blocks)
     fits = [version[b] for version in (best.blocks, before) for b in on]
-    elpd = [float(v.sum()) for v in parallel_map(held_out.leave_one_hold_out, fits, rng.spawn(len(fits)))]
+    elpd = [float(v.sum()) for v in parallel_map(held_out.truncated_leave_one_hold_out, fits, rng.spawn(len(fits)))]
     out = np.zeros(len(plain))
     out[on] = np.subtract(elpd[: len(on)], elpd[len(on) :])
     return out

@@ -35,7 +35,7 @@ class MotorAngles(TypedDict):
 
 
 class InverseKinematics(TypedDict):
-    """What the pose asks of the wires."""
+    """What the pose requires of the wires."""
 
     tension_N: Numbers
     zero_tension_length_m: Band
@@ -146,7 +146,7 @@ class Stability(FallsReport):
 
 
 class ClaimHolds(TypedDict):
-    """Probability that the paper's figures are kept; None where its time was not asked for."""
+    """Probability that the paper's figures are kept; None where its time was not requested."""
 
     specimen_spread: float
     probability: float | None

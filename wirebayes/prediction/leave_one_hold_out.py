@@ -84,7 +84,7 @@ def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
     return float(gained.sum()), standard_error(gained)
 
 
-def leave_each_hold_out(
+def smoothed_leave_one_hold_out(
     fitted: Fit,
     seed: int = 0,
     *,
@@ -92,7 +92,10 @@ def leave_each_hold_out(
     exact: bool = False,
     progress: Callable[[float], None] = lambda share: None,
 ) -> LeftOut:
-    """Leave out each recorded hold in turn.
+    """Leave out each recorded hold in turn, by Pareto-smoothed importance sampling and refits where it fails.
+
+    For converged draws of a posterior, whose weights' tail says whether they can be trusted and where a refit is worth
+    its time. The rough draws of a search are scored by `wirebayes.discovery.held_out.truncated_leave_one_hold_out`.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     def complain(row: int, role: str, found: str, expected: str) -> InputError:
         return table.complain(table.rows[row].line, columns[role].index, found, expected)  # type: ignore[index]
 
-    hold, told = _hold_numbers(table, columns.get("hold"), decimal)
+    hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
     step = evident_step(texts["displacement"]) or 0.0
     unit = columns["displacement"].unit
     readings = Readings(
@@ -134,7 +134,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     )  # fmt: skip
     holds = cut(readings, choices.time_since)
     holds, thin = _thin(holds)
-    notes += told + holds.notes + thin + _missing_holds(holds)
+    notes += numbering + holds.notes + thin + _missing_holds(holds)
     resolution = _resolution(columns["tension"], texts["tension"])
     if resolution:
         notes.append(f"tensions are written in steps of {resolution:g} N: that is their resolution")

@@ -73,6 +73,6 @@ def motor_angle(drums: Drums, length_m: Floats) -> Floats:
 
 
 def emptied(drums: Drums, length_m: Floats) -> list[int]:
-    """Legs, from 0, of whose layered drums more wire is asked, ``(..., w)`` m, than there is."""
+    """Legs, from 0, whose layered drums would need more wire, ``(..., w)`` m, than there is."""
     most = length_m.reshape(-1, len(drums.radius_m)).max(0)
     return [int(i) for i in np.flatnonzero(np.isfinite(drums.layer_turns) & (most > drums.wire_m))]

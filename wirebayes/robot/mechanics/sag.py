@@ -14,9 +14,9 @@ from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.typing import Floats
 
-# Weight by tension from which on sag is told: a level wire is then longer than its chord by a ten-thousandth, which is
-# as much as minutes of creep.
-_TOLD = 0.05
+# Weight by tension from which on sag is reported: a level wire is then longer than its chord by a ten-thousandth, as
+# much as minutes of creep.
+_REPORTED = 0.05
 
 
 def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> tuple[Floats, Floats, Floats]:
@@ -55,7 +55,7 @@ def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floa
         Empty where no wire's weight matters.
     """
     share, depth, extra = sag(robot, position_m, rotation, tension_N)
-    heavy = np.flatnonzero(share > _TOLD)
+    heavy = np.flatnonzero(share > _REPORTED)
     if not heavy.size:
         return []
     i = int(heavy[np.argmax(extra[heavy])])

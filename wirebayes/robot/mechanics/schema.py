@@ -86,7 +86,7 @@ class _Table:
         self.where, self.path = where, path
         if not isinstance(content, dict):
             raise InputError(f"{where}: {path or 'file'}: expected a table, found {_kind(content)}")
-        self.content, self.asked = content, set[str]()
+        self.content, self.known = content, set[str]()
 
     def fail(self, key: str, found: str, expected: str) -> InputError:
         """The error for one key of the table; the caller raises it.
@@ -111,7 +111,7 @@ class _Table:
         default : any, optional
             For a key that is missing; without a default that is an error.
         """
-        self.asked.add(key)
+        self.known.add(key)
         if key not in self.content:
             if default is None:
                 raise self.fail(key, "found nothing", expected)
@@ -175,8 +175,8 @@ class _Table:
 
     def finish(self) -> None:
         for key in self.content:
-            if key not in self.asked:
-                raise self.fail(key, "found an unknown key", "one of " + ", ".join(sorted(self.asked)))
+            if key not in self.known:
+                raise self.fail(key, "found an unknown key", "one of " + ", ".join(sorted(self.known)))
 
 
 def _robot(t: _Table) -> Robot:

@@ -281,7 +281,7 @@ def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArra
     done = positive & (damping == 0) & (balanced | (accept & (length < 1e-9 * size)))
     loose = balanced & ~positive & (damping == 0)
     next_damping = np.where(accept, calmer, np.maximum(1e-3, damping * 10))
-    next_damping = np.where(balanced, 0.0, next_damping)  # so that the next step asks the bare stiffness
+    next_damping = np.where(balanced, 0.0, next_damping)  # so that the next step uses the bare stiffness
     lost, stuck = np.abs(x).max(0) > reach, next_damping > 1e12
     ended = np.select([lost, done, loose, stuck], [NO_EQUILIBRIUM, FOUND, NOT_HELD, NOT_CONVERGED], _GOING_ON)
     return replace(cases, x=x, R=R, at=at, damping=next_damping), ended

@@ -110,7 +110,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
 
 
 def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible: bool) -> PoseJson:
-    """What was asked of which robot and wires."""
+    """The request, the robot and the wires."""
     return {
         "version": 1,
         "robot": robot.name,

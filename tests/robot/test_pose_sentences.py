@@ -104,16 +104,16 @@ def test_a_time_within_tolerance_is_the_last_one_where_it_holds_the_probability(
     """Distances grow by a millimetre a time in every draw; the angle leaves its tolerance earlier."""
     times = np.array([0.0, 1.0, 10.0, 100.0])
     error = control.PoseError(times, np.tile([0.0, 1e-3, 2e-3, 3e-3], (20, 1)), np.zeros((20, 4)), np.ones(20, bool))
-    asked = PoseRequest(np.zeros(3), np.eye(3), times, 2.5e-3, 0.01)
-    assert controllers._lasts(error, asked) == {"longest_time_within_s": 10.0, "still_within_at_the_end": False}
+    request = PoseRequest(np.zeros(3), np.eye(3), times, 2.5e-3, 0.01)
+    assert controllers._lasts(error, request) == {"longest_time_within_s": 10.0, "still_within_at_the_end": False}
     always = PoseRequest(np.zeros(3), np.eye(3), times, 3.5e-3, 0.01)
     assert controllers._lasts(error, always) == {"longest_time_within_s": 100.0, "still_within_at_the_end": True}
     error.angle_rad[:2, 1] = 0.02  # a tenth of the draws
-    assert controllers._lasts(error, asked)["longest_time_within_s"] == 0.0
+    assert controllers._lasts(error, request)["longest_time_within_s"] == 0.0
     error.angle_rad[1, 1] = 0.0  # one draw of twenty: 95 % are left
-    assert controllers._lasts(error, asked)["longest_time_within_s"] == 10.0
-    told = controllers._tolerances(PoseRequest(np.zeros(3), np.eye(3), times, 2e-3, np.radians(0.5)))
-    assert told == {"tolerance_mm": 2.0, "tolerance_deg": pytest.approx(0.5)}
+    assert controllers._lasts(error, request)["longest_time_within_s"] == 10.0
+    tolerances = controllers._tolerances(PoseRequest(np.zeros(3), np.eye(3), times, 2e-3, np.radians(0.5)))
+    assert tolerances == {"tolerance_mm": 2.0, "tolerance_deg": pytest.approx(0.5)}
 
 
 def at(distance_m: Any, tilt_rad: Any, times_s: Any = (0.0, 60.0)) -> Any:
@@ -130,8 +130,8 @@ def test_the_paper_s_figures_hold_in_the_draws_that_keep_both() -> None:
     d, t = DISTANCE_M, TILT_RAD
     alike = at(np.array([0.9 * d, 0.9 * d, 1.1 * d, NAN]), np.array([0.9 * t, 1.1 * t, 0.5 * t, NAN]))
     other = at(np.array([0.1 * d] * 4), np.zeros(4), (0.0, 30.0))
-    asked: Any = None
-    found = answer._claim({0.0: alike, 0.05: other}, np.zeros(3), np.eye(3), asked)
+    request: Any = None
+    found = answer._claim({0.0: alike, 0.05: other}, np.zeros(3), np.eye(3), request)
     assert found["holds"] == [{"specimen_spread": 0.0, "probability": 0.25}, {"specimen_spread": 0.05,
                                                                              "probability": None}]  # fmt: skip
     # section 4 of the paper: 0.3 mm and 0.055° within a minute
