@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import wirebayes as wb
+from wirebayes.cli import COMMANDS
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAPER = DOCS.parent / "data" / "paper"
@@ -41,6 +42,24 @@ def ran(examples: doctest.DocTest) -> list[str]:
 
 def test_the_page_from_python_runs_as_shown(shared):
     assert not shared[2], "".join(shared[2])
+
+
+CALLED_OTHERWISE = {
+    "import": "import_bench", "init": "new_experiment", "simulate": "simulate_tests", "effects": "list_effects",
+    "report": "write_report", "import-robot": "import_robot", "reproduce": "reproduce_paper",
+}  # fmt: skip
+MINUTES = {"reproduce"}  # shown on the page, too long to run
+MOST_LINES = 10
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_page_does_what_a_command_does_in_ten_lines(command: str) -> None:
+    function = f"wb.{CALLED_OTHERWISE.get(command, command)}("
+    page = (DOCS / "python.rst").read_text(encoding="utf-8")
+    examples = [e.source for e in doctest.DocTestParser().get_examples(page)]
+    calls = [source for source in examples if function in source]
+    assert function in page and (calls or command in MINUTES)
+    assert all(len(source.splitlines()) <= MOST_LINES for source in calls)
 
 
 @pytest.mark.parametrize("name", PUBLIC)

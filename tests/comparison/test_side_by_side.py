@@ -102,7 +102,7 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
 ) -> None:
     """All holds are left out in turn, and the last four of twelve held out; a given number of holds serves both."""
     made: list[int] = []
-    asked: dict[str, object] = {}
+    received: dict[str, object] = {}
 
     def fit(problem: object, seed: int, policy: object) -> object:
         holds = int(problem.samples[0].protocol.recorded.sum())  # type: ignore[attr-defined]
@@ -111,7 +111,7 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
         return SimpleNamespace(problem=problem, chains=chains, holds=holds)
 
     def leave(full: object, seed: int, policy: Policy) -> object:
-        asked.update(full=full.holds, ess=policy.ess, steps=policy.most_steps)  # type: ignore[attr-defined]
+        received.update(full=full.holds, ess=policy.ess, steps=policy.most_steps)  # type: ignore[attr-defined]
         nothing = np.zeros(2)
         return SimpleNamespace(hold=np.array([1, 2]), total=3.0, se=1.0, elpd=nothing, pareto_k=nothing,
                                refitted=np.array([False, True]), converged=False)  # fmt: skip
@@ -123,7 +123,7 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
     found = compare._scores(Task(experiments()[1], PLAIN, train_holds), 0, Policy(ess=600.0, most_steps=1000))
     assert made == fits and found["held_out"]["found"] == (early, 12)
     # the refits without a hold need half the draws and are cut off earlier
-    assert asked == {"full": fits[0], "ess": 300.0, "steps": 400}
+    assert received == {"full": fits[0], "ess": 300.0, "steps": 400}
     assert found["leave_one_hold_out"]["refitted"].tolist() == [2]
     assert found["converged"] is False  # one of three samplings was not
     assert found["effects"] == [] and found["parameters"] == 8

@@ -11,7 +11,13 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
-from wirebayes.prediction.leave_one_hold_out import LeftOut, difference, smoothed_leave_one_hold_out, log_mean, without_hold
+from wirebayes.prediction.leave_one_hold_out import (
+    LeftOut,
+    difference,
+    log_mean,
+    smoothed_leave_one_hold_out,
+    without_hold,
+)
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 
@@ -75,13 +81,13 @@ def test_log_mean_is_the_normalising_constant_of_a_normal(centre: float, width: 
         return -0.5 * ((x - centre) / width) ** 2
 
     weighted = variance * centre / width**2 + np.sqrt(variance) * rng.normal(size=(400, 3000))
-    told = [log_mean(log_p(rng.normal(size=4000)), log_p(draws)) for draws in weighted]
+    estimates = [log_mean(log_p(rng.normal(size=4000)), log_p(draws)) for draws in weighted]
     truth = 0.5 * np.log(width**2 / (1.0 + width**2)) - 0.5 * centre**2 / (1.0 + width**2)
     # the estimate is unbiased in the mean itself; 5 standard errors of 400 runs
-    shares = np.exp(np.array(told) - truth)
+    shares = np.exp(np.array(estimates) - truth)
     assert abs(shares.mean() - 1.0) < 5.0 * shares.std() / 20.0 + 0.01
     plain = [np.log(np.exp(log_p(rng.normal(size=4000))).mean()) for _ in range(400)]
-    assert np.std(told) < (0.7 * np.std(plain) if centre else 0.01)
+    assert np.std(estimates) < (0.7 * np.std(plain) if centre else 0.01)
 
 
 def test_log_mean_bears_draws_where_the_density_is_zero() -> None:

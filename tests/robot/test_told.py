@@ -172,8 +172,8 @@ def hung() -> Any:
 
 
 def test_a_calibration_lasts_longer_on_wires_that_crept_before_or_are_compensated(hung: Any) -> None:
-    robot, line, asked = hung
-    rows = controllers.between_calibrations(robot, line, asked, np.random.default_rng(1))
+    robot, line, request = hung
+    rows = controllers.between_calibrations(robot, line, request, np.random.default_rng(1))
     lasts = {(r["specimen_spread"], r["loaded_before_s"], r["controller"]): r["longest_time_within_s"] for r in rows}
     ways = ("held_still", "creep_aware")
     assert set(lasts) == {(s, h, c) for s in (0.0, 0.1) for h in (0.0, 3600.0) for c in ways}
@@ -183,23 +183,23 @@ def test_a_calibration_lasts_longer_on_wires_that_crept_before_or_are_compensate
         assert lasts[spread, 0.0, "held_still"] < lasts[spread, 0.0, "creep_aware"]
     # held still from the first moment on, the platform drifts as a command's does
     times = np.geomspace(1.0, 1e5, 41)[:20]
-    course = drift.from_command(robot, draws.for_robot(robot, line), asked.position_m, asked.rotation, times)
-    away = np.linalg.norm(course.position_m - asked.position_m, axis=-1)
+    course = drift.from_command(robot, draws.for_robot(robot, line), request.position_m, request.rotation, times)
+    away = np.linalg.norm(course.position_m - request.position_m, axis=-1)
     within = (away < 0.3e-3).mean(axis=0) >= 0.95
     assert lasts[0.0, 0.0, "held_still"] == pytest.approx(times[np.argmin(within) - 1])
 
 
 def test_a_controller_that_knows_creep_is_nearer_after_a_minute(hung: Any) -> None:
-    robot, line, asked = hung
+    robot, line, request = hung
     less = draws.WireDraws(line.parameters | {"B": 0.5 * line.parameters["B"]}, 1000.0)
-    found = controllers.errors(robot, line, asked, np.random.default_rng(1), less)
+    found = controllers.errors(robot, line, request, np.random.default_rng(1), less)
     error = {(r["specimen_spread"], r["controller"]): r["distance_mm"]["q50"] for r in found}
     names = ("hooke_only", "creep_aware_other_fit", "creep_aware")
     assert set(error) == {(s, c) for s in (0.0, 0.1) for c in names}
     worst, half, best = (error[0.0, name] for name in names)
     assert worst[0] == pytest.approx(half[0]) == pytest.approx(best[0])  # no wire has crept yet
     assert worst[1] > half[1] > best[1]
-    assert len(controllers.errors(robot, line, asked, np.random.default_rng(1))) == 4
+    assert len(controllers.errors(robot, line, request, np.random.default_rng(1))) == 4
 
 
 def test_a_leg_without_a_drum_leaves_no_gap_in_the_others() -> None:
