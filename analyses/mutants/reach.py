@@ -22,7 +22,7 @@ TESTS = {
     "prediction": _files("prediction", "held_out left_out pit_band predictive table"),
     "comparison": ["tests/comparison"],
     "discovery": _files("discovery", "explore global_test held_out model_space name_evidence power refit sharing "
-                                     "settings shrinking stepwise subsets thresholds verdict"),
+                                     "settings shrinking subsets thresholds verdict"),
     "robot": _files("robot", "answer control forward statics tensions told"),
     "robot/proof": _files("robot", "certificate reach"),
 }  # fmt: skip

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wirebayes.discovery import stepwise
 from wirebayes.discovery.model_space import EffectSet, log_prior
@@ -119,3 +120,29 @@ def test_credit_beside_a_remainder_is_that_of_the_best_form(monkeypatch: pytest.
     found = stepwise._credits(["x", "y"], trials)  # type: ignore[list-item]
     assert found["a"] == pytest.approx(np.array([5.0, 4.0]) + occam(True))
     assert found["b"] == pytest.approx(np.array([3.0, 0.0]) + occam(False))
+
+
+def corrected(
+    sd: float = 2.0, unit: float | None = 0.5, known: dict[str, Any] | None = None, theta: float = 3.0
+) -> float:
+    """A refit of b beside a, whose amplitude moved from 1 to `theta` and has a normal prior."""
+    a, b = (SimpleNamespace(key=n, columns=lambda n=n: (n,)) for n in "ab")
+    before = SimpleNamespace(names=("k1", "a"), prior=SimpleNamespace(distributions={"a": stats.norm(0.0, 2.0)}))
+    beside = SimpleNamespace(names=("k1", "b", "a"))
+    target = SimpleNamespace(problem=before, coordinates=SimpleNamespace(to_natural=lambda z: z))
+    block = SimpleNamespace(target=target, modes=SimpleNamespace(z=np.array([[900.0, 1.0], [0.0, 9.0]])), effects=(a,),
+                            experiments=[SimpleNamespace(priors=known or {})],
+                            problem_with=lambda effect: beside)  # fmt: skip
+    found: Any = SimpleNamespace(effect=b, blocks=(0,), sd=sd, theta=(np.array([900.0, 0.1, theta]),))
+    units: Any = {} if unit is None else {("b", (0,)): unit}
+    return stepwise._to_plain_prior(found, [block], units)  # type: ignore[list-item]
+
+
+def test_priors_of_a_chain_are_those_of_the_plain_fit() -> None:
+    """What b's amplitude gains in width, and what a's prior density loses: e^(-1/8) before, e^(-9/8) after."""
+    assert corrected() == pytest.approx(np.log(2.0 / 0.5) + 1.0)
+    assert corrected(unit=None) == corrected(sd=0.0) == corrected(unit=0.0) == pytest.approx(1.0)
+    assert corrected(theta=1.0) == pytest.approx(np.log(4.0))
+    # what other materials know of a shared amplitude is no prior of this kind
+    assert corrected(known={"a": {}}) == pytest.approx(np.log(4.0))
+    assert corrected(theta=np.inf) == pytest.approx(np.log(4.0))  # a place that the prior excludes says nothing
