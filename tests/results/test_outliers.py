@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wirebayes.results import outliers as module
 from wirebayes.results.outliers import FALSE_ALARMS, outliers, robust_z, threshold
@@ -59,6 +60,29 @@ def test_a_low_specimen_lies_below_and_the_farthest_comes_first():
     assert "below the median" in found[0].sentence and found[0].z < 0
 
 
+@pytest.mark.parametrize(("distance", "far"), [(0.95, False), (1.05, True)])
+def test_specimens_that_agree_are_judged_by_the_width_of_the_posterior(distance, far):
+    """Seven agree, each known to a tenth; the eighth lies so many times the threshold of that tenth away."""
+    away = np.exp(0.1 * distance * threshold(8, 2))
+    same = [row(f"s{i}", 1000.0, sd=0.1) for i in range(7)]
+    assert bool(outliers([*same, row("odd", 1000.0 * away, sd=0.1)])) is far
+    assert bool(outliers([*same, row("odd", 1000.0 / away, sd=0.1)])) is far
+
+
+def test_positive_parameters_are_compared_by_their_logarithms_others_as_they_are():
+    """Stiffnesses spread by a factor: a hundredth lies far, though by its difference it would be among the others."""
+    spread = [row(f"s{i}", 1000.0 * np.exp(0.4 * z)) for i, z in enumerate(np.linspace(-2.0, 2.0, 21))]
+    assert [o.experiment for o in outliers([*spread, row("soft", 10.0)])] == ["soft"]
+
+    def offset(name, at):
+        quantiles = {"q05": at - 0.01, "q50": at, "q95": at + 0.01}
+        return {"name": name, "material": "line", "length_mm": 1.0, "parameters": {"offset": quantiles}}
+
+    even = [offset(f"s{i}", at) for i, at in enumerate(np.linspace(-1.0, 1.0, 21))]
+    assert not outliers(even)
+    assert [o.experiment for o in outliers([*even, offset("odd", 9.0)])] == ["odd"]
+
+
 def test_a_robust_z_is_the_distance_in_expected_distances():
     """Nine values whose median absolute deviation is one, each known to 0.5, one of them badly."""
     values = np.array([-4.0, -3.0, -1.0, -0.5, 0.0, 0.5, 1.0, 3.0, 4.0])
@@ -88,6 +112,11 @@ def share_of_false_alarms(specimens, sets=10_000):
 def test_the_share_of_false_alarms_is_what_is_said(specimens):
     # eight parameters of a material; 10,000 sets tell the share of one to .0008
     assert 0.5 * FALSE_ALARMS / 8 < share_of_false_alarms(specimens) < 1.5 * FALSE_ALARMS / 8
+
+
+def test_both_tails_of_every_specimen_and_parameter_share_the_risk():
+    one_tail = stats.t.sf(threshold(12, 8), 1.0 + module.MAD_EFFICIENCY * 12)
+    assert 2 * one_tail * 12 * 8 == pytest.approx(FALSE_ALARMS)
 
 
 def test_the_share_would_be_seen_to_be_wrong(monkeypatch):
