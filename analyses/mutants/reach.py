@@ -23,7 +23,9 @@ TESTS = {
     "comparison": ["tests/comparison"],
     "discovery": _files("discovery", "explore global_test held_out model_space name_evidence power refit sharing "
                                      "settings shrinking subsets thresholds verdict"),
-    "robot": _files("robot", "answer control forward statics tensions told"),
+    "robot/mechanics": _files("robot", "statics tensions"),
+    "robot/motion": _files("robot", "forward"),
+    "robot/pose": _files("robot", "answer told"),
     "robot/proof": _files("robot", "certificate reach"),
 }  # fmt: skip
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant

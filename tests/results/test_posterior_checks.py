@@ -99,6 +99,13 @@ def test_exact_thresholds_of_a_silent_check(simulated):
     assert posterior_checks.loose_steps({k: v for k, v in own.items() if k != "setting_sd"}, sample) == ""
 
 
+def test_readings_that_do_not_differ_are_not_called_noisy(simulated):
+    """No tension at all, or one and the same: the check before the fit names that."""
+    sample = simulated.problem.samples[0]
+    same = replace(sample, readings=np.full_like(sample.readings, 2.0))
+    assert posterior_checks.noise(draws(simulated.problem), same) == ""
+
+
 @pytest.mark.parametrize(("share", "named"), [(1.9, True), (2.1, False)])
 def test_an_error_finer_than_a_load_cell_resolves_is_no_noise(simulated, share, named):
     sample = replace(simulated.problem.samples[0], resolution_N=0.0)
