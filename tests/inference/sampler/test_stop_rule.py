@@ -8,10 +8,10 @@ import pytest
 from tests.statistical.targets import gaussian
 from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import burn_in, kept
+from wirebayes.inference.sampler import burn_in, ensemble, kept
 from wirebayes.inference.sampler.kept import OUTWEIGHS
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.state import Diagnostics, Kept, Learned, Sampling, Walkers
+from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, Walkers
 
 ENSEMBLES, WALKERS, D = 4, 32, 3
 EASY = {"ensembles": ENSEMBLES, "walkers": WALKERS, "ess": 1.0, "r_hat": 10.0, "most_steps": 4000}
@@ -223,3 +223,13 @@ def test_a_positive_parameter_is_judged_by_its_logarithm(unit: float) -> None:
     target.coordinates.to_natural = lambda z: unit * np.exp(z)
     found = kept._diagnosed(target, by_ensemble(z))  # type: ignore[arg-type]
     assert found.r_hat == pytest.approx(expected.r_hat) and found.ess == pytest.approx(expected.ess)
+
+
+def test_progress_counts_burn_in_as_a_fifth_and_then_effective_draws() -> None:
+    """From nothing to all, never beyond, however many rounds burn-in takes."""
+    policy = Policy(rounds=4, ess=1000.0)
+    rounds = [ensemble._share(BurnIn(None, Learned(None, None, 1), None, 0, n), policy) for n in (0, 1, 4, 9)]  # type: ignore[arg-type]
+    assert rounds == pytest.approx([0.0, 0.05, 0.2, 0.2])
+    kept_draws = [ensemble._share(after(100, ess), policy) for ess in (1.0, 500.0, 1000.0, 4000.0)]
+    assert kept_draws == pytest.approx([0.2008, 0.6, 1.0, 1.0])
+    assert ensemble._share(replace(after(100, 1.0), diagnostics=None), policy) == pytest.approx(0.2)
