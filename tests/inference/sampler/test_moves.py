@@ -79,6 +79,16 @@ def test_steps_that_moved_are_counted_and_the_steps_between_are_spread_evenly():
     assert np.array_equal(sampler.get_log_prob(), -0.5 * chain**2)
 
 
+class Round:
+    """A round cloud is straight already."""
+
+    def forward(self, x):
+        return x, np.zeros(len(x))
+
+    def inverse(self, u):
+        return u
+
+
 def squared_jumps(before, proposed, log_factor, target):
     """Mean squared distance a Metropolis step goes, refusals counted as zero."""
     accepted = np.minimum(0.0, target(proposed) - target(before) + log_factor)
@@ -98,17 +108,23 @@ def test_steps_of_differential_evolution_are_nearly_the_best_length(dimensions, 
     step = random.normal(size=(n, dimensions))
     walks = [squared_jumps(x, x + length * step, 0.0, target) for length in np.geomspace(0.05, 3.0, 60)]
 
-    class Round:  # a round cloud is straight already
-        def forward(self, x):
-            return x, np.zeros(len(x))
-
-        def inverse(self, u):
-            return u
-
     move = EvolutionMove(1, Round() if straightened else None)
     found = squared_jumps(x, *move.get_proposal(x, [others], random), target)
     # the rest is spent on steps from mode to mode, or on short ones
     assert found > 0.7 * max(walks)
+
+
+def test_half_of_the_straightened_steps_serve_a_walker_whom_long_ones_do_not():
+    """On a target half as wide as the cloud of walkers, against steps that are all as long as the cloud asks for."""
+    random, n, dimensions = np.random.RandomState(2), 20_000, 8
+
+    def target(x):
+        return -0.5 * np.sum((2.0 * x) ** 2, axis=1)
+
+    x, others = 0.5 * random.normal(size=(n, dimensions)), random.normal(size=(n, dimensions))
+    long = x + 2.38 / np.sqrt(dimensions) * random.normal(size=(n, dimensions))
+    found = squared_jumps(x, *EvolutionMove(1, Round()).get_proposal(x, [others], random), target)
+    assert found > 1.3 * squared_jumps(x, long, 0.0, target)
 
 
 def test_without_straightening_some_steps_lead_from_mode_to_mode():
