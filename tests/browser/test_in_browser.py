@@ -4,6 +4,7 @@ Nothing is cut off or overlaps, nothing is asked from outside, nothing is said o
 with contrast, names and order, tables are sorted and robots turned by the keyboard.
 """
 
+import csv
 import json
 import os
 import re
@@ -101,6 +102,7 @@ def commands_of(folder: Path) -> None:
     wb.plan(tests[0], tests=20, output=folder / "plan")
     wb.batch(tests, discover=False, check=False, policy=few, output=folder / "batch")
     wb.pose("linear-7", fitted, times=[0, 60, 600], draws=40, output=folder / "pose")
+    poses_over_time(folder, fitted)
     wb.export("hangprinter-4", fitted, draws=50, output=folder / "export")
     rows = ["Weg [mm];Zeit [s];Kraft [N]", "1,5;0;2,12", "1,5;30;1,91", "1,5;60;1,86", "3,0;0;4,02", "3,0;45;3,88"]
     (folder / "bench.csv").write_text("\n".join(rows))
@@ -110,9 +112,32 @@ def commands_of(folder: Path) -> None:
         write(folder / name)
 
 
+def poses_over_time(folder: Path, wires) -> None:
+    """Commanded poses with a payload, and a log of the same with everything that can be measured."""
+    import wirebayes as wb
+
+    moved = wb.pose("linear-7", wires, trajectory=WAY, draws=10, output=folder / "pose-trajectory").folder
+    columns: dict[str, list[float]] = {}
+    for name in ("poses.csv", "corrections.csv"):
+        with (moved / name).open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        columns |= {key: [float(row[key]) for row in rows] for key in rows[0]}
+    log = dict(WAY)
+    for i in range(1, 8):
+        corrected, change_mm = columns[f"joint_{i}_m"], columns[f"change_{i}_mm"]
+        log[f"joint_{i}_m"] = [joint - 1e-3 * change for joint, change in zip(corrected, change_mm, strict=True)]
+        log[f"tension_{i}_N"] = columns[f"tension_{i}_N"]
+    nothing = dict.fromkeys(("rx_rad", "ry_rad", "rz_rad", "roll_deg", "pitch_deg"), [0.0] * 5)
+    wb.pose("linear-7", wires, joints=log | nothing, draws=10, output=folder / "pose-joints")
+
+
+WAY = {
+    "time_s": [0, 60, 600, 660, 3600], "x_m": [0, 0.1, 0.1, -0.1, -0.1], "y_m": [0, 0, 0, 0.05, 0.05],
+    "z_m": [0.6, 0.6, 0.6, 0.65, 0.65], "payload_kg": [0, 0.2, 0.2, 0, 0],
+}  # fmt: skip
 KINDS = (
     "reproduce", "batch", "calibrate", "check", "compare", "discover", "export", "fit", "import", "plan", "pose",
-    "simulate",
+    "pose-joints", "pose-trajectory", "simulate",
 )  # fmt: skip
 
 

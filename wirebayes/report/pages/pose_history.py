@@ -35,6 +35,7 @@ _FILES = (
 )
 _WIDE = ("poses",)
 _ROWS = 12  # of the tables on the page
+_SMALLEST_MM = 1e-4  # less is shown as nothing: a tenth of what a dial gauge resolves, and often only rounding
 
 
 def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> Page:
@@ -124,7 +125,7 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
     clock = pose["clock"]
     loose.append(
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
-        f"differ by {number(clock['largest_mm'])} mm at most, {number(clock['at_the_end_mm'])} mm at the end."
+        f"differ by {_mm(clock['largest_mm'])} mm at most, {_mm(clock['at_the_end_mm'])} mm at the end."
     )
     if not pose["history"].get("reference_sd_mm") and pose["history"]["kind"] == "measured":
         loose.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")
@@ -149,10 +150,9 @@ def _poses(pose: dict[str, Any]) -> list[Block]:
         cells = []
         for axis in range(3):
             middle, sd = (None if place[q] is None else place[q][i][axis] for q in ("q50", "sd"))
-            cells += [_metres(middle), number(None if sd is None else 1e3 * sd)]
-        far = drift["distance_mm"]
-        lines.append([number(float(drift["times_s"][i]), 6), *cells, number(far["q50"][i]),
-                      span(far["q05"][i], far["q95"][i])])  # fmt: skip
+            cells += [_metres(middle), _mm(None if sd is None else 1e3 * sd)]
+        low, far, high = (drift["distance_mm"][q][i] for q in ("q05", "q50", "q95"))
+        lines.append([_seconds(drift["times_s"][i]), *cells, _mm(far), f"{_mm(low)} … {_mm(high)}"])
     header = ["time, s", "x, m", "sd, mm", "y, m", "sd, mm", "z, m", "sd, mm", "distance, mm", "90 %"]
     return [Table(header, lines, "Some of the rows; all of them, with bands and rotations: poses.csv.")]
 
@@ -162,6 +162,15 @@ def _metres(value: float | None) -> str:
     return "–" if value is None else f"{value:z.6f}".replace("-", "−")
 
 
+def _mm(value: float | None) -> str:
+    return number(0.0 if value is not None and abs(value) < _SMALLEST_MM else value)
+
+
+def _seconds(time: float) -> str:
+    """A row's time without zeros that nobody wrote."""
+    return f"{time:,.3f}".rstrip("0").rstrip(".").replace(",", "\u202f")
+
+
 def _corrections(pose: dict[str, Any]) -> list[Block]:
     change = pose["corrections"]["change_mm"]
     if not change["mean"]:
@@ -169,8 +178,8 @@ def _corrections(pose: dict[str, Any]) -> list[Block]:
     times, joints = pose["corrections"]["times_s"], range(len(change["mean"][0]))
     lines = [
         [
-            number(float(times[i]), 6),
-            *(f"{number(change['mean'][i][j])} ± {number(change['sd'][i][j])}" for j in joints),
+            _seconds(times[i]),
+            *(f"{_mm(change['mean'][i][j])} ± {_mm(change['sd'][i][j])}" for j in joints),
         ]
         for i in _shown(times)
     ]
