@@ -13,6 +13,7 @@ from wirebayes.cli import main
 from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import plain
+from wirebayes.model.prior import wire_defaults
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, schema
 from wirebayes.robot.mechanics.wires import tension
@@ -148,6 +149,39 @@ def test_lines_of_two_laws_are_refused(fitted, monkeypatch):  # noqa: F811
     assert both.name == "a"
     assert sorted(both.others["b"].parameters["k1"]) == sorted(both.parameters["k1"])
     assert (both.others["b"].parameters["k1"] != both.parameters["k1"]).any()
+
+
+def test_legs_are_new_specimens_where_several_were_tested():
+    robot = _mixed(schema.read("linear-6"), (1, 4))
+    rng, n = np.random.default_rng(0), 4000
+    spread = {name: np.full(n, 0.02 * (i + 1)) for i, name in enumerate(draws.CORE)}
+    line = replace(_line(n, sd=0.0), spread=spread, specimens=3, others={THICK: replace(_line(n, sd=0.0), name=THICK)})
+    wires = draws.for_robot(robot, line, 0.3, rng)
+    for i, name in enumerate(draws.CORE):
+        sd = np.log(np.broadcast_to(wires.theta[name], (6, n))).std(1)
+        np.testing.assert_allclose(sd[[0, 2, 3, 5]], 0.02 * (i + 1), rtol=0.06)
+        np.testing.assert_allclose(sd[[1, 4]], 0.3 if name in draws.DIFFER else 0.0, rtol=0.06, atol=1e-12)
+    assert draws.typical_spread(line, 0.3) == pytest.approx(np.sqrt(np.mean(np.square([0.02, 0.04, 0.08]))), abs=1e-4)
+    known = unknowns(robot, line, Uncertain(1e-3, 0.05), rng)
+    theta = known.columns(known.draws)[0].theta
+    np.testing.assert_allclose(np.log(theta["U"]).std(1), [0.06, 0, 0.06, 0.06, 0, 0.06], rtol=0.06, atol=1e-4)
+
+
+def test_commands_take_several_tests_of_one_line(fitted, tmp_path, capsys, monkeypatch):  # noqa: F811
+    known = wire_defaults(1000.0)
+    before = {name: known[name].rvs(500, random_state=i) for i, name in enumerate(draws.CORE)}
+    monkeypatch.setattr("wirebayes.results.store.prior_draws", lambda folder, experiment=None: before)
+    way = tmp_path / "way.csv"
+    way.write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,0,0,.6\n")
+    arguments = ["pose", "linear-6", "--trajectory", str(way), "--draws", "10", "--output", str(tmp_path / "out")]
+    assert main([*arguments, "--wires", f"{fitted},{fitted}"]) == 0
+    said = json.loads((tmp_path / "out" / "pose.json").read_text())["wires"]["specimens"]["default"]
+    assert said["tests"] == 2
+    assert 0 < said["spread"]["B"]["q05"] < said["spread"]["B"]["q95"]
+    assert "Specimens of default differ as estimated from 2 tests: k1 by" in capsys.readouterr().err
+    assert "differ as estimated from 2 tests" in (tmp_path / "out" / "report.html").read_text()
+    assert main([*arguments[:-1], str(tmp_path / "no"), "--wires", f"{fitted},"]) == 2
+    assert "found 1 specimen, expected two or more" in capsys.readouterr().err
 
 
 def test_sag_is_that_of_a_level_cable():

@@ -11,7 +11,10 @@ RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's 
 Wires = Annotated[
     list[str],
     typer.Option(
-        "--wires", metavar="FOLDER", help="A folder with a posterior.nc; NAME=FOLDER for each of several wires."
+        "--wires",
+        metavar="FOLDER",
+        help="A folder with a posterior.nc, or several of one line with commas between; NAME=FOLDER for each of "
+        "several wires.",
     ),
 ]
 Draws = Annotated[int, typer.Option("--draws", min=1, help="Posterior draws used, evenly thinned.")]

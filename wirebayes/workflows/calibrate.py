@@ -10,6 +10,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration import session_file
 from wirebayes.robot.self_calibration.answer import answer
@@ -115,7 +116,7 @@ def calibrate(
     decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, *options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
-            prior = Prior(line, 1e-3 * reference_sd, specimen_spread, bias_sd_N=bias)
+            prior = Prior(line, 1e-3 * reference_sd, typical_spread(line, specimen_spread), bias_sd_N=bias)
             with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
                 found = answer(machine, prior, session, values, seed)
             write_json(run.directory / "calibrate.json", found)

@@ -11,6 +11,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, plain, write_csv, write_json
 from wirebayes.robot.history.history import with_payload
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
@@ -81,7 +82,8 @@ def pose(
     ----------
     robot : Robot, name of a shipped robot, or path
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
-        The line that the wires are cut from; of findings the final model.
+        The line that the wires are cut from; of findings the final model. A list of several: tests of one line, from
+        which the spread of its specimens is estimated.
     position : (3,) array, optional
         Of the platform in m; the robot's home pose when left out. With `joints`: about where it starts.
     rotation : (3,) array, optional
@@ -93,7 +95,7 @@ def pose(
     tolerance_tilt : float
         Allowed rotation, degrees.
     specimen_spread : float
-        Relative difference between wires of one line.
+        Relative difference between wires of one line, where it is not estimated from several tests.
     map_heights : sequence of float, optional
         Heights of the workspace's slices that are mapped, m; three through the robot's box when left out.
     map_rotations : sequence of (3,) arrays, optional
@@ -154,6 +156,7 @@ def pose(
     moments = rising_times(times)
     tolerance, tolerance_tilt, specimen_spread = float(tolerance), float(tolerance_tilt), float(specimen_spread)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
+    specimen_spread = typical_spread(line, specimen_spread)
     carried = (payload, None if payload_at is None else text_of(payload_at))
     if over_time:
         _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)

@@ -25,6 +25,7 @@ from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.truth import TruthJson
 from wirebayes.results import store
 from wirebayes.results.store import Stored
+from wirebayes.robot.mechanics.draws import specimens_said
 from wirebayes.typing import Floats
 from wirebayes.workflows.options import PathLike
 
@@ -524,10 +525,11 @@ class Pose(Result[PoseJson]):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """Why there is no answer, or ways in which it leaves what was tested."""
+        """Why there is no answer, the estimated spread of specimens, and ways in which it leaves what was tested."""
         found = self.summary()
         unheld = (found["sentence"],) if "sentence" in found else ()
-        return (*unheld, *(f"warning: {warning}" for warning in found.get("warnings", [])))
+        spread = specimens_said(found.get("wires", {}))
+        return (*unheld, *spread, *(f"warning: {warning}" for warning in found.get("warnings", [])))
 
     def _shortly(self) -> list[str]:
         found = self.summary()

@@ -13,6 +13,7 @@ import numpy as np
 from wirebayes import __version__
 from wirebayes.effects import source_of
 from wirebayes.errors import InputError
+from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.io.run_folder import plain
 from wirebayes.results import store
 from wirebayes.results.store import Stored
@@ -25,7 +26,8 @@ from wirebayes.workflows.results import POSTERIOR, Findings, Posterior, Posterio
 
 RobotLike = PathLike | Robot
 Line = PathLike | Posterior | Posteriors | Findings
-Wires = Line | Mapping[str, Line]  # one line for all legs, or lines by the names that legs have in the robot's file
+Specimens = Line | Sequence[Line]  # a line, known from one test or from several of one material
+Wires = Specimens | Mapping[str, Specimens]  # for all legs, or by the names that legs have in the robot's file
 
 
 def read_robot(name_or_file: PathLike) -> Robot:
@@ -62,9 +64,22 @@ def robot_of(robot: RobotLike) -> Robot:
 def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:
     """The posterior that decides a result; of several lines, what tells them all."""
     if _several(wires):
-        files = {name: content(folder_of(line, experiment) / POSTERIOR) for name, line in wires.items()}
-        return hash_of(files)
+        return hash_of({name: str(_content_of(line, experiment)) for name, line in wires.items()})
+    if _is_sample(wires):
+        return str(_content_of(wires, experiment))
     return folder_of(wires, experiment) / POSTERIOR
+
+
+def _content_of(line: Specimens, experiment: str | None) -> str:
+    """What tells the posteriors of a line from others."""
+    if _is_sample(line):
+        return hash_of({str(i): content(folder_of(one, experiment) / POSTERIOR) for i, one in enumerate(line)})
+    return content(folder_of(line, experiment) / POSTERIOR)
+
+
+def _is_sample(wires: Wires) -> TypeGuard[Sequence[Line]]:
+    """Whether several tests of one line were given."""
+    return isinstance(wires, list | tuple) and not isinstance(wires, Posteriors)
 
 
 def _several(wires: Wires) -> TypeGuard[Mapping[str, Line]]:
@@ -109,6 +124,8 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
     """
     if _several(wires):
         return _together({name: draws_of(line, count, experiment, own_effects) for name, line in wires.items()})
+    if _is_sample(wires):
+        return _sample(wires, count, experiment, own_effects)
     if isinstance(wires, Posteriors | Findings):
         wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)
     if isinstance(wires, Posterior):
@@ -171,18 +188,63 @@ def _together(lines: dict[str, WireDraws]) -> WireDraws:
     return replace(first, others=lines)
 
 
+def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effects: Path | None) -> WireDraws:
+    """A line known from several specimens: what they have in common, and how they differ."""
+    folders = [folder_of(line, experiment) for line in lines]
+    if len(folders) < 2:
+        raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
+    tests = [store.load(folder, experiment, own_effects) for folder in folders]
+    ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
+    first = ones[0]
+    for folder, one in zip(folders, ones, strict=True):
+        if one.material() or LENGTH_EXPONENT in one.parameters:
+            raise InputError(f"{folder}: found a fit with effects, expected plain fits where specimens are compared")
+        if (one.law, one.history) != (first.law, first.history):
+            raise InputError(
+                f"{folder}: found a fit with {one.law} and {one.history}, expected {first.law} and {first.history} as "
+                f"in {folders[0]}"
+            )
+    logarithms = []
+    for stored, one in zip(tests, ones, strict=True):
+        values = np.log(np.column_stack([stored.draws[name] for name in CORE]))
+        values[:, CORE.index("B")] += np.log(first.length_mm / one.length_mm)  # creep is a strain
+        logarithms.append(values)
+    before = store.prior_draws(folders[0], experiment)
+    log_prior = np.log(np.column_stack([before[name] for name in CORE]))
+    prior = log_prior.mean(0), np.cov(log_prior.T)
+    found = between_specimens(logarithms, prior, count, np.random.default_rng(0))
+    tension = np.array([one.tension_range_N or (0.0, 0.0) for one in ones])
+    time = np.array([one.time_range_s or (0.0, 0.0) for one in ones])
+    return replace(
+        first,
+        parameters=dict(zip(CORE, np.exp(found.mean).T, strict=True)),
+        effects=(),
+        tension_range_N=(float(tension.min()), float(tension.max())),
+        time_range_s=(float(time.min()), float(time.max())),
+        spread=dict(zip(CORE, found.spread.T, strict=True)),
+        specimens=len(ones),
+    )
+
+
 def named_lines(texts: Sequence[str]) -> Wires:
-    """What ``--wires`` was given: one folder, or several times ``NAME=FOLDER``."""
+    """What ``--wires`` was given: a line, or several times ``NAME=LINE``; a line is a folder, or some with commas."""
     pairs = [text.partition("=") for text in texts]
     if len(texts) == 1 and (not pairs[0][1] or Path(texts[0]).exists()):
-        return Path(texts[0])
+        return _folders(texts[0])
     for text, (name, sign, folder) in zip(texts, pairs, strict=True):
         if not (name and sign and folder):
             raise InputError(f"--wires: found {text!r} beside others; expected NAME=FOLDER for each")
     names = [name for name, _, _ in pairs]
     if len(set(names)) < len(names):
         raise InputError(f"--wires: found {', '.join(names)}; expected each name once")
-    return {name: Path(folder) for name, _, folder in pairs}
+    return {name: _folders(folder) for name, _, folder in pairs}
+
+
+def _folders(text: str) -> Path | list[Path]:
+    """A folder, or several with commas between."""
+    if "," not in text or Path(text).exists():
+        return Path(text)
+    return [Path(part) for part in text.split(",") if part]
 
 
 def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:

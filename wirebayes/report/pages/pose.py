@@ -25,6 +25,7 @@ from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.robot import CONTROLLERS
+from wirebayes.robot.mechanics.draws import specimens_said
 
 _CAPTIONS = {
     "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
@@ -91,6 +92,7 @@ def _asked(pose: dict[str, Any]) -> Points:
         effects = wires["effects"]
         model = f"the plain model with {', '.join(effects).replace('_', ' ')}" if effects else "the plain model"
         points.append(f"Wires known from {wires['draws']} posterior draws of a sample of {tested}: {model}.")
+        points += specimens_said(wires)
         if pose.get("inverse"):
             low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
             rule = pose["tension_distribution"]["choice"].replace("_", " ")

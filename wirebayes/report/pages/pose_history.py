@@ -20,6 +20,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.glossary import meaning
+from wirebayes.robot.mechanics.draws import specimens_said
 
 _CAPTIONS = {
     "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
@@ -92,6 +93,7 @@ def _asked(pose: dict[str, Any]) -> list[str]:
         f"Wires known from {wires['draws']} posterior draws of a sample of {wires['tested_length_mm']:g} mm: {model}. "
         f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. They were new at the first row.",
     ]
+    out += specimens_said(wires)
     if history["restart_share"] is None:
         out.append(f"The wires' clocks started {history['holds']} times, as the column hold says.")
     else:

@@ -9,7 +9,7 @@ from wirebayes.robot.history.follow import uncreeping
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.self_calibration.session import OWN, Prior
+from wirebayes.robot.self_calibration.session import Prior
 from wirebayes.typing import Floats
 
 _STEP = 0.05  # of a prior sd: far above the solver's error, and poses are straight over it
@@ -97,7 +97,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
     legs, n = robot.legs, line.count
-    own = rng.standard_normal((n, len(OWN) * legs)) * max(errors.spread, 1e-6)
+    own = rng.standard_normal((n, len(prior.own) * legs)) * prior.own_sd
     values = np.concatenate([rng.standard_normal((n, legs)) * prior.reference_sd_m, prior.fitted.T, own], 1)
     white = solve_triangular(root, (values - mean).T, lower=True).T
     return Unknowns(robot, prior, mean, root, np.asarray(white))

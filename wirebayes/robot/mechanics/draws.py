@@ -21,6 +21,7 @@ from wirebayes.wire import laws
 from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
 
 CORE = ("k1", "B", "U", "k2", "N")
+DIFFER = ("k1", "B", "k2")  # what a stated spread lets differ from specimen to specimen
 LENGTH_EXPONENT = "length_exponent"  # creep elongation grows as length to this power; 1, a strain, unless fitted
 
 
@@ -46,6 +47,11 @@ class WireDraws:
         Of the wire in the robot's file that it is; "default" are the legs that name none.
     others : mapping of name to WireDraws
         Lines of legs with other names, as many draws each, independent of these.
+    spread : mapping of name to (n,) array
+        Standard deviations of the logarithms of `CORE` from specimen to specimen, where several were tested; the
+        parameters are then the line's. Empty: a stated spread is used.
+    specimens : int
+        How many were tested.
     """
 
     parameters: Mapping[str, Floats]
@@ -58,6 +64,8 @@ class WireDraws:
     tension_ref_N: float = 1.0
     name: str = "default"
     others: Mapping[str, "WireDraws"] = field(default_factory=dict)
+    spread: Mapping[str, Floats] = field(default_factory=dict)
+    specimens: int = 1
 
     @property
     def count(self) -> int:
@@ -71,12 +79,14 @@ class WireDraws:
     def part(self, index: NDArray[np.intp] | slice) -> "WireDraws":
         """Some of the draws, each with all its parameters."""
         others = {name: line.part(index) for name, line in self.others.items()}
-        return replace(self, parameters={k: v[index] for k, v in self.parameters.items()}, others=others)
+        parts = ({k: v[index] for k, v in values.items()} for values in (self.parameters, self.spread))
+        return replace(self, parameters=next(parts), spread=next(parts), others=others)
 
     def centre(self) -> "WireDraws":
         """One wire with the posterior mean of every parameter: what a controller would use."""
         others = {name: line.centre() for name, line in self.others.items()}
-        return replace(self, parameters={k: np.array([v.mean()]) for k, v in self.parameters.items()}, others=others)
+        means = ({k: np.array([v.mean()]) for k, v in values.items()} for values in (self.parameters, self.spread))
+        return replace(self, parameters=next(means), spread=next(means), others=others)
 
     @property
     def each(self) -> dict[str, "WireDraws"]:
@@ -104,7 +114,8 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         For every leg whose wire is not given in the robot's file.
     spread : float
         Relative standard deviation of stiffness k1, creep amount B and rate k2 from leg to leg (log-normal, the three
-        independent), beside the shared draw.
+        independent), beside the shared draw; 0: wires of one line are alike. Of a line whose spread was estimated,
+        each draw's own spread of each parameter is taken.
     rng : numpy Generator
         Needed when `spread` is not zero.
 
@@ -130,8 +141,9 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     if spread > 0:
         if rng is None:
             raise ValueError("a specimen spread needs a random generator")
-        for name in ("k1", "B", "k2"):
-            theta[name] = theta[name] * np.exp(spread * rng.standard_normal((robot.legs, n)))
+        for name in differing(line):
+            sd = np.stack([np.broadcast_to(spread_of(one, name, spread), (n,)) for one in lines])
+            theta[name] = theta[name] * np.exp(sd * rng.standard_normal((robot.legs, n)))
     length = np.array([wire.length_mm for wire in lines])[:, None]
     longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
     if scaled:
@@ -144,6 +156,45 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     theta = dict(Placed(by_length, theta).change("sample", theta, hold))
     others = tuple(e for e in effects if e.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def differing(line: WireDraws) -> tuple[str, ...]:
+    """The parameters in which specimens of a line, or of one beside it, differ."""
+    return CORE if any(one.spread for one in line.each.values()) else DIFFER
+
+
+def spread_of(line: WireDraws, name: str, stated: float) -> Floats | float:
+    """Spread of a parameter from specimen to specimen: each draw's, where it was estimated."""
+    if line.spread:
+        return line.spread[name]
+    return stated if name in DIFFER else 0.0
+
+
+def typical_spread(line: WireDraws, stated: float) -> float:
+    """The spread that stands for all: the estimated one's root mean square over k1, B and k2, or the stated one."""
+    if not line.spread:
+        return stated
+    return round(float(np.sqrt(np.mean([line.spread[name] ** 2 for name in DIFFER]))), 4)
+
+
+def specimens_said(wires: Mapping[str, Any]) -> list[str]:
+    """A sentence for each line whose spread was estimated, of `summary`'s content.
+
+    Parameters
+    ----------
+    wires : mapping
+        ``wires`` of ``pose.json``.
+    """
+    return [
+        f"Specimens of {name} differ as estimated from {one['tests']} tests: "
+        + ", ".join(
+            f"{k} by {100 * one['spread'][k]['q50']:.2g} % ({100 * one['spread'][k]['q05']:.2g} to "
+            f"{100 * one['spread'][k]['q95']:.2g} %)"
+            for k in CORE
+        )
+        + "."
+        for name, one in wires.get("specimens", {}).items()
+    ]
 
 
 def lines_of(robot: Robot, line: WireDraws) -> list[WireDraws]:
@@ -207,6 +258,15 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
 def summary(robot: Robot, line: WireDraws) -> WiresUsed:
     """Which wires an answer is for, as ``pose.json`` says it."""
     kept = line.material()
+    several = {name: one for name, one in line.each.items() if one.spread}
+    estimated = {
+        name: {
+            "tests": one.specimens,
+            "spread": {k: dict(zip(("q05", "q50", "q95"), np.quantile(v, [0.05, 0.5, 0.95]), strict=True))
+                       for k, v in one.spread.items()},
+        }
+        for name, one in several.items()
+    }  # fmt: skip
     return {
         "draws": line.count,
         "tested_length_mm": line.length_mm,
@@ -216,7 +276,7 @@ def summary(robot: Robot, line: WireDraws) -> WiresUsed:
         "left_out": [e.key for e in line.effects if e not in kept],
         "legs": list(robot.wire),
         "lines": list(line.each),
-    }
+    } | ({"specimens": estimated} if several else {})
 
 
 def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:

@@ -10,14 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, for_robot
+from wirebayes.robot.mechanics.draws import (
+    CORE,
+    LENGTH_EXPONENT,
+    WireDraws,
+    differing,
+    for_robot,
+    lines_of,
+    spread_of,
+)
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
 from wirebayes.typing import Floats
 
-OWN = ("k1", "B", "k2")  # what differs from specimen to specimen
+_LEAST = 1e-6  # relative: wires that are said to be alike still get a spread, far below anything that matters
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,7 @@ class Prior:
     line : WireDraws
     reference_sd_m : float
     spread : float
-        Relative, of k1, B and k2 from wire to wire.
+        Relative, of k1, B and k2 from wire to wire; a line with an estimated spread has its own.
     creeps : bool
         False: calibration by Hooke's law alone, lengths thought constant.
     bias_sd_N : float
@@ -88,6 +96,16 @@ class Prior:
         ]
 
     @property
+    def own(self) -> tuple[str, ...]:
+        """The parameters in which specimens differ."""
+        return differing(self.line)
+
+    @property
+    def own_sd(self) -> float:
+        """Standard deviation of the unknowns that say how a specimen differs; they are scaled for each leg's line."""
+        return max(self.spread, _LEAST)
+
+    @property
     def fitted(self) -> Floats:
         """(p, n) draws of all lines' parameters, logarithms of those that are positive."""
         return np.array([
@@ -99,7 +117,7 @@ class Prior:
     def moments(self, legs: int) -> tuple[Floats, Floats]:
         """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""
         values = self.fitted
-        p, own = len(values), len(OWN) * legs
+        p, own = len(values), len(self.own) * legs
         biased = legs if self.bias_sd_N > 0 else 0
         mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own + biased)])
         cov = np.zeros((len(mean), len(mean)))
@@ -108,7 +126,7 @@ class Prior:
         cov[legs : legs + p, legs : legs + p] = np.cov(values) if self.line.count > 1 else 0.0
         cov[legs : legs + p, legs : legs + p] += 1e-12 * np.eye(p)
         specimens, sensors = slice(legs + p, legs + p + own), slice(legs + p + own, None)
-        cov[specimens, specimens] = max(self.spread, 1e-6) ** 2 * np.eye(own)
+        cov[specimens, specimens] = self.own_sd**2 * np.eye(own)
         cov[sensors, sensors] = self.bias_sd_N**2 * np.eye(biased)
         return mean, cov
 
@@ -122,10 +140,12 @@ class Prior:
             lines[wire] = replace(line, parameters=values)
         first = lines.pop(self.line.name)
         wires = for_robot(robot, replace(first, others=lines))
-        own = unknowns[:, legs + p : legs + p + len(OWN) * legs].T.reshape(len(OWN), legs, n)
-        theta = dict(wires.theta) | {
-            name: wires.theta[name] * np.exp(deviation) for name, deviation in zip(OWN, own, strict=True)
-        }
+        own = unknowns[:, legs + p : legs + p + len(self.own) * legs].T.reshape(len(self.own), legs, n)
+        theta = dict(wires.theta)
+        for name, deviation in zip(self.own, own, strict=True):
+            rms = [np.sqrt(np.mean(np.square(spread_of(one, name, self.own_sd)))) for one in lines_of(robot, self.line)]
+            scale = np.array(rms)[:, None] / self.own_sd
+            theta[name] = theta[name] * np.exp(scale * deviation)
         whole = replace(wires, theta=theta)
         return (whole if self.creeps else without_creep(whole)), unknowns[:, :legs]
 

@@ -1,0 +1,136 @@
+"""How much specimens of one line differ, from the posteriors of several that were fitted by themselves.
+
+The logarithms ``x`` of a specimen's parameters are normal about the line's ``μ`` with independent standard deviations
+``s``. A specimen's readings enter as the normal approximation of its posterior with the prior of its fit taken out:
+precision ``Λ = S⁻¹ - S₀⁻¹``, so that a parameter that no test determines stays unknown however many tests there are.
+Specimens and ``μ`` are integrated out in closed form; from the density of ``log s`` that is left, importance sampling
+about its mode draws. Few specimens leave the spreads near their prior (`model.pooling`) and their bands wide.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import optimize
+
+from wirebayes.model.pooling import SPREAD
+from wirebayes.typing import Floats
+
+_PROPOSALS = 4000  # importance draws: a thousand effective ones and more with five parameters
+_REACH = 4.0  # prior sd of log s in which the mode is sought
+_FREEDOM = 5.0  # of the proposal's t distribution: tails beyond those of a normal prior of log s
+_ONE_SD = 0.841344746  # the share of a normal distribution below one standard deviation
+_STEP = 0.05  # in log s, for the curvature at the mode
+
+
+@dataclass(frozen=True)
+class LineDraws:
+    """Draws of what a line's specimens have in common, and of how they differ.
+
+    Attributes
+    ----------
+    mean : (n, p) array
+        Of the logarithms.
+    spread : (n, p) array
+        Standard deviations of the logarithms from specimen to specimen.
+    effective : float
+        How many independent draws the importance sampling gave.
+    """
+
+    mean: Floats
+    spread: Floats
+    effective: float
+
+
+def between_specimens(
+    logarithms: list[Floats], prior: tuple[Floats, Floats], count: int, rng: np.random.Generator
+) -> LineDraws:
+    """Line and spread given posteriors of specimens.
+
+    Parameters
+    ----------
+    logarithms : list of (n_j, p) array
+        Posterior draws of each specimen's parameters.
+    prior : (p,), (p, p) arrays
+        Mean and covariance of the logarithms under the prior of the fits, which is the line's prior too.
+    count : int
+        Draws wanted.
+    rng : numpy Generator
+    """
+    information = [_information(values, prior) for values in logarithms]
+    mean = float(np.log(SPREAD.median()))
+    sd = float(np.log(SPREAD.ppf(_ONE_SD)) - mean)  # of log s, which is normal
+    p = len(prior[0])
+
+    def log_density(log_s: Floats) -> Floats:
+        return _collapsed(log_s, information, prior)[0] - 0.5 * (((log_s - mean) / sd) ** 2).sum(1)
+
+    def unlikely(log_s: Any) -> float:
+        return -float(log_density(np.asarray(log_s)[None])[0])
+
+    bounds = [(mean - _REACH * sd, mean + _REACH * sd)] * p
+    mode = np.asarray(optimize.minimize(unlikely, [mean] * p, method="L-BFGS-B", bounds=bounds).x)
+    root = np.linalg.cholesky(_covariance(log_density, mode, sd))
+    normal = rng.standard_normal((_PROPOSALS, p))
+    scale = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, _PROPOSALS))
+    unit = normal * scale[:, None]
+    log_s = mode + unit @ root.T
+    proposal = -0.5 * (_FREEDOM + p) * np.log1p((unit**2).sum(1) / _FREEDOM)
+    log_weight = log_density(log_s) - proposal
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    steps = (rng.random() + np.arange(count)) / count
+    pick = rng.permutation(np.minimum(np.searchsorted(np.cumsum(weight), steps), _PROPOSALS - 1))
+    _, precision, vector = _collapsed(log_s[pick], information, prior)
+    covariance = np.linalg.inv(precision)
+    centre = np.einsum("nij,nj->ni", covariance, vector)
+    noise = np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), rng.standard_normal((count, p)))
+    return LineDraws(centre + noise, np.exp(log_s[pick]), float(1.0 / (weight**2).sum()))
+
+
+def _information(values: Floats, prior: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Precision and vector of a specimen's readings alone: its posterior without the prior, never below none."""
+    mean, covariance = values.mean(0), np.atleast_2d(np.cov(values.T))
+    before = np.linalg.inv(prior[1])
+    precision = np.linalg.inv(covariance)
+    scale = np.sqrt(np.diag(precision))
+    vector = precision @ mean - before @ prior[0]
+    sizes, axes = np.linalg.eigh((precision - before) / np.outer(scale, scale))
+    kept = sizes > 1e-6  # what the readings say nothing of may come out negative
+    axes = axes[:, kept]
+    part = scale[:, None] * (axes @ (axes.T @ (vector / scale))[:, None])
+    return np.outer(scale, scale) * ((axes * sizes[kept]) @ axes.T), part[:, 0]
+
+
+def _collapsed(
+    log_s: Floats, information: list[tuple[Floats, Floats]], prior: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """Log likelihood ``(n,)`` of spreads, and the precision and vector of the line's mean given them."""
+    before = np.linalg.inv(prior[1])
+    n, p = log_s.shape
+    inverse = np.exp(-2.0 * log_s)[:, :, None] * np.eye(p)
+    precision = np.tile(before, (n, 1, 1))
+    vector = np.tile(before @ prior[0], (n, 1))
+    log_likelihood = np.zeros(n)
+    for own, told in information:
+        both = own + inverse
+        within = np.linalg.inv(both)
+        precision += inverse - inverse @ within @ inverse
+        vector += np.einsum("nij,njk,k->ni", inverse, within, told)
+        log_likelihood += 0.5 * np.einsum("i,nij,j->n", told, within, told) - 0.5 * np.linalg.slogdet(both)[1]
+        log_likelihood -= log_s.sum(1)
+    centre = np.linalg.solve(precision, vector[..., None])[..., 0]
+    log_likelihood += 0.5 * (vector * centre).sum(1) - 0.5 * np.linalg.slogdet(precision)[1]
+    return log_likelihood, precision, vector
+
+
+def _covariance(log_density: Callable[[Floats], Floats], mode: Floats, sd: float) -> Floats:
+    """Inverse curvature at the mode, no wider than the prior in any direction."""
+    p = len(mode)
+    steps = _STEP * np.eye(p)
+    pairs = [mode + a * steps[i] + b * steps[j] for i in range(p) for j in range(p) for a in (1, -1) for b in (1, -1)]
+    values = log_density(np.array(pairs)).reshape(p, p, 4)
+    hessian = -(values[..., 0] - values[..., 1] - values[..., 2] + values[..., 3]) / (4 * _STEP**2)
+    sizes, axes = np.linalg.eigh(0.5 * (hessian + hessian.T))
+    return np.asarray((axes / np.maximum(sizes, sd**-2)) @ axes.T)
