@@ -295,6 +295,22 @@ def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsy
     assert "independent ones" in (tmp_path / "out" / "report.html").read_text()
 
 
+def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
+    robot = schema.read("hangprinter-4")
+    history = _told(robot, TIMES[:2], _places(robot)[:2])
+    read = replace(history, tension_N=np.array([[1.14, 1.07, 1.1, 5.28]] * 2))
+    arguments = ((robot.home_m, np.eye(3)), Uncertain(1e-3))
+    blind = estimate(robot, _line(12), history, *arguments, np.random.default_rng(0))
+    used = estimate(robot, _line(12), read, *arguments, np.random.default_rng(0))
+    monkeypatch.setattr("wirebayes.robot.history.estimate.draw",
+                        lambda *given: replace(conditioning.draw(*given), effective=5.0))  # fmt: skip
+    unused = estimate(robot, _line(12), read, *arguments, np.random.default_rng(0))
+    assert used.used
+    assert not unused.used
+    np.testing.assert_array_equal(unused.track.position_m, blind.track.position_m)
+    assert (used.track.position_m != blind.track.position_m).any()
+
+
 def test_an_inclinometer_reads_what_turned_the_platform():
     roll, pitch, yaw = 0.1, -0.2, 1.3
     turn = rotation.matrix(np.array([0, 0, yaw])) @ rotation.matrix(np.array([0, pitch, 0]))

@@ -122,7 +122,8 @@ def answer(
     }
     if history.read:
         content["readings"] |= {
-            "misfit": found.misfit, "converged": found.converged, "effective_draws": found.effective
+            "misfit": found.misfit, "converged": found.converged, "effective_draws": found.effective,
+            "used": found.used,
         }  # fmt: skip
     content["warnings"] = _warnings(robot, line, history, found, joint, content)
     tables = {
@@ -230,9 +231,10 @@ def _warnings(
             "1; check signs, units, payload and the standard errors"
         )
     if found.effective is not None and found.effective < _FEWEST:
+        then = "the bands' ends are rough" if found.used else "the readings are not used, the bands are those without"
         out.append(
-            f"only about {found.effective:.0f} of {line.count} draws agree with the readings: the bands' ends are "
-            "rough; take more --draws, and check payload and standard errors"
+            f"only about {found.effective:.0f} of {line.count} draws agree with the readings: {then}; take more "
+            "--draws, and check payload and standard errors"
         )
     clock = content["clock"]
     width = content["drift"][0]["distance_mm"]

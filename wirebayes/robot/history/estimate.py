@@ -17,6 +17,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.typing import Floats
 
 Progress = Callable[[str, float, float], None]
+_TOO_FEW = 20.0  # effective draws: of fewer, not one lies beyond a 5 % quantile
 _NONE = 1e-9  # of a wire's stiffness: it bears nothing, and the equations keep their form
 
 
@@ -39,6 +40,8 @@ class Estimate:
         Whether the mode was reached, where there were readings.
     effective : float or None
         How many independent draws agree with the readings.
+    used : bool
+        False where they are too few to give bands: the draws are then those of the joint values alone.
     """
 
     track: Track
@@ -48,6 +51,7 @@ class Estimate:
     misfit: float | None = None
     converged: bool = True
     effective: float | None = None
+    used: bool = True
 
 
 def estimate(
@@ -88,13 +92,16 @@ def estimate(
     loose = slack_wires(read, robot.legs)
     mode = find_mode(known, read, way.white, loose) or find_mode(known, read, way.white, np.zeros_like(loose))
     if mode is None:  # not even the mean wires hang in balance
-        return replace(way.followed(known.draws), converged=False, effective=0.0)
+        return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
     out = draw(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
     left = _mean(read.residual(out.track, np.zeros_like(out.white)))
-    return replace(
-        Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count])),
-        misfit=float(np.nanmean((left / read.of.sd) ** 2)), converged=mode.converged, effective=out.effective,
-    )  # fmt: skip
+    used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
+    if used:
+        found = Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count]))
+    else:
+        found = way.followed(known.draws)
+    misfit = float(np.nanmean((left / read.of.sd) ** 2))
+    return replace(found, misfit=misfit, converged=mode.converged, effective=out.effective, used=used)
 
 
 def _mean(left: Floats) -> Floats:

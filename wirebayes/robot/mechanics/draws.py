@@ -164,7 +164,16 @@ def differing(line: WireDraws) -> tuple[str, ...]:
 
 
 def spread_of(line: WireDraws, name: str, stated: float) -> Floats | float:
-    """Spread of a parameter from specimen to specimen: each draw's, where it was estimated."""
+    """Spread of a parameter from specimen to specimen: each draw's, where it was estimated.
+
+    Parameters
+    ----------
+    line : WireDraws
+    name : str
+        One of `CORE`.
+    stated : float
+        Relative spread of a line whose own was not estimated.
+    """
     if line.spread:
         return line.spread[name]
     return stated if name in DIFFER else 0.0
