@@ -184,7 +184,16 @@ class _Way:
                       lambda row: self.progress(name, row + 1, rows))  # fmt: skip
 
     def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:
-        """White unknowns ``(n, d)`` followed, some wires ``(w,)`` without stiffness."""
+        """White unknowns followed, some wires without stiffness.
+
+        Parameters
+        ----------
+        white : (n, d) array
+        name : str
+            For the progress.
+        without : (w,) bool array
+            Wires that bear nothing.
+        """
         wires, error = self.known.columns(white)
         if without.any():
             stiffness = np.where(without[:, None], _NONE * wires.theta["k1"], wires.theta["k1"])
