@@ -24,6 +24,7 @@ from wirebayes.workflows import one_experiment
 ROOT = Path(__file__).parents[2]
 FEW = wb.Policy(walkers=32, ess=1, rounds=2, most_rounds=2, tail=99, round_draws=512, block=8, most_steps=8, r_hat=99)
 TRUTH = {"k1": 1200.0, "B": 0.2, "U": 0.8, "k2": 0.03, "N": 0.8, "preload": 0.3, "sensor_sd": 0.005, "setting_sd": 0.01}
+PATIENT_S = 300.0  # for processes to start, however busy the machine is
 QUICK = {"discover": False, "check": False, "policy": FEW}
 
 
@@ -232,6 +233,8 @@ def _all_but(*names):
 @contextmanager
 def cluster(folder):
     """A scheduler and two workers on loopback; yields its address and the workers' processes."""
+    from distributed import Client
+
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     file = folder / "scheduler.json"
 
@@ -247,6 +250,8 @@ def cluster(folder):
         started += [start("worker", "--nthreads", "1", "--no-nanny", *loopback) for _ in range(2)]
         while not (address := _address(file)):
             time.sleep(0.05)
+        with Client(address, timeout=PATIENT_S, set_as_default=False) as client:
+            client.wait_for_workers(2)  # a busy machine takes longer to start them than a user is kept waiting
         yield address, started[1:]
     finally:
         for process in started:

@@ -3,7 +3,14 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.calibrate import PoseNow
-from wirebayes.json_files.values import Band, Numbers
+from wirebayes.json_files.values import Band, Numbers, Quantiles
+
+
+class Specimens(TypedDict):
+    """Of a line of which several specimens were tested."""
+
+    tests: int
+    spread: dict[str, Quantiles]
 
 
 class WiresUsed(TypedDict):
@@ -17,6 +24,7 @@ class WiresUsed(TypedDict):
     left_out: list[str]
     legs: list[str]
     lines: list[str]
+    specimens: NotRequired[dict[str, Specimens]]
 
 
 class TensionDistribution(TypedDict):

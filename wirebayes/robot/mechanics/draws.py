@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.json_files.pose import WiresUsed
+from wirebayes.json_files.pose import Specimens, WiresUsed
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
@@ -267,16 +267,7 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
 def summary(robot: Robot, line: WireDraws) -> WiresUsed:
     """Which wires an answer is for, as ``pose.json`` says it."""
     kept = line.material()
-    several = {name: one for name, one in line.each.items() if one.spread}
-    estimated = {
-        name: {
-            "tests": one.specimens,
-            "spread": {k: dict(zip(("q05", "q50", "q95"), np.quantile(v, [0.05, 0.5, 0.95]), strict=True))
-                       for k, v in one.spread.items()},
-        }
-        for name, one in several.items()
-    }  # fmt: skip
-    return {
+    used: WiresUsed = {
         "draws": line.count,
         "tested_length_mm": line.length_mm,
         "elastic_law": line.law,
@@ -285,7 +276,20 @@ def summary(robot: Robot, line: WireDraws) -> WiresUsed:
         "left_out": [e.key for e in line.effects if e not in kept],
         "legs": list(robot.wire),
         "lines": list(line.each),
-    } | ({"specimens": estimated} if several else {})
+    }
+    several = {name: _specimens(one) for name, one in line.each.items() if one.spread}
+    if several:
+        used["specimens"] = several
+    return used
+
+
+def _specimens(line: WireDraws) -> Specimens:
+    """How many were tested, and how much they differ."""
+    spread = {name: np.quantile(draws, [0.05, 0.5, 0.95]).tolist() for name, draws in line.spread.items()}
+    return {
+        "tests": line.specimens,
+        "spread": {name: {"q05": low, "q50": middle, "q95": high} for name, (low, middle, high) in spread.items()},
+    }
 
 
 def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
