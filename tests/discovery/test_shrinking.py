@@ -56,7 +56,7 @@ def test_gains_are_sums_over_holds_with_their_spread(remains: bool, monkeypatch:
     plain, effects = np.array([1.0, 2.0, 3.0, 4.0]), np.array([4.0, 4.0, 4.0, 8.0])
     smooth, both = [np.array([2.0, 3.0]), np.array([4.0, 5.0])], [np.array([7.0, 7.0]), np.array([7.0, 11.0])]
     fits = [plain, effects, *smooth, *(both if remains else [])]
-    monkeypatch.setattr(held_out, "leave_one_hold_out", lambda fit, rng: fit)
+    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: fit)
     found = shrinking._gain(fits, 1, 2, remains, np.random.default_rng(0), map)  # type: ignore[arg-type]
     gained = np.array([6.0, 5.0, 4.0, 7.0] if remains else [3.0, 2.0, 1.0, 4.0])
     assert found.final == gained.sum() and found.flexible == 4.0
@@ -64,7 +64,7 @@ def test_gains_are_sums_over_holds_with_their_spread(remains: bool, monkeypatch:
 
 
 def test_a_gain_without_named_effects_is_that_of_the_discrepancy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(held_out, "leave_one_hold_out", lambda fit, rng: fit)
+    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: fit)
     fits = [np.array([1.0, 2.0]), np.array([4.0, 8.0])]
     found = shrinking._gain(fits, 0, 1, True, np.random.default_rng(0), map)  # type: ignore[arg-type]
     assert found.final == found.flexible == 9.0

@@ -136,7 +136,7 @@ def test_nothing_left_to_add_passes_the_second_test() -> None:
 @pytest.mark.parametrize("before", [True, False])
 def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the set without it was fitted, against that, else against the plain model; in its own materials alone."""
-    monkeypatch.setattr(verdict.held_out, "leave_one_hold_out", lambda fit, rng: np.array(fit))
+    monkeypatch.setattr(verdict.held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
     plain = [[1.0], [2.0, 2.0], [3.0]]
     sets = explored({"a": 1.0, "ab": 2.0})
     sets.fitted[frozenset("a")].blocks[:] = [[5.0], [6.0, 6.0], [7.0]]
@@ -153,7 +153,7 @@ def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, mon
 def test_the_first_effect_gains_over_the_plain_model_the_third_over_two(
     names_: str, gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verdict.held_out, "leave_one_hold_out", lambda fit, rng: np.array(fit))
+    monkeypatch.setattr(verdict.held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
     sets = explored({"a": 1.0, "ab": 2.0, "abc": 3.0})
     for set_, elpd in (("a", 5.0), ("ab", 10.0), ("abc", 30.0)):
         sets.fitted[frozenset(set_)].blocks[:] = [[elpd]]  # type: ignore[list-item]
