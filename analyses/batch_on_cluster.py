@@ -71,11 +71,11 @@ def main() -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     made = wb.simulate_tests(tests=options.experiments, displacements=range(1, 6), times=[0, 30, 60], seed=1)
     file = made.folder / "experiments.toml"
-    options = {"discover": False, "check": False, "posteriors": False, "policy": SHORT}
+    settings = {"discover": False, "check": False, "posteriors": False, "policy": SHORT}
 
     def run(name: str, **more: object) -> float:
         begin = time.monotonic()
-        wb.batch(file, **options, output=options.output / name, **more)  # type: ignore[arg-type]
+        wb.batch(file, **settings, output=options.output / name, **more)  # type: ignore[arg-type]
         return time.monotonic() - begin
 
     with patch("wirebayes.workers.cores", lambda: 1):
