@@ -184,8 +184,8 @@ class Start:
 def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) -> Start:
     """The best places without an effect, of the same density and by the same steps as on a ladder.
 
-    The plain fit is the best with its own noise; with the noise integrated out some place nearby is better by up to
-    half a nat, which an effect would be credited with.
+    The plain fit is the best with its own noise; with the noise integrated out some place nearby is better, by up to a
+    tenth of a nat where it was measured. Places that differ in their noise are compared in the same units.
 
     Parameters
     ----------
