@@ -25,7 +25,7 @@ TESTS = {
                                      "settings shrinking subsets thresholds verdict"),
     "robot/mechanics": _files("robot", "statics tensions"),
     "robot/motion": _files("robot", "forward"),
-    "robot/pose": _files("robot", "told"),
+    "robot/pose": _files("robot", "pose_reports"),
     "robot/proof": _files("robot", "certificate reach"),
 }  # fmt: skip
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant

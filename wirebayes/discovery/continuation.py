@@ -384,9 +384,9 @@ def _begin(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> tuple[_Asc
     n, places = begin.data_sets, len(begin.z) // begin.data_sets
     target, column, y = _with_effect(block, ladder, np.split(begin.z, places))
     # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
-    nothing = begin.largest - 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - begin.z.shape[1])
-    behind = np.stack([np.where(np.isfinite(nothing), nothing, np.inf), begin.largest - begin.log_density])
-    nothing, behind = behind.reshape(2, places, n).repeat(len(ladder.probes), axis=1).reshape(2, -1)
+    plain = begin.largest - 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - begin.z.shape[1])
+    each_place = np.stack([np.where(np.isfinite(plain), plain, np.inf), begin.largest - begin.log_density])
+    nothing, behind = each_place.reshape(2, places, n).repeat(len(ladder.probes), axis=1).reshape(2, -1)
     # From where to where a rung speaks: half way, by ratio, to its neighbours.
     apart = np.tile(ladder.amplitudes[1] / ladder.amplitudes[0], places).repeat(n)
     main = ladder.effect.amplitudes[0]

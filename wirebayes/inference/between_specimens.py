@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import optimize
 
+from wirebayes.inference.sampler.mixture import rows_by_weight
 from wirebayes.model.pooling import SPREAD
 from wirebayes.typing import Floats
 
@@ -80,8 +81,7 @@ def between_specimens(
     log_weight = log_density(log_s) - proposal
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
-    steps = (rng.random() + np.arange(count)) / count
-    pick = rng.permutation(np.minimum(np.searchsorted(np.cumsum(weight), steps), _PROPOSALS - 1))
+    pick = rng.permutation(rows_by_weight(weight, count, rng))
     _, precision, vector = _collapsed(log_s[pick], information, prior)
     covariance = np.linalg.inv(precision)
     centre = np.einsum("nij,nj->ni", covariance, vector)
@@ -113,12 +113,14 @@ def _collapsed(
     precision = np.tile(before, (n, 1, 1))
     vector = np.tile(before @ prior[0], (n, 1))
     log_likelihood = np.zeros(n)
-    for own, told in information:
+    for own, own_vector in information:
         both = own + inverse
         within = np.linalg.inv(both)
         precision += inverse - inverse @ within @ inverse
-        vector += np.einsum("nij,njk,k->ni", inverse, within, told)
-        log_likelihood += 0.5 * np.einsum("i,nij,j->n", told, within, told) - 0.5 * np.linalg.slogdet(both)[1]
+        vector += np.einsum("nij,njk,k->ni", inverse, within, own_vector)
+        log_likelihood += (
+            0.5 * np.einsum("i,nij,j->n", own_vector, within, own_vector) - 0.5 * np.linalg.slogdet(both)[1]
+        )
         log_likelihood -= log_s.sum(1)
     centre = np.linalg.solve(precision, vector[..., None])[..., 0]
     log_likelihood += 0.5 * (vector * centre).sum(1) - 0.5 * np.linalg.slogdet(precision)[1]

@@ -1,4 +1,4 @@
-"""What is said of a hold, from falls, margins and pose errors that are written down."""
+"""What a pose report says of falls, margins, claims and controllers, from results that are written down."""
 
 from types import SimpleNamespace
 from typing import Any
