@@ -9,7 +9,7 @@ ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors", "typing"},
     {"json_files"},
-    {"linear_algebra"},
+    {"linear_algebra", "resampling"},
     {"units", "interrupt", "user_files"},
     {"workers"},
     {"wire"},
@@ -25,7 +25,8 @@ LAYERS: list[set[str]] = [
     {"workflows"},
     {"cli"},
 ]
-ROBOT_MAY_USE = {"errors", "typing", "json_files", "linear_algebra", "units", "user_files", "wire", "robot"}
+NEUTRAL = {"errors", "typing", "json_files", "linear_algebra", "resampling", "units", "user_files"}
+ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
 MAY_USE_ROBOT = {"report", "reproduce", "workflows", "cli", "__init__"}
 
 

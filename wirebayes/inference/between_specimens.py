@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy import optimize
 
-from wirebayes.inference.sampler.mixture import rows_by_weight
 from wirebayes.model.pooling import SPREAD
+from wirebayes.resampling import systematic_rows
 from wirebayes.typing import Floats
 
 _PROPOSALS = 4000  # importance draws: a thousand effective ones and more with five parameters
@@ -81,7 +81,7 @@ def between_specimens(
     log_weight = log_density(log_s) - proposal
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
-    pick = rng.permutation(rows_by_weight(weight, count, rng))
+    pick = rng.permutation(systematic_rows(weight, count, rng))
     _, precision, vector = _collapsed(log_s[pick], information, prior)
     covariance = np.linalg.inv(precision)
     centre = np.einsum("nij,nj->ni", covariance, vector)

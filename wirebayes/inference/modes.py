@@ -10,8 +10,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.sampler.mixture import rows_by_weight, spread_rows
+from wirebayes.inference.sampler.mixture import spread_rows
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.resampling import systematic_rows
 from wirebayes.typing import Array
 
 Density = Callable[[Array, Array], Array]
@@ -305,7 +306,7 @@ def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generat
         step = _next_step(value, 1.0 - power)
         power += step
         weight = np.exp(step * (value - value.max()))
-        kept = rows_by_weight(weight, m, rng)
+        kept = systematic_rows(weight, m, rng)
         z, value = z[kept], value[kept]
         one, other = rng.integers(m, size=(2, m))
         moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)

@@ -23,6 +23,7 @@ from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Learned, Pair, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.resampling import systematic_rows
 from wirebayes.typing import Array
 
 
@@ -242,7 +243,7 @@ def _resampled(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[n
     """(n,) rows drawn by weight, systematically, in random order; no row counts for more than the root of all rows."""
     weight = np.exp(log_weight - log_weight.max())
     weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
-    return rng.permutation(mixture.rows_by_weight(weight, n, rng))
+    return rng.permutation(systematic_rows(weight, n, rng))
 
 
 def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:

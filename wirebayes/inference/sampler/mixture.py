@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from wirebayes.typing import Array
@@ -182,25 +181,6 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
         chosen.append(int(rng.choice(len(x), p=nearest / nearest.sum())))
         nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
     return chosen
-
-
-def rows_by_weight(weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Rows drawn in proportion to their weights, systematically, in their order.
-
-    Parameters
-    ----------
-    weight : (m,) array
-        Not negative; need not sum to one.
-    n : int
-        Number of draws.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (n,) int array
-    """
-    shares = np.cumsum(weight)
-    return np.minimum(np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n), len(weight) - 1)
 
 
 def log_sum(logs: Array) -> Array:

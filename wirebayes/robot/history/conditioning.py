@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.resampling import systematic_rows
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import roll_and_pitch
 from wirebayes.robot.history.readings import Information, Sensors
@@ -173,8 +174,7 @@ def draw(known: Callable[[], Unknowns], read: Readings, mode: Mode, way: Way, rn
             break
     if not effective:
         return Draws(white[0], tracks[0], 0.0)
-    steps = (rng.random() + np.arange(n)) / n
-    pick = np.minimum(np.searchsorted(np.cumsum(share), steps), len(share) - 1)
+    pick = systematic_rows(share, n, rng)
     return Draws(np.concatenate(white)[pick], _joined(tracks).part(pick), min(effective, float(n)))
 
 

@@ -1,0 +1,34 @@
+"""Systematic resampling."""
+
+import numpy as np
+
+from wirebayes.resampling import systematic_rows
+
+
+def test_a_row_comes_as_often_as_its_weight_says_to_within_one() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        weight = rng.exponential(size=7) * rng.integers(0, 2, 7) + 1e-3 * np.eye(7)[3]
+        rows = systematic_rows(weight, 40, rng)
+        expected = 40 * weight / weight.sum()
+        assert (np.diff(rows) >= 0).all()
+        assert (np.abs(np.bincount(rows, minlength=7) - expected) < 1).all()
+
+
+def test_the_mean_number_of_draws_is_the_weight() -> None:
+    rng = np.random.default_rng(1)
+    weight = np.array([0.05, 0.0, 0.6, 0.35])
+    counts = sum(np.bincount(systematic_rows(weight, 3, rng), minlength=4) for _ in range(4000))
+    assert np.abs(counts / 12000 - weight).max() < 0.01
+
+
+class Last:
+    """The largest number that a generator draws."""
+
+    def uniform(self) -> float:
+        return float(np.nextafter(1.0, 0.0))
+
+
+def test_rounding_leads_to_no_row_beyond_the_last() -> None:
+    weight = np.full(49, 1 / 49)
+    assert systematic_rows(weight, 10_000, Last())[-1] == 48  # type: ignore[arg-type]
