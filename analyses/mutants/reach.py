@@ -23,10 +23,10 @@ TESTS = {
     "comparison": ["tests/comparison"],
     "discovery": _files("discovery", "explore global_test held_out model_space name_evidence power refit sharing "
                                      "settings shrinking subsets thresholds verdict"),
-    "robot/mechanics": _files("robot", "statics tensions"),
+    "robot/mechanics": _files("robot", "statics tensions pulleys"),
     "robot/motion": _files("robot", "forward"),
-    "robot/pose": _files("robot", "pose_reports"),
-    "robot/proof": _files("robot", "certificate reach"),
+    "robot/pose": _files("robot", "pose_reports answer"),
+    "robot/proof": _files("robot", "certificate reach drawn pulleys"),
 }  # fmt: skip
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant
 

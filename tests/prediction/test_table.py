@@ -9,6 +9,7 @@ from scipy import stats
 from tests.model.dense import normal
 from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
+from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.prediction.table import HEADER, mixture_table, table
 from wirebayes.results.store import Stored
@@ -58,3 +59,29 @@ def test_undecided_models_answer_as_often_as_they_are_probable() -> None:
         for name, level in (("q05_N", 0.05), ("q95_N", 0.95)):
             below = sum(share * stats.norm.cdf(row[name], mean[i], sd[i]) for share, mean, sd in parts)
             assert below == pytest.approx(level, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("shares", "used"),
+    [((1.0,), [4000]), ((0.75, 0.25), [3000, 1000]), ((0.9999, 1e-4), [4000, 2]), ((1.0 - 1e-9, 1e-9), [4000, 2])],
+)
+def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_has_two(
+    shares: tuple[float, ...], used: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Evenly spread over the stored ones, from the first to the last."""
+    experiment = simulated_tests([Bench(displacements_mm=(2,))], Truth(WIRE), seed=1)[0]
+    protocol = experiment.protocol()
+    question = PredictionRequest(protocol, 0, np.ones(1, bool), np.full(1, np.nan))
+    stored = SimpleNamespace(theta=np.arange(9000.0)[:, None], problem=None, sample=SimpleNamespace(name="wire"))
+    request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
+    asked: list[np.ndarray] = []
+
+    def predict(problem: None, theta: np.ndarray, *rest: object) -> np.ndarray:
+        asked.append(theta[:, 0])
+        return np.zeros((*protocol.time_s.shape, len(theta)))
+
+    monkeypatch.setattr(module, "predict", predict)
+    mixture_table([(share, request) for share in shares])  # type: ignore[misc]
+    assert [len(rows) for rows in asked] == used
+    for rows in asked:
+        assert (rows[0], rows[-1]) == (0.0, 8999.0) and np.ptp(np.diff(rows)) <= 1.0

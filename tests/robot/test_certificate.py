@@ -71,7 +71,9 @@ def test_a_platform_free_to_move_is_not_certified():
 def test_bounds_too_wide_are_not_certified():
     robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke")
     known = np.full(robot.legs, k1)
-    assert not certify(robot, "hooke", (0.5 * known, 2 * known), (zero - 0.05, zero + 0.05), offset, x, R).proved
+    proof = certify(robot, "hooke", (0.5 * known, 2 * known), (zero - 0.05, zero + 0.05), offset, x, R)
+    assert not proof.proved
+    assert proof.unique_m == 0.0 and np.isnan(proof.radius_m).all()
 
 
 def test_wires_on_the_edge_of_slackness_are_handled():

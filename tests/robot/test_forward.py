@@ -156,3 +156,23 @@ def test_linear_actuator_keeps_its_wire_and_moves_through_the_ratio():
     np.testing.assert_allclose(half.joint_m, 0.5 * commands.joint_m)
     found = forward.solve(robot, c.wires, zero, offset, c.position_m + 1e-3, rotation.matrix(np.zeros(3)))
     assert _distance(robot, found, c.position_m, c.rotation).max() < 1e-9
+
+
+def test_a_tackle_of_lines_is_solved_as_one_line_of_their_stiffness():
+    """m lines of k1, m times as long, pull as one of m k1: the same poses, and the same force is left to rounding."""
+    plain = schema.read("cogiro-desk")
+    robot, tackle = (replace(plain, lines=np.full(8, m)) for m in (1.0, 4.0))
+    c = cases.disturbed(plain, "hooke", 20, np.random.default_rng(3))
+    free, n = c.zero_m - c.offset_m, len(c.zero_m)
+    found, begun = [], []
+    for one, m in ((robot, 1.0), (tackle, 4.0)):
+        wires = replace(c.wires, theta={"k1": c.wires.theta["k1"] / m})
+        found.append(forward.solve(one, wires, m * free, np.zeros(8), c.position_m, c.rotation))
+        R = np.moveaxis(c.rotation, 0, -1)
+        start = m * free.T, np.zeros((8, n)), c.position_m.T, R
+        begun.append(forward._begin(one, wires, *start, np.ones((6, 1))))
+    np.testing.assert_allclose(found[1].position_m, found[0].position_m, atol=1e-12)
+    np.testing.assert_allclose(4.0 * found[1].tension_N, found[0].tension_N, atol=1e-9)
+    np.testing.assert_array_equal(found[1].status, found[0].status)
+    for name in ("floor", "level"):
+        np.testing.assert_allclose(getattr(begun[1], name), getattr(begun[0], name))

@@ -41,6 +41,18 @@ def test_impossible_bounds_are_refused():
     assert tensions.minimum_norm(structure, load, 0.5, 1.0) is None
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_tensions_that_leave_their_bounds_come_back_to_the_corner_that_is_nearest(axis, sign):
+    """10 N on three wires side by side, 1 to 5 N each: one too tight, one too loose, by an axis of the null space."""
+    structure, load = np.ones((1, 3)), np.array([10.0])
+    way = sign * np.linalg.svd(structure)[2][1 + axis]
+    corner = np.full(3, 4.0)
+    corner[way.argmax()], corner[way.argmin()] = 5.0, 1.0
+    np.testing.assert_allclose(tensions.nearest(corner + 2.0 * way, structure, load, 1.0, 5.0), corner, atol=1e-9)
+    assert tensions.nearest(corner + 2.0 * way, structure, load, 1.0, 3.3) is None
+
+
 def test_a_pose_outside_the_wires_is_infeasible():
     robot = schema.read("cogiro-desk")
     tau = inverse.tensions(robot, np.array([[3.0, 0.0, 0.3]]), np.eye(3)[None])
