@@ -91,10 +91,10 @@ def main() -> int:
             ratios = {}
             for column in (c for c in plan.widths if c not in CREEP):
                 real = np.array([row[column] for row in kept])
-                ratio = plan.widths[column].width_90 / real.mean()
-                middle = plan.widths[column].sd_median / np.median([row[f"{column} sd"] for row in kept])
+                ratio = plan.widths[column]["width_90"] / real.mean()
+                middle = plan.widths[column]["sd_median"] / np.median([row[f"{column} sd"] for row in kept])
                 error = ratio * real.std(ddof=1) / np.sqrt(len(real)) / real.mean()
-                ratios[column] = {"planned": plan.widths[column].width_90, "fits": float(real.mean()),
+                ratios[column] = {"planned": plan.widths[column]["width_90"], "fits": float(real.mean()),
                                   "ratio": float(ratio), "se": float(error),
                                   "ratio_of_median_sds": float(middle)}  # fmt: skip
             result[name] = {"fits": len(kept), "not_converged": len(rows) - len(kept), "ratios": ratios}

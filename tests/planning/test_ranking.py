@@ -1,15 +1,16 @@
 """The order of planned tests: within the time there is first, then by the aim."""
 
 from wirebayes.planning.ranking import Judged, ranked, too_long
-from wirebayes.planning.sensitivity import EffectPower, Sensitivity
-from wirebayes.planning.widths import Expected, Width
+from wirebayes.planning.sensitivity import Sensitivity
+from wirebayes.planning.widths import Expected
 from wirebayes.simulation.synthetic import Bench
 
 
 def judged(name, bits, creep_sd, cosine=0.0, holds=10):
-    width = Width(creep_sd, 0.0, creep_sd, 0.0, 0.0, 0.0, 1.0)
+    width = {"sd": creep_sd, "sd_se": 0.0, "sd_median": creep_sd, "width_90": 0.0, "width_90_low": 0.0,
+             "width_90_high": 0.0, "guess_sd": 1.0}  # fmt: skip
     expected = Expected({"creep_1h_mm": width}, 1.0, 1000.0, 60.0, bits, 5, ())
-    power = EffectPower(1.0, "-", 4.0, 10.0, ())
+    power = {"amplitude_80": 1.0, "unit": "-", "delta_80": 4.0, "delta_prior": 10.0, "confused_with": []}
     effects = Sensitivity({"a": power, "b": power}, {("a", "b"): cosine, ("b", "a"): cosine})
     bench = Bench(name, displacements_mm=tuple(range(1, holds + 1)), times_s=(0.0, 60.0))
     return Judged(bench.experiment(), "", expected, effects)

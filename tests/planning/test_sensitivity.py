@@ -34,12 +34,12 @@ def test_lost_motion_needs_a_way_back(up):
     assert "lost_motion" not in up.effects
     assert any(sentence.startswith("lost_motion: this protocol cannot show it") for sentence in up.hidden)
     back = seen(THERE_AND_BACK)
-    assert back.effects["lost_motion"].amplitude_80 > 0
-    assert back.effects["lost_motion"].unit == "mm"
+    assert back.effects["lost_motion"]["amplitude_80"] > 0
+    assert back.effects["lost_motion"]["unit"] == "mm"
 
 
 def test_what_looks_alike_is_said_and_lies_close(up):
-    assert "toe" in up.effects["strain_stiffening"].confused_with
+    assert "toe" in up.effects["strain_stiffening"]["confused_with"]
     assert up.apart("toe", "strain_stiffening") < up.apart("toe", "steady_creep")
     assert up.apart("toe", "strain_stiffening") == pytest.approx(up.apart("strain_stiffening", "toe"))
     assert up.apart("toe", "lost_motion") == 0.0
@@ -47,9 +47,9 @@ def test_what_looks_alike_is_said_and_lies_close(up):
 
 def test_delta_is_amplitude_in_units_of_what_is_seen(up):
     effect = up.effects["steady_creep"]
-    ratio = CATALOGUE["steady_creep"]().amplitudes[0].prior.std() / effect.amplitude_80
-    assert effect.delta_prior == pytest.approx(ratio * effect.delta_80)
-    assert 2.0 < effect.delta_80 < 10.0  # fewer standard deviations are chance, more are plain to see
+    ratio = CATALOGUE["steady_creep"]().amplitudes[0].prior.std() / effect["amplitude_80"]
+    assert effect["delta_prior"] == pytest.approx(ratio * effect["delta_80"])
+    assert 2.0 < effect["delta_80"] < 10.0  # fewer standard deviations are chance, more are plain to see
 
 
 def test_nothing_to_look_for_leaves_what_is_absorbed():
@@ -62,7 +62,7 @@ def test_nothing_to_look_for_leaves_what_is_absorbed():
 @pytest.mark.statistical
 def test_an_amplitude_said_to_be_seen_in_four_of_five_tests_is():
     """Forty tests with steady creep of that size, each judged by the test that `discover` opens with."""
-    amplitude = seen(UP, simulations=300).effects["steady_creep"].amplitude_80
+    amplitude = seen(UP, simulations=300).effects["steady_creep"]["amplitude_80"]
     truth = Truth({**CENTRE, "steady_creep.a": amplitude}, (CATALOGUE["steady_creep"](),))
     found = 0
     for i in range(40):

@@ -75,10 +75,10 @@ def test_without_weights_it_would_not_be(monkeypatch):
 def test_more_readings_and_longer_holds_teach_more():
     few = planned(Bench("few", times_s=(0.0, 60.0, 120.0)))
     many = planned(Bench("many", times_s=tuple(np.linspace(0, 120, 25))))
-    assert many.widths["sensor_sd"].sd < 0.5 * few.widths["sensor_sd"].sd
+    assert many.widths["sensor_sd"]["sd"] < 0.5 * few.widths["sensor_sd"]["sd"]
     assert many.information_bits > few.information_bits
     long = planned(Bench("long", times_s=tuple(np.linspace(0, 1200, 25))))
-    assert long.widths["B"].sd < 0.7 * many.widths["B"].sd
+    assert long.widths["B"]["sd"] < 0.7 * many.widths["B"]["sd"]
     assert long.information_bits > many.information_bits
 
 
@@ -87,7 +87,7 @@ def test_creep_is_stated_for_one_tension_and_length():
     test = at_centre(bench.experiment(), guess(5), "hooke", "saturating")
     assert typical_tension(test) == pytest.approx(np.median([h.tension_N[0] for h in test.recorded_holds]))
     own, twice = planned(bench), planned(bench, length_mm=2000.0)
-    ratio = twice.widths["creep_1h_mm"].sd / own.widths["creep_1h_mm"].sd
+    ratio = twice.widths["creep_1h_mm"]["sd"] / own.widths["creep_1h_mm"]["sd"]
     assert ratio == pytest.approx(2.0)
     assert twice.widths["k1"] == own.widths["k1"]
 
@@ -100,7 +100,7 @@ def test_a_fixed_parameter_has_no_width_and_priors_of_the_fit_count():
     )
     tight = expected_widths(fixed, guess(20) | {"N": np.full(20, 0.7)}, np.random.default_rng(1))
     assert "N" not in tight.widths
-    assert tight.widths["k2"].sd < 0.1 * loose.widths["k2"].sd
+    assert tight.widths["k2"]["sd"] < 0.1 * loose.widths["k2"]["sd"]
 
 
 def test_the_same_seed_gives_the_same_widths_and_draws_are_kept():

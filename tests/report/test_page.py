@@ -202,7 +202,8 @@ def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
     for converged in (True, False):
         (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"converged": converged}))
         assert ("do not trust these intervals" in read(write(copy)).words) is not converged
-    for check in ({"passed": True, "sentence": "good"}, {"passed": False, "sentence": "bad"}):
+    for passed, sentence in ((True, "good"), (False, "bad")):
+        check = {"passed": passed, "sentence": sentence, "gross_errors": []}
         (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"model_check": check}))
         words = read(write(copy)).words
         assert check["sentence"] in words.split("What was measured")[0]
@@ -343,7 +344,7 @@ def test_the_page_of_a_pose_that_cannot_be_held_says_so(tmp_path):
 
 
 def test_the_page_of_a_comparison_lists_models_and_failures(tmp_path):
-    good = {"name": "plain", "failed": None, "weight": 0.75, "difference": {"elpd": 0.0, "se": 0.0}}
+    good = {"name": "plain", "failed": None, "weight": 0.75, "difference": {"elpd": 0.0, "se": 0.0}, "held_out": None}
     bad = {"name": "toe", "failed": "no finite start", "meaning": ""}
     models = [good | {"meaning": "the base"}, bad]
     content = {"experiments": {"wire-a": {"base": "plain", "models": models}}}

@@ -23,10 +23,10 @@ def lot(n=12, seed=0, **about):
 
 def test_a_specimen_that_lies_apart_is_named_with_its_parameter():
     (found,) = outliers([*lot(), row("odd", 2000.0)])
-    assert (found.experiment, found.parameter, found.specimens) == ("odd", "k1", 13)
-    assert found.z > threshold(13, 2)
-    assert found.sentence.startswith("odd: k1 is 2000, ")
-    assert "above the median of 13 specimens of line" in found.sentence
+    assert (found["experiment"], found["parameter"], found["specimens"]) == ("odd", "k1", 13)
+    assert found["z"] > threshold(13, 2)
+    assert found["sentence"].startswith("odd: k1 is 2000, ")
+    assert "above the median of 13 specimens of line" in found["sentence"]
 
 
 def test_an_uncertain_specimen_is_none():
@@ -50,14 +50,14 @@ def test_six_specimens_are_compared_five_are_not(specimens, compared):
 
 def test_creep_is_compared_per_metre_of_length_and_said_so():
     (found,) = outliers([*lot(), row("odd", 1000.0, length=2000.0, b=0.8)])
-    assert (found.parameter, found.value, found.median) == ("B", pytest.approx(0.8), pytest.approx(0.2))
-    assert "B per m of length is 0.8" in found.sentence
+    assert (found["parameter"], found["value"], found["median"]) == ("B", pytest.approx(0.8), pytest.approx(0.2))
+    assert "B per m of length is 0.8" in found["sentence"]
 
 
 def test_a_low_specimen_lies_below_and_the_farthest_comes_first():
     found = outliers([*lot(), row("low", 500.0), row("lower", 200.0)])
-    assert [o.experiment for o in found] == ["lower", "low"]
-    assert "below the median" in found[0].sentence and found[0].z < 0
+    assert [o["experiment"] for o in found] == ["lower", "low"]
+    assert "below the median" in found[0]["sentence"] and found[0]["z"] < 0
 
 
 @pytest.mark.parametrize(("distance", "far"), [(0.95, False), (1.05, True)])
@@ -72,7 +72,7 @@ def test_specimens_that_agree_are_judged_by_the_width_of_the_posterior(distance,
 def test_positive_parameters_are_compared_by_their_logarithms_others_as_they_are():
     """Stiffnesses spread by a factor: a hundredth lies far, though by its difference it would be among the others."""
     spread = [row(f"s{i}", 1000.0 * np.exp(0.4 * z)) for i, z in enumerate(np.linspace(-2.0, 2.0, 21))]
-    assert [o.experiment for o in outliers([*spread, row("soft", 10.0)])] == ["soft"]
+    assert [o["experiment"] for o in outliers([*spread, row("soft", 10.0)])] == ["soft"]
 
     def offset(name, at):
         quantiles = {"q05": at - 0.01, "q50": at, "q95": at + 0.01}
@@ -80,7 +80,7 @@ def test_positive_parameters_are_compared_by_their_logarithms_others_as_they_are
 
     even = [offset(f"s{i}", at) for i, at in enumerate(np.linspace(-1.0, 1.0, 21))]
     assert not outliers(even)
-    assert [o.experiment for o in outliers([*even, offset("odd", 9.0)])] == ["odd"]
+    assert [o["experiment"] for o in outliers([*even, offset("odd", 9.0)])] == ["odd"]
 
 
 def test_a_robust_z_is_the_distance_in_expected_distances():
@@ -98,7 +98,7 @@ def test_a_robust_z_is_the_distance_in_expected_distances():
 def test_equal_specimens_divide_nothing_by_zero():
     same = [row(f"s{i}", 1000.0, sd=0.0) for i in range(8)]
     assert not outliers(same)
-    assert [o.experiment for o in outliers([*same, row("odd", 1001.0, sd=0.0)])] == ["odd"]
+    assert [o["experiment"] for o in outliers([*same, row("odd", 1001.0, sd=0.0)])] == ["odd"]
 
 
 def share_of_false_alarms(specimens, sets=10_000):

@@ -3,9 +3,20 @@
 import json
 from collections import Counter
 from textwrap import wrap
-from typing import Any
+from typing import Any, cast
 
 from wirebayes.io.run_folder import plain
+from wirebayes.json_files.batch import BatchJson
+from wirebayes.json_files.calibrate import CalibrateJson
+from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
+from wirebayes.json_files.comparison import ComparedModels
+from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.imported import ImportedExperiment
+from wirebayes.json_files.plan import JudgedProtocol
+from wirebayes.json_files.pose import PoseJson
+from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.values import Quantiles
 from wirebayes.workflows.results import (
     Batch,
     Calibration,
@@ -119,24 +130,25 @@ def next_step(result: Result[Any]) -> str:
     return f"read {folder}"
 
 
-def _posterior(summary: dict[str, Any]) -> list[str]:
-    check, derived = summary.get("model_check") or {"passed": None}, summary["derived"]
+def _posterior(summary: SummaryJson) -> list[str]:
+    derived = summary["derived"]
     state = "converged" if summary["converged"] else "NOT CONVERGED"
-    passed = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[check["passed"]]
+    passed = summary["model_check"]["passed"] if "model_check" in summary else None
+    checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
     names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
     parameters = ", ".join(f"{name} {_band(summary['parameters'][name])}" for name in names)
     creep = f"creep after 2 min at {derived['tension_N']:g} N {_band(derived['creep_2min_mm'])} mm"
-    return [f"{summary['experiment']}: {state}, {passed}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
+    return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
 
 
 _SHOWN = ("k1", "B", "U", "k2", "N")
 
 
-def _effects(summary: dict[str, Any]) -> list[str]:
+def _effects(summary: SummaryJson) -> list[str]:
     return [key.split("@")[0] for key in summary["effects"]]
 
 
-def _finding(name: str, report: dict[str, Any]) -> list[str]:
+def _finding(name: str, report: ExperimentFindings) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
     said = _NAMED.get(verdict, f"{verdict}: {effects}")
     if verdict == "partial":
@@ -155,7 +167,7 @@ def _finding(name: str, report: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _imported(name: str, test: dict[str, Any]) -> list[str]:
+def _imported(name: str, test: ImportedExperiment) -> list[str]:
     sample = f"{test['length_mm']:g} mm of {test['material']}"
     return [
         f"{name}: {test['holds']} holds, {test['readings']} readings, {sample}",
@@ -163,7 +175,7 @@ def _imported(name: str, test: dict[str, Any]) -> list[str]:
     ]
 
 
-def _batch(found: dict[str, Any]) -> list[str]:
+def _batch(found: BatchJson) -> list[str]:
     rows, far = found["experiments"], found["outliers"]
     failed = sum(row["error"] is not None for row in rows)
     converged = sum(bool(row["converged"]) for row in rows)
@@ -175,7 +187,7 @@ def _batch(found: dict[str, Any]) -> list[str]:
     return lines + ([f"  and {len(far) - _MOST_LINES} more outliers"] if len(far) > _MOST_LINES else [])
 
 
-def _planned(row: dict[str, Any]) -> list[str]:
+def _planned(row: JudgedProtocol) -> list[str]:
     budget = "" if row["within_budget"] else ", longer than the available time"
     lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
     known = [f"{name} {row['parameters'][name]['sd_median']:.2g}" for name in _SHOWN if name in row["parameters"]]
@@ -190,7 +202,7 @@ def _planned(row: dict[str, Any]) -> list[str]:
 _MOST_LINES = 10  # of outliers, on a terminal
 
 
-def _checked(name: str, test: dict[str, Any]) -> list[str]:
+def _checked(name: str, test: CheckedExperiment) -> list[str]:
     recorded = f"{test['recorded_holds']} holds, {test['readings']} readings in {test['duration_s'] / 60.0:.3g} min"
     steps = f", written in steps of {test['resolution_N']:g} N" if test["resolution_N"] else ""
     lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
@@ -227,7 +239,7 @@ _SHOWS = {
 }
 
 
-def _size(effect: str, found: dict[str, Any]) -> str:
+def _size(effect: str, found: EffectSize) -> str:
     if found["amplitude_80"] is None:
         return f"{effect} ({found['reason']})"
     return f"{effect} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
@@ -242,28 +254,28 @@ def _wrapped(title: str, items: list[str]) -> list[str]:
     return [line.replace("\u00a0", " ") for line in lines]
 
 
-def _comparison(name: str, table: dict[str, Any]) -> str:
+def _comparison(name: str, table: ComparedModels) -> str:
     best, *others = [row["name"] for row in table["models"] if row["failed"] is None] or ["none"]
     return f"{name}: {best} predicts left-out holds best" + (f", then {', '.join(others[:2])}" if others else "")
 
 
-def _pose(found: dict[str, Any]) -> list[str]:
+def _pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     if not found["feasible"]:
         return [f"{found['robot']}: {found['sentence']}"]
     lines = []
-    measured = found.get("history", {}).get("kind") == "measured"
-    said = "is away from where it is meant to be" if measured else "has drifted"
+    measured = "history" in found and cast(PoseHistoryJson, found)["history"]["kind"] == "measured"
+    moved = "is away from where it is meant to be" if measured else "has drifted"
     for drift in found["drift"]:
         far, time = drift["distance_mm"], drift["times_s"][-1]
         if far["q50"] is not None:
             lines.append(
-                f"{found['robot']}: after {time:g} s the platform {said} by {far['q50'][-1]:.3g} mm "
+                f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
                 f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
             )
     return lines or [f"{found['robot']}: no draw of the wires could be solved"]
 
 
-def _calibration(found: dict[str, Any]) -> list[str]:
+def _calibration(found: CalibrateJson) -> list[str]:
     known = found["with_creep_model"]
     if not known["converged"]:
         return [f"{found['robot']}: not converged, no lengths to use"]
@@ -273,5 +285,5 @@ def _calibration(found: dict[str, Any]) -> list[str]:
     return [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
 
 
-def _band(quantity: dict[str, float] | None) -> str:
+def _band(quantity: Quantiles | ParameterRange | None) -> str:
     return "-" if quantity is None else f"{quantity['q50']:.4g} [{quantity['q05']:.4g}, {quantity['q95']:.4g}]"

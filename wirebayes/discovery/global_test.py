@@ -19,6 +19,7 @@ from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.json_files.discovery import GrossError
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
@@ -52,7 +53,7 @@ class Gate:
     """
 
     blocks: list[LaplaceFit]
-    struck: list[dict[str, Any]]
+    struck: list[GrossError]
     trials: list[Probe]
     candidates: list[Candidate]
     patterns: list[Any]
@@ -99,7 +100,7 @@ def examine(
     trials, candidates = screening.candidate_probes(blocks, kinds)
     if not candidates:
         raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
-    struck: list[dict[str, Any]] = []
+    struck: list[GrossError] = []
     for i, block in enumerate(blocks):
         blocks[i], gone = _strike_gross_errors(block, trials, candidates, i, rng)
         struck += gone
@@ -169,8 +170,8 @@ def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, 
 
 def _strike_gross_errors(
     block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: np.random.Generator
-) -> tuple[LaplaceFit, list[dict[str, Any]]]:
-    struck: list[dict[str, Any]] = []
+) -> tuple[LaplaceFit, list[GrossError]]:
+    struck: list[GrossError] = []
     most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))
     while len(struck) < most:
         own = [c for c in candidates if i in c.blocks]

@@ -11,7 +11,6 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -148,7 +147,7 @@ def check_model(
         alpha,
         len(gate.test.null),
         names if failed else (),
-        tuple(cast(list[GrossError], gate.struck)),
+        tuple(gate.struck),
         "",
         bool(effects),
     )

@@ -8,7 +8,7 @@ detected.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +28,10 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import (
     Amplitude,
     Answer,
+    DetectableAmplitude,
     Disagreement,
+    DiscoveryJson,
     ExperimentFindings,
-    GrossError,
     HeldOutReport,
     Outlook,
     Remainder,
@@ -56,7 +57,7 @@ class Findings:
         For each material the models that the readings leave undecided, the final one first; empty where nothing is.
     """
 
-    report: dict[str, Any]
+    report: DiscoveryJson
     final: tuple[LaplaceFit, ...]
     undecided: tuple[list[Alternative], ...] = ()
 
@@ -77,7 +78,7 @@ def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = 
 
 def discover(
     experiments: Sequence[Experiment], *, without: Sequence[str] = (), seed: int = 0, **settings: Any
-) -> dict[str, Any]:
+) -> DiscoveryJson:
     """The content of ``discovery.json`` for the experiments of one file (see `investigate`).
 
     Parameters
@@ -185,7 +186,7 @@ def _own_reports(
             "steps": check.steps,
             "held_out": check.held_out,
             "residual_rms_N": shrinking.left_over(block, e.name),
-            "gross_errors": [g for g in cast(list[GrossError], gate.struck) if g["experiment"] == e.name],
+            "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
         }
         for e, check in zip(block.experiments, checks, strict=True)
     }
@@ -337,7 +338,7 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
     block, trials, candidates = gate.blocks[i], gate.trials, gate.candidates
     found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)
     best_probe = {name: k for name, (k, _) in found.items()}
-    seen = {
+    seen: dict[str, DetectableAmplitude] = {
         name: {"amplitude_80": amplitude, "unit": trials[k].effect.amplitudes[0].unit}
         for name, (k, amplitude) in found.items()
     }

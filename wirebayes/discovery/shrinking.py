@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 
@@ -12,12 +11,13 @@ from wirebayes.discovery.settings import KEEP_ELPD
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
+from wirebayes.json_files.discovery import HeldOut, LeaveOneHoldOutGain, Scores, Step
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
-_NOTHING: dict[str, Any] = {"rmse_N": None, "elpd": None, "coverage_90": None}
-_NOT_HELD_OUT: dict[str, Any] = {
-    "holds": [], "plain": _NOTHING, "final": _NOTHING | {"elpd_difference_se": None}, "gap_closed": None,
+_NOTHING: Scores = {"rmse_N": None, "elpd": None, "coverage_90": None}
+_NOT_HELD_OUT: HeldOut = {
+    "holds": [], "plain": _NOTHING, "final": {**_NOTHING, "elpd_difference_se": None}, "gap_closed": None,
     "shrinks": False,
 }  # fmt: skip
 
@@ -34,8 +34,8 @@ class Shrinking:
         The same scores of the plain model and of each accepted effect in turn.
     """
 
-    held_out: dict[str, Any]
-    steps: list[dict[str, Any]]
+    held_out: HeldOut
+    steps: list[Step]
 
 
 def shrinking(
@@ -71,8 +71,7 @@ def shrinking(
     train = [held_out.last_third(e) for e in plain.experiments]
     models = ["plain", *names]
     if not all(train):
-        steps = [{"model": m} | _NOTHING for m in models]
-        return [Shrinking(dict(_NOT_HELD_OUT), [dict(step) for step in steps]) for _ in train]
+        return [Shrinking(_NOT_HELD_OUT.copy(), [{"model": m, **_NOTHING} for m in models]) for _ in train]
     smooth = [_beside_discrepancy(plain, train, rng, parallel_map)] if remains or stages else []
     if remains and stages:
         smooth.append(_beside_discrepancy(stages[-1], train, rng, parallel_map))
@@ -88,7 +87,7 @@ def shrinking(
     out = []
     for i, before in enumerate(by_step[0]):
         report = _compared(before, final[i], flexible[i], gain)
-        steps = [{"model": m} | _score(part[i]) for m, part in zip(models, by_step, strict=True)]
+        steps: list[Step] = [{"model": m, **_score(part[i])} for m, part in zip(models, by_step, strict=True)]
         out.append(Shrinking(report, steps))
     return out
 
@@ -141,7 +140,7 @@ class _Gain:
         """Clearly better than plain, and no worse than the smooth discrepancy."""
         return self.final > max(KEEP_ELPD, 2.0 * self.standard_error) and self.final >= self.flexible
 
-    def to_dict(self) -> dict[str, float]:
+    def to_dict(self) -> LeaveOneHoldOutGain:
         return {
             "elpd_difference": self.final,
             "elpd_difference_se": self.standard_error,
@@ -162,14 +161,14 @@ def _gain(
 
 def _compared(
     plain: held_out.HeldOut, final: held_out.HeldOut, flexible: held_out.HeldOut | None, gain: _Gain | None
-) -> dict[str, Any]:
+) -> HeldOut:
     """What the report says of the held-out holds of one experiment."""
     d = final.elpd - plain.elpd
     spread = float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None
     return {
         "holds": plain.holds,
         "plain": _score(plain),
-        "final": _score(final) | {"elpd_difference_se": spread},
+        "final": {**_score(final), "elpd_difference_se": spread},
         "flexible": _score(flexible) if flexible else None,
         "floor_N": float(np.sqrt(final.floor)),
         "gap_closed": held_out.gap_closed(plain, final) if gain else None,
@@ -215,5 +214,5 @@ def left_over(block: LaplaceFit, name: str) -> float:
     return float(np.sqrt((((sample.readings - line.tension)[sample.protocol.mask]) ** 2).mean()))
 
 
-def _score(held: held_out.HeldOut) -> dict[str, Any]:
+def _score(held: held_out.HeldOut) -> Scores:
     return {"rmse_N": held.rmse_N, "elpd": float(held.elpd.sum()), "coverage_90": held.inside}

@@ -37,7 +37,11 @@ class Row(DiscoveryColumns):
 
 
 class OutlierRow(TypedDict):
-    """A parameter of a specimen far from those of the others; `results.outliers.Outlier` says what each value is."""
+    """A parameter of a specimen that lies far from those of the others of its material.
+
+    `value` is the specimen's posterior median, `median` that of all specimens of the material, B per m of length; `z`
+    robust standard deviations lie between them. `specimens` of the material were compared.
+    """
 
     experiment: str
     material: str

@@ -3,6 +3,7 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import MeanAndSd, Numbers
+from wirebayes.typing import Array
 
 
 class CalibrationPrior(TypedDict):
@@ -52,7 +53,7 @@ class Observed(TypedDict):
     """What the poses can determine, and which to read next."""
 
     observability: Observability
-    next_positions_m: Numbers
+    next_positions_m: Array | list[list[float]]
 
 
 class CalibratedPoses(TypedDict):

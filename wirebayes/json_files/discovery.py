@@ -1,6 +1,6 @@
 """``discovery.json``: what the plain model is missing."""
 
-from typing import Any, Literal, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 
@@ -51,10 +51,17 @@ class Answer(TypedDict):
     where: list[Disagreement]
 
 
+class DetectableAmplitude(TypedDict):
+    """The smallest amplitude that is detected in 80 % of such tests; None where none is large enough."""
+
+    amplitude_80: float | None
+    unit: str
+
+
 class Outlook(TypedDict):
     """What could have been seen, what cannot be, and what to measure next."""
 
-    power: dict[str, dict[str, Any]]
+    power: dict[str, DetectableAmplitude]
     not_identifiable: list[str]
     next_measurement: str
 
@@ -68,11 +75,52 @@ class GrossError(TypedDict):
     log_bayes: float
 
 
+class Scores(TypedDict):
+    """How one model predicts the held-out holds; None where no holds were held out."""
+
+    rmse_N: float | None
+    elpd: float | None
+    coverage_90: float | None
+
+
+class Step(Scores):
+    """The plain model, or the model with one accepted effect more than the step before."""
+
+    model: str
+
+
+class FinalScores(Scores):
+    """With the standard error of the elpd's difference from the plain model; None for a single hold."""
+
+    elpd_difference_se: float | None
+
+
+class LeaveOneHoldOutGain(TypedDict):
+    """What the final model, and a smooth discrepancy alone, gain over the plain one with holds left out in turn."""
+
+    elpd_difference: float
+    elpd_difference_se: float
+    flexible_elpd_difference: float
+
+
+class HeldOut(TypedDict):
+    """The last holds predicted from the first; `floor_N` is the rms error that sensor noise alone would leave."""
+
+    holds: list[int]
+    plain: Scores
+    final: FinalScores
+    flexible: NotRequired[Scores | None]
+    floor_N: NotRequired[float]
+    gap_closed: float | None
+    leave_one_hold_out: NotRequired[LeaveOneHoldOutGain | None]
+    shrinks: bool
+
+
 class HeldOutReport(TypedDict):
     """How models predict an experiment's holds that they did not see."""
 
-    steps: list[dict[str, Any]]
-    held_out: dict[str, Any]
+    steps: list[Step]
+    held_out: HeldOut
     residual_rms_N: float
     gross_errors: list[GrossError]
 

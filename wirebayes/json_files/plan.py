@@ -2,11 +2,18 @@
 
 from typing import TypedDict
 
+from wirebayes.json_files.discovery import DetectableAmplitude
 from wirebayes.json_files.values import Statistics
 
 
 class ExpectedWidth(TypedDict):
-    """Of a quantity's posterior; `planning.widths.Width` says what each value is."""
+    """Of a quantity's posterior, over the simulated tests.
+
+    `sd` is the mean of its standard deviations, `sd_se` the standard error of that mean, `sd_median` their median,
+    which a few odd draws of a vague guess do not move. `width_90` is the mean length of its 90 % interval; in 90 % of
+    the tests that length lies between `width_90_low` and `width_90_high`. `guess_sd` is the standard deviation before
+    the test.
+    """
 
     sd: float
     sd_se: float
@@ -17,11 +24,14 @@ class ExpectedWidth(TypedDict):
     guess_sd: float
 
 
-class EffectSeen(TypedDict):
-    """What a test would show of one effect; `planning.sensitivity.EffectPower` says what each value is."""
+class EffectPower(DetectableAmplitude):
+    """What a test would show of one effect.
 
-    amplitude_80: float | None
-    unit: str
+    `delta_80` is the signature of `amplitude_80` in standard deviations of what the readings leave it, `delta_prior`
+    the same of one standard deviation of the effect's prior. The signatures of the effects in `confused_with` are as
+    good as the same (cosine above `discovery.power.ALIKE`).
+    """
+
     delta_80: float | None
     delta_prior: float
     confused_with: list[str]
@@ -62,7 +72,7 @@ class JudgedProtocol(TypedDict):
     simulated_tests: int
     parameters: dict[str, ExpectedWidth]
     creep: ExpectedCreep
-    effects: dict[str, EffectSeen]
+    effects: dict[str, EffectPower]
     cosines: dict[str, float]
     not_identifiable: list[str]
     robot: RobotDrift | None

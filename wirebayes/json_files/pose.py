@@ -1,4 +1,4 @@
-"""``pose.json``: a robot's pose on creeping wires, or poses over time."""
+"""``pose.json``: a robot's pose on creeping wires."""
 
 from typing import NotRequired, TypedDict
 
@@ -263,57 +263,23 @@ class Workspace(ClaimNumbers):
     slices: list[SliceOfWorkspace]
 
 
-class HistoryOfRobot(TypedDict):
-    """What the robot went through; `target` is what drift is counted from."""
-
-    kind: str
-    rows: int
-    duration_s: float
-    highest_payload_kg: float
-    restart_share: float | None
-    specimen_spread: float
-    reference_sd_mm: NotRequired[float]
-    target: NotRequired[str]
-    holds: NotRequired[int]
-
-
-class HistoryReadings(TypedDict):
-    """Tensions and tilts that were read on the way, and how well they agree with joint values and wires."""
-
-    tensions: int
-    tilts: int
-    tension_sd_N: float
-    tilt_sd_rad: float
-    misfit: NotRequired[float | None]
-    converged: NotRequired[bool]
-
-
-class Corrections(TypedDict):
-    """Changes of the joint values that bring the platform back, and what they leave."""
-
-    times_s: Numbers
-    change_mm: Band
-    left_mm: Band
-
-
-class Clock(TypedDict):
-    """How far poses move if the wires' clocks run on instead of starting anew."""
-
-    largest_mm: float
-    at_the_end_mm: float
-
-
-class PoseJson(TypedDict):
-    """The whole file; where nothing holds the platform, `sentence` says so and ends it."""
+class RobotOnWires(TypedDict):
+    """What every answer says; where nothing holds the platform, `sentence` says so and ends it."""
 
     version: int
     robot: str
     mass_kg: float
-    pose: NotRequired[PoseNow]
     wires: WiresUsed
-    tension_distribution: NotRequired[TensionDistribution]
     feasible: bool
     sentence: NotRequired[str]
+    warnings: NotRequired[list[str]]
+
+
+class PoseJson(RobotOnWires):
+    """The whole file for one pose."""
+
+    pose: PoseNow
+    tension_distribution: TensionDistribution
     feasible_draws: NotRequired[float]
     inverse: NotRequired[InverseKinematics]
     forward: NotRequired[ForwardKinematics]
@@ -325,12 +291,4 @@ class PoseJson(TypedDict):
     pose_error: NotRequired[list[ControllerError]]
     between_calibrations: NotRequired[list[BetweenCalibrations]]
     variance_shares: NotRequired[VarianceShares]
-    warnings: NotRequired[list[str]]
     workspace: NotRequired[Workspace | None]
-    # over time
-    history: NotRequired[HistoryOfRobot]
-    readings: NotRequired[HistoryReadings]
-    position_m: NotRequired[Band]
-    rotation_vector_rad: NotRequired[Band | None]
-    corrections: NotRequired[Corrections]
-    clock: NotRequired[Clock]

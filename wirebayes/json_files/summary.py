@@ -14,6 +14,18 @@ class Parameter(Statistics):
     r_hat: float
 
 
+class Derived(TypedDict):
+    """Of a fresh sample under a constant `tension_N`; None where a draw has no finite value, as of endless creep."""
+
+    tension_N: float
+    creep_2min_mm: Statistics | None
+    creep_1h_mm: Statistics | None
+    creep_1day_mm: Statistics | None
+    final_creep_mm: Statistics | None
+    median_creep_time_s: Statistics | None
+    stiffness_N: Statistics | None
+
+
 class Identifiability(TypedDict):
     """What the data taught about one parameter; `results.identifiability.Taught` says what each value is."""
 
@@ -74,7 +86,7 @@ class SummaryJson(TypedDict):
     convergence: str
     warnings: list[str]
     parameters: dict[str, Parameter]
-    derived: dict[str, float | Statistics | None]
+    derived: Derived
     identifiability: dict[str, Identifiability]
     extrapolation: ExtrapolatedCreep
     likelihood_evaluations: int

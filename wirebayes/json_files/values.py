@@ -1,6 +1,6 @@
 """Values that several files hold."""
 
-from typing import Any, TypedDict
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,10 @@ from wirebayes.typing import Floats
 # an array where it is computed, a list where it is read
 Numbers = Floats | list[float]
 Integers = NDArray[np.int64] | list[int]
+
+Quantile = Literal["q05", "q50", "q95"]
+Statistic = Literal["mean", "sd", Quantile]
+INTERVAL: tuple[Quantile, ...] = ("q05", "q50", "q95")  # the ends of a 90 % interval and the median between them
 
 
 class Quantiles(TypedDict):

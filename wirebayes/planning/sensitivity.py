@@ -15,36 +15,13 @@ from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
+from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.problem import build
 from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
-
-
-@dataclass(frozen=True)
-class EffectPower:
-    """What a test would show of one effect.
-
-    Attributes
-    ----------
-    amplitude_80 : float or None
-        Smallest amplitude that the global test detects in 80 % of tests; None where none is large enough.
-    unit : str
-    delta_80 : float or None
-        That amplitude's signature, in standard deviations of what the readings leave it.
-    delta_prior : float
-        The same of an amplitude of one standard deviation of the effect's prior.
-    confused_with : tuple of str
-        Effects whose signatures are as good as the same (cosine above `power.ALIKE`).
-    """
-
-    amplitude_80: float | None
-    unit: str
-    delta_80: float | None
-    delta_prior: float
-    confused_with: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -68,7 +45,7 @@ class Sensitivity:
         """How far two effects of prior size lie apart: the smaller δ, less what the other effect explains of it."""
         if one not in self.effects or other not in self.effects:
             return 0.0
-        smaller = min(self.effects[one].delta_prior, self.effects[other].delta_prior)
+        smaller = min(self.effects[one]["delta_prior"], self.effects[other]["delta_prior"])
         return smaller * float(np.sqrt(max(0.0, 1.0 - self.cosines[one, other] ** 2)))
 
 
@@ -110,12 +87,16 @@ def sensitivity(
     x = expand(block.target, block.modes.z[:1], trials)
     alike = power.similarity([x], trials, [float(x.ratio[0])])
     strength = np.median(null.norm, axis=0)
-    effects = {}
+    effects: dict[str, EffectPower] = {}
     for name, (k, seen) in power.detectable(null, trials, candidates, level).items():
         main = trials[k].effect.amplitudes[0]
-        confused = tuple(n for n in power.group_of([name], alike) if n != name)
-        delta = None if seen is None else seen * float(strength[k])
-        effects[name] = EffectPower(seen, main.unit, delta, float(strength[k] * main.prior.std()), confused)
+        effects[name] = {
+            "amplitude_80": seen,
+            "unit": main.unit,
+            "delta_80": None if seen is None else seen * float(strength[k]),
+            "delta_prior": float(strength[k] * main.prior.std()),
+            "confused_with": [n for n in power.group_of([name], alike) if n != name],
+        }
     return Sensitivity(effects, alike, tuple(hidden))
 
 

@@ -14,6 +14,7 @@ from wirebayes.inference.modes import Density, climb, rowwise
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import frozen
+from wirebayes.json_files.plan import ExpectedWidth
 from wirebayes.model.problem import MATERIAL, Problem, build
 from wirebayes.model.replicate import readings
 from wirebayes.typing import Array
@@ -33,41 +34,12 @@ _DEGREES = 4.0  # of the Student t: its tails cover those of a posterior near it
 
 
 @dataclass(frozen=True)
-class Width:
-    """Expected width of one quantity's posterior.
-
-    Attributes
-    ----------
-    sd : float
-        Its standard deviation, mean over the simulated tests.
-    sd_se : float
-        Standard error of that mean.
-    sd_median : float
-        Its median over the simulated tests, which a few odd draws of a vague guess do not move.
-    width_90 : float
-        Length of its 90 % interval, mean over the simulated tests.
-    width_90_low, width_90_high : float
-        Between which that length lies in 90 % of the tests.
-    guess_sd : float
-        Standard deviation before the test, of the guess.
-    """
-
-    sd: float
-    sd_se: float
-    sd_median: float
-    width_90: float
-    width_90_low: float
-    width_90_high: float
-    guess_sd: float
-
-
-@dataclass(frozen=True)
 class Expected:
     """What a test is expected to teach.
 
     Attributes
     ----------
-    widths : dict of name to Width
+    widths : dict of name to ExpectedWidth
         Parameters, then ``creep_longest_hold_mm`` and ``creep_1h_mm`` at `tension_N`.
     tension_N, length_mm : float
         For which creep is stated.
@@ -81,7 +53,7 @@ class Expected:
         Equally weighted posterior draws of the first few simulated tests.
     """
 
-    widths: dict[str, Width]
+    widths: dict[str, ExpectedWidth]
     tension_N: float
     length_mm: float
     longest_hold_s: float
@@ -279,10 +251,11 @@ def _log_volume(theta: Array, weight: Array, problem: Problem) -> Array:
     return np.asarray(0.5 * np.linalg.slogdet(covariance + 1e-24 * np.eye(len(columns)))[1])
 
 
-def _width(rows: Array, before: Array) -> Width:
+def _width(rows: Array, before: Array) -> ExpectedWidth:
     sd, length = rows.T
     low, high = np.quantile(length, [0.05, 0.95])
     se = float(sd.std(ddof=1) / np.sqrt(len(sd))) if len(sd) > 1 else 0.0
-    return Width(
-        float(sd.mean()), se, float(np.median(sd)), float(length.mean()), float(low), float(high), float(before.std())
-    )
+    return {
+        "sd": float(sd.mean()), "sd_se": se, "sd_median": float(np.median(sd)), "width_90": float(length.mean()),
+        "width_90_low": float(low), "width_90_high": float(high), "guess_sd": float(before.std()),
+    }  # fmt: skip

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from wirebayes.io.run_folder import plain, write_bytes
+from wirebayes.json_files.scene import SceneJson
 
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
 _SENTENCE = 36  # characters; no number with its interval is longer
@@ -110,7 +111,7 @@ class Links:
 class View:
     """A robot in 3-D that can be turned; `scene` is what ``view.js`` draws."""
 
-    scene: Mapping[str, Any]
+    scene: SceneJson
     alt: str
     caption: str = ""
     kind: str = "view"

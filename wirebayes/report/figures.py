@@ -9,6 +9,7 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy.ndimage import gaussian_filter
 
+from wirebayes.json_files.summary import ExtrapolatedCreep
 from wirebayes.report.blocks import unit_text
 from wirebayes.results.store import unit_of
 from wirebayes.typing import Array
@@ -298,7 +299,7 @@ def residuals(
     return figure
 
 
-def creep_ahead(ahead: Mapping[str, Any], title: str) -> Figure:
+def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
     """Creep under a constant tension against time: 90 % bands with the prior, with it counted half, and without data.
 
     Parameters
@@ -307,13 +308,13 @@ def creep_ahead(ahead: Mapping[str, Any], title: str) -> Figure:
         ``extrapolation`` of a ``summary.json``.
     """
     figure, axes = panel("time under constant tension, s", "creep, mm", f"{title}, {ahead['tension_N']:g} N")
-    prior, weaker, posterior = (ahead[f"{name}_mm"] for name in ("prior", "weaker_prior", "posterior"))
+    prior, weaker, posterior = ahead["prior_mm"], ahead["weaker_prior_mm"], ahead["posterior_mm"]
     axes.fill_between(ahead["time_s"], prior["q05"], prior["q95"], color=QUIET, alpha=0.45, lw=0, label="prior alone")
     axes.fill_between(ahead["time_s"], posterior["q05"], posterior["q95"], color=CHAIN, alpha=0.45, lw=0,
                       label="posterior, 90 %")  # fmt: skip
     axes.plot(ahead["time_s"], posterior["q50"], color=CHAIN, lw=1.2)
-    for end, label in (("q05", "prior at half weight"), ("q95", None)):
-        axes.plot(ahead["time_s"], weaker[end], color=HOLD, lw=1, ls="--", label=label)
+    for end, label in ((weaker["q05"], "prior at half weight"), (weaker["q95"], None)):
+        axes.plot(ahead["time_s"], end, color=HOLD, lw=1, ls="--", label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
     for t, word in ((3600.0, "1 h"), (86400.0, "1 day")):

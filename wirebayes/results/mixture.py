@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from wirebayes.io.run_folder import read_json, write_json
+from wirebayes.json_files.mixture import Member, MixtureJson
 
 FILE = "mixture.json"
 
@@ -18,12 +19,14 @@ def write_mixture(folder: Path, members: Sequence[tuple[str, float, Sequence[str
     members : sequence of (folder, probability, effects)
         Folders below `folder`, ``.`` for the final posterior itself; the probabilities sum to one.
     """
-    rows = [{"folder": f, "probability": p, "effects": list(effects)} for f, p, effects in members]
-    write_json(folder / FILE, {"members": rows})
+    rows: list[Member] = [{"folder": f, "probability": p, "effects": list(effects)} for f, p, effects in members]
+    content: MixtureJson = {"members": rows}
+    write_json(folder / FILE, content)
 
 
 def members_of(folder: Path) -> list[tuple[float, Path]]:
     """Probability and folder of every model that a posterior stands for; itself alone where nothing is undecided."""
     if not (folder / FILE).is_file():
         return [(1.0, folder)]
-    return [(float(m["probability"]), folder / m["folder"]) for m in read_json(folder / FILE)["members"]]
+    content: MixtureJson = read_json(folder / FILE)
+    return [(float(m["probability"]), folder / m["folder"]) for m in content["members"]]

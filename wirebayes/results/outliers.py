@@ -5,13 +5,13 @@ the expected distance, which combines the spread of the specimens (from the medi
 this specimen's posterior. Neither a few outliers nor one badly determined specimen affects it much.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from scipy import stats
 
+from wirebayes.json_files.batch import OutlierRow, Row
+from wirebayes.json_files.values import INTERVAL
 from wirebayes.typing import Array
 
 FALSE_ALARMS = 0.05  # of materials whose specimens are all alike, the usual one in twenty has an outlier
@@ -21,75 +21,54 @@ MAD_EFFICIENCY = 0.37  # the median absolute deviation of n normal values knows 
 _LEAST = 1e-9  # spread in logarithms or in the parameter's own unit: equal values are no reason to divide by zero
 
 
-@dataclass(frozen=True)
-class Outlier:
-    """One parameter of one specimen.
-
-    Attributes
-    ----------
-    experiment, material, parameter : str
-    value, median : float
-        Posterior median of the specimen, and the median over the material's specimens; B per m of length.
-    z : float
-        Robust standard deviations between them.
-    specimens : int
-        How many of the material were compared.
-    """
-
-    experiment: str
-    material: str
-    parameter: str
-    value: float
-    median: float
-    z: float
-    specimens: int
-
-    @property
-    def sentence(self) -> str:
-        """The finding in words."""
-        called = f"{self.parameter} per m of length" if self.parameter == "B" else self.parameter
-        side = "above" if self.z > 0 else "below"
-        return (
-            f"{self.experiment}: {called} is {self.value:.4g}, {abs(self.z):.1f} robust standard deviations {side} "
-            f"the median of {self.specimens} specimens of {self.material}, {self.median:.4g}"
-        )
-
-
-def outliers(rows: Sequence[Mapping[str, Any]]) -> list[Outlier]:
+def outliers(rows: Iterable[Row]) -> list[OutlierRow]:
     """The outliers among fitted specimens, farthest first.
 
     Parameters
     ----------
-    rows : sequence of mappings
-        ``name``, ``material``, ``length_mm`` and ``parameters``: for each the ``q05``, ``q50``, ``q95`` of its
-        posterior. Rows without parameters are passed over.
+    rows : iterable of Row
+        Of ``batch.json``; rows without parameters are passed over.
 
     Returns
     -------
-    list of Outlier
+    list of OutlierRow
     """
-    materials: dict[str, list[Mapping[str, Any]]] = {}
+    materials: dict[str, list[Row]] = {}
     for row in rows:
-        if row["parameters"]:
+        if row["parameters"] and row["material"] is not None:
             materials.setdefault(row["material"], []).append(row)
-    found = []
+    found: list[OutlierRow] = []
     for material, members in materials.items():
         for name in dict.fromkeys(p for row in members for p in row["parameters"]):
             have = [row for row in members if name in row["parameters"]]
             if len(have) < LEAST_SPECIMENS:
                 continue
-            low, value, high = (np.array([row["parameters"][name][q] for row in have]) for q in ("q05", "q50", "q95"))
+            low, value, high = (np.array([row["parameters"][name][q] for row in have]) for q in INTERVAL)
             if name == "B":  # an elongation: specimens may differ in length
-                low, value, high = (v / np.array([row["length_mm"] / 1e3 for row in have]) for v in (low, value, high))
+                metres = np.array([row["length_mm"] for row in have], float) / 1e3
+                low, value, high = low / metres, value / metres, high / metres
             positive = bool((low > 0).all())
             x, sd = (np.log(value), np.log(high / low)) if positive else (value, high - low)
             z = robust_z(x, sd / _NINETY)
             far = np.flatnonzero(np.abs(z) > threshold(len(have), len(members[0]["parameters"])))
             found += [
-                Outlier(have[i]["name"], material, name, float(value[i]), float(np.median(value)), float(z[i]), len(z))
+                _row(have[i]["name"], material, name, float(value[i]), float(np.median(value)), float(z[i]), len(z))
                 for i in far
             ]
-    return sorted(found, key=lambda outlier: (-abs(outlier.z), outlier.experiment))
+    return sorted(found, key=lambda outlier: (-abs(outlier["z"]), outlier["experiment"]))
+
+
+def _row(
+    experiment: str, material: str, parameter: str, value: float, median: float, z: float, specimens: int
+) -> OutlierRow:
+    called = f"{parameter} per m of length" if parameter == "B" else parameter
+    side = "above" if z > 0 else "below"
+    sentence = (
+        f"{experiment}: {called} is {value:.4g}, {abs(z):.1f} robust standard deviations {side} "
+        f"the median of {specimens} specimens of {material}, {median:.4g}"
+    )
+    return {"experiment": experiment, "material": material, "parameter": parameter, "value": value, "median": median,
+            "z": z, "specimens": specimens, "sentence": sentence}  # fmt: skip
 
 
 _NINETY = 2 * 1.645  # standard deviations between the 5 % and the 95 % quantile

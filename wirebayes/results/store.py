@@ -19,7 +19,7 @@ from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
 from wirebayes.io.run_folder import stored_results, write_bytes, write_json
-from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.json_files.summary import Derived, Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
@@ -467,14 +467,17 @@ def unit_of(name: str, effects: tuple[Effect, ...] = ()) -> str:
     return units.get(name, "1")
 
 
-def derived(wire: FreshSample, tension_N: float) -> dict[str, Array]:
-    """Quantities people compare, per draw: creep at a tension after some times and in the end, its speed, stiffness."""
-    creep = wire.creep_mm(tension_N, np.array(list(CREEP_TIMES_S.values())))
+def derived(wire: FreshSample, tension_N: float) -> Derived:
+    """Quantities people compare: creep at a tension after some times and in the end, its speed, stiffness."""
+    two_minutes, hour, day = wire.creep_mm(tension_N, np.array(list(CREEP_TIMES_S.values())))
     return {
-        **dict(zip(CREEP_TIMES_S, creep, strict=True)),
-        "final_creep_mm": wire.final_creep_mm(tension_N),
-        "median_creep_time_s": wire.median_creep_time_s(tension_N),
-        "stiffness_N": wire.stiffness_N(tension_N),
+        "tension_N": tension_N,
+        "creep_2min_mm": band(two_minutes),
+        "creep_1h_mm": band(hour),
+        "creep_1day_mm": band(day),
+        "final_creep_mm": band(wire.final_creep_mm(tension_N)),
+        "median_creep_time_s": band(wire.median_creep_time_s(tension_N)),
+        "stiffness_N": band(wire.stiffness_N(tension_N)),
     }
 
 
@@ -517,7 +520,6 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> SummaryJson:
                 parameters[f"{name}[{s.name}]"] = statistics(variable.values[..., i])
     tension = round(first.model.tension_ref_N, 3)
     wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
-    quantities = {key: band(value) for key, value in derived(wire, tension).items()}
     chains = fit.chains
     return {
         "experiment": sample.name if sample else first.material.replace(" ", "-"),
@@ -529,7 +531,7 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> SummaryJson:
         "convergence": chains.why,
         "warnings": _warnings(fit, sample),
         "parameters": parameters,
-        "derived": {"tension_N": tension, **quantities},
+        "derived": derived(wire, tension),
         "identifiability": to_dict(identifiability(fit)),
         "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
         "likelihood_evaluations": chains.evaluations,

@@ -20,7 +20,7 @@ from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.problem import MATERIAL, SAMPLE, build
-from wirebayes.results.outliers import Outlier, outliers
+from wirebayes.results.outliers import outliers
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import as_finished, executor, without_script
 from wirebayes.workflows.one_experiment import QUANTITIES, Done, Task, do, first_columns, packed
@@ -272,13 +272,13 @@ def _empty(file: str, said: str) -> Row:
     }  # fmt: skip
 
 
-def _tabulate(rows: Sequence[Row], far: Sequence[Outlier], folder: Path) -> None:
+def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> None:
     """``batch.json``, ``summary.csv`` and, where pyarrow is installed, ``summary.parquet``."""
     names = [n for n in (*MATERIAL, *SAMPLE) if any(n in row["parameters"] for row in rows)]
     header = [*_FIRST, *(f"{n}_{q}" for n in names for q in QUANTITIES), *_LAST]
     lying: dict[str, list[str]] = {}
     for outlier in far:
-        lying.setdefault(outlier.experiment, []).append(outlier.parameter)
+        lying.setdefault(outlier["experiment"], []).append(outlier["parameter"])
     table = []
     for row in rows:
         own: dict[str, Any] = dict(row["parameters"])
@@ -288,9 +288,5 @@ def _tabulate(rows: Sequence[Row], far: Sequence[Outlier], folder: Path) -> None
         table.append([*(cells[c] for c in _FIRST), *values, *(cells[c] for c in _LAST)])
     write_csv(folder / TABLE, header, table)
     write_parquet(folder / PARQUET, header, table)
-    found: list[OutlierRow] = [
-        {"experiment": o.experiment, "material": o.material, "parameter": o.parameter, "value": o.value,
-         "median": o.median, "z": o.z, "specimens": o.specimens, "sentence": o.sentence} for o in far
-    ]  # fmt: skip
-    content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": found}
+    content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far)}
     write_json(folder / Batch._content, content)

@@ -219,7 +219,7 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
             with stored_results(place.path / one.name):
                 models = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
                 content["experiments"][one.name] = side_by_side(models, BASE)
-            pictures.save_pictures(place.path / one.name, one.name, dict(content["experiments"][one.name]), models)
+            pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
         write_json(place.path / "comparison.json", content)
         opened.finish()
     return Comparison(place, plan.own_effects, warnings=plan.warnings)

@@ -18,6 +18,7 @@ from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.run_folder import open_run, read_json, write_json
+from wirebayes.json_files.summary import SummaryJson
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.wire.laws import ElasticLaw, History
@@ -199,10 +200,12 @@ def _mixtures(found: search.Findings, output: Path) -> None:
 def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
     for e in (e for block in found.final for e in block.experiments):
-        parameters = read_json(output / e.name / "final" / "summary.json")["parameters"]
+        summary: SummaryJson = read_json(output / e.name / "final" / "summary.json")
+        parameters = summary["parameters"]
         for name, amplitude in found.report["experiments"][e.name]["amplitudes"].items():
             column = next(c for c in parameters if c.startswith(f"{name}."))
-            amplitude |= {key: parameters[column][key] for key in ("mean", "q05", "q95")}
+            of_posterior = parameters[column]
+            amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
 
 
 def _pictures(found: search.Findings, output: Path, own_effects: Path | None) -> None:

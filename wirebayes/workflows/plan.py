@@ -17,13 +17,13 @@ from wirebayes.io.experiment import Experiment, read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
 from wirebayes.io.readings import Hold, frozen
 from wirebayes.io.run_folder import open_run, plain, read_json, write_json
-from wirebayes.json_files.plan import EffectSeen, ExpectedWidth, JudgedProtocol, PlanJson, RobotDrift
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked, too_long
-from wirebayes.planning.sensitivity import SIMULATIONS, EffectPower, sensitivity
-from wirebayes.planning.widths import HOUR_S, Width, at_centre, expected_widths, typical_tension
+from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
+from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
 from wirebayes.results import store
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
@@ -304,7 +304,7 @@ def _row(
 ) -> JudgedProtocol:
     """A protocol as it stands in ``plan.json``."""
     test, expected, seen = judged.test, judged.expected, judged.sensitivity
-    quantities = {name: _width(width) for name, width in expected.widths.items()}
+    widths = expected.widths
     cosines = {f"{a} {b}": cos for (a, b), cos in seen.cosines.items() if a < b}
     recorded = test.recorded_holds
     return {
@@ -312,29 +312,14 @@ def _row(
         "readings": sum(hold.time_s.size for hold in recorded), "duration_min": judged.duration_min,
         "within_budget": not too_long(judged, request.budget_min), "score": judged.score(request.aim),
         "information_bits": expected.information_bits, "simulated_tests": expected.tests,
-        "parameters": {n: q for n, q in quantities.items() if n in (*MATERIAL, *SAMPLE)},
+        "parameters": {n: q for n, q in widths.items() if n in (*MATERIAL, *SAMPLE)},
         "creep": {
             "tension_N": expected.tension_N, "length_mm": expected.length_mm,
-            "longest_hold_s": expected.longest_hold_s, "creep_longest_hold_mm": quantities["creep_longest_hold_mm"],
-            "creep_1h_mm": quantities["creep_1h_mm"],
+            "longest_hold_s": expected.longest_hold_s, "creep_longest_hold_mm": widths["creep_longest_hold_mm"],
+            "creep_1h_mm": widths["creep_1h_mm"],
         },
-        "effects": {name: _seen(effect) for name, effect in seen.effects.items()},
-        "cosines": cosines, "not_identifiable": list(seen.hidden),
+        "effects": seen.effects, "cosines": cosines, "not_identifiable": list(seen.hidden),
         "robot": None if machine is None else _drift(judged, request.guess, machine, law, history),
-    }  # fmt: skip
-
-
-def _width(width: Width) -> ExpectedWidth:
-    return {
-        "sd": width.sd, "sd_se": width.sd_se, "sd_median": width.sd_median, "width_90": width.width_90,
-        "width_90_low": width.width_90_low, "width_90_high": width.width_90_high, "guess_sd": width.guess_sd,
-    }  # fmt: skip
-
-
-def _seen(effect: EffectPower) -> EffectSeen:
-    return {
-        "amplitude_80": effect.amplitude_80, "unit": effect.unit, "delta_80": effect.delta_80,
-        "delta_prior": effect.delta_prior, "confused_with": list(effect.confused_with),
     }  # fmt: skip
 
 

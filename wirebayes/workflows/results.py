@@ -21,11 +21,12 @@ from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 from wirebayes.json_files.pose import PoseJson
+from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.truth import TruthJson
 from wirebayes.results import store
 from wirebayes.results.store import Stored
-from wirebayes.robot.mechanics.draws import specimens_said
+from wirebayes.robot.mechanics.draws import specimens_in_words
 from wirebayes.typing import Floats
 from wirebayes.workflows.options import PathLike
 
@@ -512,7 +513,7 @@ class Comparison(Result[ComparisonJson]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pose(Result[PoseJson]):
+class Pose(Result[PoseJson | PoseHistoryJson]):
     """A pose of a robot on creeping wires: kinematics, drift and pose error with bands.
 
     Examples
@@ -528,7 +529,7 @@ class Pose(Result[PoseJson]):
         """Why there is no answer, the estimated spread of specimens, and ways in which it leaves what was tested."""
         found = self.summary()
         unheld = (found["sentence"],) if "sentence" in found else ()
-        spread = specimens_said(found.get("wires", {}))
+        spread = specimens_in_words(found["wires"])
         return (*unheld, *spread, *(f"warning: {warning}" for warning in found.get("warnings", [])))
 
     def _shortly(self) -> list[str]:

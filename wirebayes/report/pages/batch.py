@@ -6,6 +6,7 @@ from typing import Any
 
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -30,7 +31,7 @@ _SHOWN = ("k1", "B", "U", "k2", "N")
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``batch.json``."""
-    found = read_json(folder / "batch.json")
+    found: BatchJson = read_json(folder / "batch.json")
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
     first: list[Block] = [Columns([_done(rows), _known(fitted), _unknown(rows, configuration)])]
@@ -58,7 +59,7 @@ _FILES = (
 )
 
 
-def _done(rows: list[dict[str, Any]]) -> Points:
+def _done(rows: list[Row]) -> Points:
     materials = Counter(row["material"] for row in rows if row["material"])
     failed = [row for row in rows if row["error"]]
     said = [f"{len(rows)} experiments on {len(materials)} materials."]
@@ -66,7 +67,7 @@ def _done(rows: list[dict[str, Any]]) -> Points:
     return Points("What was done", said)
 
 
-def _known(fitted: list[dict[str, Any]]) -> Points:
+def _known(fitted: list[Row]) -> Points:
     verdicts = Counter(row["verdict"] for row in fitted if row["verdict"])
     effects = Counter(effect for row in fitted for effect in row["effects"])
     said = [f"{count} × {verdict.replace('-', ' ')}" for verdict, count in verdicts.most_common()]
@@ -79,7 +80,7 @@ def _known(fitted: list[dict[str, Any]]) -> Points:
     return Points("What is known", said or ["The parameters; missing effects were not searched for."])
 
 
-def _unknown(rows: list[dict[str, Any]], configuration: dict[str, Any]) -> Points:
+def _unknown(rows: list[Row], configuration: dict[str, Any]) -> Points:
     stopped = [row["name"] for row in rows if row["converged"] is False]
     said = [f"Not converged: {_some(stopped)}."] if stopped else []
     checked = sum(row["p_global"] is not None for row in rows)
@@ -93,8 +94,9 @@ def _unknown(rows: list[dict[str, Any]], configuration: dict[str, Any]) -> Point
     return Points("How far it can be trusted", said or ["All fits converged."])
 
 
-def _outliers(fitted: list[dict[str, Any]], far: list[dict[str, Any]]) -> list[Block]:
-    small = sorted(m for m, n in Counter(row["material"] for row in fitted).items() if n < LEAST_SPECIMENS)
+def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
+    specimens = Counter(row["material"] for row in fitted if row["material"])
+    small = sorted(material for material, count in specimens.items() if count < LEAST_SPECIMENS)
     rule = (
         "A specimen is an outlier when a parameter's median is farther from the median of its material than the "
         f"scatter of the others and its own uncertainty explain. If all specimens are "
@@ -111,7 +113,7 @@ def _outliers(fitted: list[dict[str, Any]], far: list[dict[str, Any]]) -> list[B
     return [Table(header, lines, "B is per metre of length."), Text(rule + said)]
 
 
-def _table(rows: list[dict[str, Any]]) -> list[Block]:
+def _table(rows: list[Row]) -> list[Block]:
     lines = [
         [
             row["name"],
@@ -128,7 +130,7 @@ def _table(rows: list[dict[str, Any]]) -> list[Block]:
     return [Table(header, lines, more + "Posterior medians; intervals stand in summary.csv.")]
 
 
-def _value(row: dict[str, Any], name: str) -> str:
+def _value(row: Row, name: str) -> str:
     return number(row["parameters"][name]["q50"]) if name in row["parameters"] else "–"
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths
 from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, files_beside, number, span
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
@@ -11,7 +12,7 @@ from wirebayes.report.pages.robot_view import robot_view
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``calibrate.json``."""
-    found = read_json(folder / "calibrate.json")
+    found: CalibrateJson = read_json(folder / "calibrate.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     first: list[Block] = [Columns([_done(found), _known(found), _unknown(creep, hooke)])]
     if not creep["converged"]:
@@ -35,7 +36,7 @@ _FILES = (
 )
 
 
-def _done(found: dict[str, Any]) -> Points:
+def _done(found: CalibrateJson) -> Points:
     prior = found["prior"]
     biases = []
     if "tension_bias_sd_N" in prior:
@@ -51,7 +52,7 @@ def _done(found: dict[str, Any]) -> Points:
     ])  # fmt: skip
 
 
-def _known(found: dict[str, Any]) -> Points:
+def _known(found: CalibrateJson) -> Points:
     if found["pose_now"] is None:
         return Points("What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]])
     sd = [1e3 * v for v in found["with_creep_model"]["length_m"]["sd"]]
@@ -60,7 +61,7 @@ def _known(found: dict[str, Any]) -> Points:
     return Points("What is known", [text, f"The platform is at ({place}) m.", found["observability"]["sentence"]])
 
 
-def _unknown(creep: dict[str, Any], hooke: dict[str, Any]) -> Points:
+def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
     said = []
     for name, result in (("the creep model", creep), ("Hooke's law alone", hooke)):
         if not result["converged"]:
@@ -75,7 +76,7 @@ def _unknown(creep: dict[str, Any], hooke: dict[str, Any]) -> Points:
     return Points("How far it can be trusted", said)
 
 
-def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
+def _lengths(creep: EstimatedLengths, hooke: EstimatedLengths) -> Table:
     a, b = creep["length_m"], hooke["length_m"]
     lines = [
         [
@@ -94,7 +95,7 @@ def _lengths(creep: dict[str, Any], hooke: dict[str, Any]) -> Table:
     return Table(header, lines, "Zero-tension length of every wire when the last hold ended, creep included.")
 
 
-def _biases(creep: dict[str, Any]) -> list[Block]:
+def _biases(creep: EstimatedLengths) -> list[Block]:
     if "tension_bias_N" not in creep:
         return []
     pairs = zip(creep["tension_bias_N"]["mean"], creep["tension_bias_N"]["sd"], strict=True)
@@ -113,7 +114,7 @@ def _milli(value: float | None) -> str:
     return "–" if value is None else f"{1e3 * value:.2f}"
 
 
-def _next(found: dict[str, Any]) -> list[Block]:
+def _next(found: CalibrateJson) -> list[Block]:
     joints = "No joint values are given: read more poses, or check the readings and their stated errors."
     if found["joint_values_for_home_m"] is not None:
         values = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])

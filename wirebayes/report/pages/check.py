@@ -4,6 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.check import CheckedExperiment, CheckJson
+from wirebayes.json_files.imported import ImportedExperiment, ImportJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -28,28 +30,27 @@ _FILES = (
     ("check.json", "every number of this page as JSON"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
-_TOLD = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
+_DETERMINED_BY = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``check.json`` or ``import.json``, a section for each experiment."""
-    imported = configuration["command"] == "import"
-    found = read_json(folder / ("import.json" if imported else "check.json"))["experiments"]
-    tell = _imported if imported else _checked
-    sections = [Section(name, tell(e, _picture(folder, name))) for name, e in found.items()]
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
-    if imported:
-        return Page(
-            "What was imported", "A file of a bench, as it was understood: look at it before you fit.", sections
-        )
-    sections.append(
-        meaning(("hold", "90 % interval", "prior"), [e for found_in in found.values() for e in found_in["effects"]])
-    )
+    files = Section("Raw results", [files_beside(folder, _FILES)])
+    if configuration["command"] == "import":
+        imported: ImportJson = read_json(folder / "import.json")
+        sections = [Section(name, _imported(e, _picture(folder, name))) for name, e in imported["experiments"].items()]
+        lead = "A file of a bench, as it was understood: look at it before you fit."
+        return Page("What was imported", lead, [*sections, files])
+    checked: CheckJson = read_json(folder / "check.json")
+    found = checked["experiments"]
+    sections = [Section(name, _checked(e, _picture(folder, name))) for name, e in found.items()]
+    effects = [effect for e in found.values() for effect in e["effects"]]
+    sections += [files, meaning(("hold", "90 % interval", "prior"), effects)]
     lead = "What was understood of the readings, what is suspicious, and what such a test can and cannot determine."
     return Page("What this test can determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
-def _imported(e: dict[str, Any], picture: list[Block]) -> list[Block]:
+def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
     about = [
         f"From {e['raw']}.",
         f"{e['holds']} holds, {e['readings']} readings.",
@@ -61,7 +62,7 @@ def _imported(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     return [Columns(columns), *picture]
 
 
-def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
+def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
     about = [
         f"{e['material']}, {number(e['length_mm'])} mm.",
         f"{e['recorded_holds']} recorded holds, {e['unrecorded_holds']} unrecorded, {e['readings']} readings.",
@@ -78,7 +79,7 @@ def _checked(e: dict[str, Any], picture: list[Block]) -> list[Block]:
     ]
     rows = [
         [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]),
-         _TOLD[p["determined_by"]], SYMBOLS.get(name, "–")]
+         _DETERMINED_BY[p["determined_by"]], SYMBOLS.get(name, "–")]
         for name, p in e["parameters"].items()
     ]  # fmt: skip
     caption = "A first estimate by a short run of the sampler; fit gives the posterior."

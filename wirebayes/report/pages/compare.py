@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
 from wirebayes.report.blocks import Block, Page, Pictures, Section, Table, Text, files_beside, number, pictures_in
 from wirebayes.report.glossary import meaning
 
@@ -27,7 +28,8 @@ _FILES = (
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section an experiment, from ``comparison.json`` and the pictures beside it."""
-    found = read_json(folder / "comparison.json")["experiments"]
+    content: ComparisonJson = read_json(folder / "comparison.json")
+    found = content["experiments"]
     sections = [_section(folder, name, table) for name, table in found.items()]
     lead = "Each model predicts every hold from the others, and the last holds from the first; best first."
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
@@ -36,7 +38,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     return Page("Models side by side", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
-def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
+def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     rows = table["models"]
     good = [r for r in rows if r.get("failed") is None]
     blocks: list[Block] = [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
@@ -46,9 +48,9 @@ def _section(folder: Path, name: str, table: dict[str, Any]) -> Section:
     header += ["given first reading, N", "meaning"]
     lines = []
     for r in good:
-        difference, held = r.get("difference") or {}, r.get("held_out") or {}
-        errors = (number((held.get(way) or {}).get("rmse_N"), 2) for way in ("free", "given_first"))
-        scores = (number(difference.get(key), 2) for key in ("elpd", "se"))
+        difference, held = r["difference"], r["held_out"]
+        errors = (number(s and s["rmse_N"], 2) for s in ((held["free"], held["given_first"]) if held else (None, None)))
+        scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
         lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _brief(r.get("meaning") or "")])
     blocks.append(
         Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")

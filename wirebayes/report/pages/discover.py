@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -29,7 +30,8 @@ from wirebayes.report.pictures.discover import waterfall
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section an experiment, from ``discovery.json`` and the pictures beside it."""
-    found = read_json(folder / "discovery.json")["experiments"]
+    content: DiscoveryJson = read_json(folder / "discovery.json")
+    found = content["experiments"]
     overview = Table(
         ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
         [
@@ -54,7 +56,7 @@ _FILES = (
 _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 
 
-def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
+def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     candidates = listed([spoken(e) for e in v["set"]])
     words = {
         "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
@@ -120,7 +122,7 @@ def _section(folder: Path, name: str, v: dict[str, Any]) -> Section:
     return Section(name, blocks)
 
 
-def _spoken(v: dict[str, Any]) -> str:
+def _spoken(v: ExperimentFindings) -> str:
     return str(v["verdict"]).replace("-", " ")
 
 
@@ -130,7 +132,7 @@ _BEFORE_AND_AFTER = (
 )
 
 
-def _patterns(v: dict[str, Any]) -> dict[str, str]:
+def _patterns(v: ExperimentFindings) -> dict[str, str]:
     """What the picture of each pattern shows."""
     return {
         f"where-{w['covariate'].replace(' ', '-')}": f"Residuals of the plain model: {w['sentence']}"
@@ -138,18 +140,18 @@ def _patterns(v: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _alike(v: dict[str, Any]) -> str:
+def _alike(v: ExperimentFindings) -> str:
     """The near-equivalents of what is named: a headline that hides them would promise too much."""
     like = [spoken(e) for e in v.get("group", []) if e not in (*v["effects"], *v["set"], "unknown")]
     return f"; on this protocol hard to distinguish from {listed(like)}" if like else ""
 
 
-def _share(v: dict[str, Any]) -> str:
+def _share(v: ExperimentFindings) -> str:
     closed = (v.get("held_out") or {}).get("gap_closed")
     return "–" if closed is None else f"{100 * closed:.0f} %"
 
 
-def _gap(v: dict[str, Any]) -> str:
+def _gap(v: ExperimentFindings) -> str:
     held = v.get("held_out") or {}
     if not held.get("plain") or not held.get("final"):
         return ""
@@ -158,12 +160,12 @@ def _gap(v: dict[str, Any]) -> str:
     text = f"On the unused holds {holds} the rms error goes from {plain} to {final} N"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
-    if v.get("accepted") and held.get("flexible"):
-        text += f"; a smooth curve instead of a named effect reaches {number(held['flexible']['rmse_N'], 2)}"
+    if v.get("accepted") and (flexible := held.get("flexible")):
+        text += f"; a smooth curve instead of a named effect reaches {number(flexible['rmse_N'], 2)}"
     return text + "."
 
 
-def _amplitude(effect: str, a: dict[str, Any]) -> str:
+def _amplitude(effect: str, a: Amplitude) -> str:
     unit = "" if a.get("unit") in (None, "-", "1") else f" {a['unit']}"
     at = "" if a.get("hold") is None else f", from hold {a['hold']} on"
     return f"{spoken(effect)}: {number(a['mean'])}{unit} ({span(a['q05'], a['q95'])}){at}."

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.summary import SummaryJson
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
@@ -37,16 +38,15 @@ _FILES = (
     ("*/posterior.nc", "all draws, opens with ArviZ"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
-_SPOKEN = {"creep_2min_mm": "2 min", "creep_1h_mm": "1 h", "creep_1day_mm": "1 day"}
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section for each experiment of each fit in the folder."""
     sections, effects = [], dict[str, Effect]()
     for file in sorted(folder.glob("*/summary.json")):
-        summary = read_json(file)
+        summary: SummaryJson = read_json(file)
         if configuration.get("own_effects"):
-            sections.append(_told(summary))
+            sections.append(_of_summary(summary))
             continue
         names = experiments_in(file.parent / "posterior.nc")
         for name in names:
@@ -60,7 +60,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
-def _told(summary: dict[str, Any]) -> Section:
+def _of_summary(summary: SummaryJson) -> Section:
     """A fit with effects of the user's own, from its summary alone: a page never executes a user's code."""
     lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
     words = Text("Fitted with effects from a file of the user's own, so this section shows summary.json alone.")
@@ -69,7 +69,7 @@ def _told(summary: dict[str, Any]) -> Section:
     return Section(summary["experiment"], blocks)
 
 
-def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) -> Section:
+def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Section:
     """Readings, verdict, intervals and residuals of one experiment.
 
     Parameters
@@ -88,7 +88,7 @@ def section(stored: Stored, prior: dict[str, Array], summary: dict[str, Any]) ->
     sample, draws = stored.sample, stored.draws
     sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
     shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}
-    trusted = summary["converged"] and _check(summary)["passed"] is not False
+    trusted = summary["converged"] and _passed(summary) is not False
     blocks: list[Block] = _cautions(summary)
     blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects, trusted)]))
     alt = f"Measured minus predicted tension of {sample.name}, hold after hold, inside the 90 % band."
@@ -138,22 +138,24 @@ _PAIRS = (
 )
 
 
-def _check(summary: dict[str, Any]) -> dict[str, Any]:
-    """The result of the model check, or why there is none."""
-    absent = {"passed": None, "sentence": "The model was not checked against the readings: the check was left out."}
-    return dict(summary.get("model_check", absent))
+def _passed(summary: SummaryJson) -> bool | None:
+    """The result of the model check; None where it was left out."""
+    return summary["model_check"]["passed"] if "model_check" in summary else None
 
 
-def _cautions(summary: dict[str, Any]) -> list[Block]:
+def _cautions(summary: SummaryJson) -> list[Block]:
     """What a reader must know before anything else."""
-    check = _check(summary)
-    out: list[Block] = [Text(check["sentence"], strong=check["passed"] is not True or bool(check.get("gross_errors")))]
+    if "model_check" in summary:
+        check = summary["model_check"]
+        out: list[Block] = [Text(check["sentence"], strong=not check["passed"] or bool(check["gross_errors"]))]
+    else:
+        out = [Text("The model was not checked against the readings: the check was left out.", strong=True)]
     if not summary["converged"]:
         out.insert(0, Text("Not converged: do not trust these intervals.", strong=True))
     return [Text(f"Check the readings: {said}.", strong=True) for said in summary["warnings"]] + out
 
 
-def _sampled(summary: dict[str, Any]) -> str:
+def _sampled(summary: SummaryJson) -> str:
     state = "Converged" if summary["converged"] else "Not converged"
     return (
         f"{state} {summary['convergence'].removeprefix('not converged ')}. Likelihood {summary['likelihood']}, history "
@@ -213,16 +215,20 @@ def _means(name: str, effects: tuple[Effect, ...]) -> str:
     return SYMBOLS.get(name) or sentences.get(name, "–")
 
 
-def _derived(summary: dict[str, Any]) -> Table:
+def _derived(summary: SummaryJson) -> Table:
     derived = summary["derived"]
-    names = {key: f"creep after {text}, mm" for key, text in _SPOKEN.items()}
-    names |= {"final_creep_mm": "final creep, mm", "median_creep_time_s": "half of it after, s"}
-    names |= {"stiffness_N": "stiffness there, N per unit strain"}
-    lines = []
-    for key, name in names.items():
-        band = derived[key]
-        endless = "grows without end" if key == "final_creep_mm" else "–"
-        lines.append([name, number(band["q50"]), span(band["q05"], band["q95"])] if band else [name, endless, "–"])
+    rows = [
+        ("creep after 2 min, mm", derived["creep_2min_mm"], "–"),
+        ("creep after 1 h, mm", derived["creep_1h_mm"], "–"),
+        ("creep after 1 day, mm", derived["creep_1day_mm"], "–"),
+        ("final creep, mm", derived["final_creep_mm"], "grows without end"),
+        ("half of it after, s", derived["median_creep_time_s"], "–"),
+        ("stiffness there, N per unit strain", derived["stiffness_N"], "–"),
+    ]
+    lines = [
+        [name, number(band["q50"]), span(band["q05"], band["q95"])] if band else [name, otherwise, "–"]
+        for name, band, otherwise in rows
+    ]
     caption = (
         f"A fresh sample under a constant {derived['tension_N']:g} N, with all fitted effects of the wire and without "
         "those of the bench."

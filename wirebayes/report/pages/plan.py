@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -31,9 +32,9 @@ _AIMS = {
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``plan.json``."""
-    found = read_json(folder / "plan.json")
+    found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
-    first: list[Block] = [Columns([_asked(found), _answered(found), _trusted(rows)]), _ranking(found)]
+    first: list[Block] = [Columns([_requested(found), _answered(found), _trusted(rows)]), _ranking(found)]
     picture = picture_file(folder, "plan")
     if picture is not None:
         alt = "Expected widths and detectable effects of each test."
@@ -57,7 +58,7 @@ _FILES = (
 )
 
 
-def _asked(found: dict[str, Any]) -> Points:
+def _requested(found: PlanJson) -> Points:
     aim = found["aim"]
     by = _AIMS[aim[0]] if len(aim) == 1 else f"how well {_words(aim[0])} and {_words(aim[1])} would be distinguished"
     said = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
@@ -66,7 +67,7 @@ def _asked(found: dict[str, Any]) -> Points:
     return Points("What was requested", said)
 
 
-def _answered(found: dict[str, Any]) -> Points:
+def _answered(found: PlanJson) -> Points:
     best = found["protocols"][0]
     said = [f"Do {best['name']}" + (f": {best['words']}." if best["words"] else ".")]
     creep = best["creep"]["creep_1h_mm"]
@@ -79,7 +80,7 @@ def _answered(found: dict[str, Any]) -> Points:
     return Points("What to do", said)
 
 
-def _trusted(rows: list[dict[str, Any]]) -> Points:
+def _trusted(rows: list[JudgedProtocol]) -> Points:
     least = min(row["simulated_tests"] for row in rows)
     return Points("How far it can be trusted", [
         f"Each test was simulated and fitted {least} times or more, with the priors of the later fit. Half of the "
@@ -88,7 +89,7 @@ def _trusted(rows: list[dict[str, Any]]) -> Points:
     ])  # fmt: skip
 
 
-def _ranking(found: dict[str, Any]) -> Table:
+def _ranking(found: PlanJson) -> Table:
     names = [n for n in ("k1", "B", "U", "k2", "N") if n in found["protocols"][0]["parameters"]]
     robot = found["robot"] is not None
     lines = [
@@ -96,7 +97,7 @@ def _ranking(found: dict[str, Any]) -> Table:
             str(row["rank"]), row["name"], number(row["duration_min"]), number(row["information_bits"]),
             *(number(row["parameters"][n]["sd_median"], 2) for n in names),
             number(row["creep"]["creep_1h_mm"]["sd_median"], 2),
-            *([number((row["robot"] or {}).get("drift_sd_mm"), 2)] if robot else []),
+            *([number(row["robot"] and row["robot"]["drift_sd_mm"], 2)] if robot else []),
             "yes" if row["within_budget"] else "too long",
         ]
         for row in found["protocols"]
@@ -108,18 +109,21 @@ def _ranking(found: dict[str, Any]) -> Table:
     )
 
 
-def _protocol(row: dict[str, Any]) -> list[Block]:
+def _protocol(row: JudgedProtocol) -> list[Block]:
     blocks: list[Block] = [
         Text(
             f"{row['holds']} holds with {row['readings']} readings, {number(row['duration_min'])} min"
             + (f": {row['words']}." if row["words"] else ".")
         )
     ]
-    quantities = row["parameters"] | {n: q for n, q in row["creep"].items() if isinstance(q, dict)}
+    quantities = row["parameters"] | {
+        "creep_longest_hold_mm": row["creep"]["creep_longest_hold_mm"],
+        "creep_1h_mm": row["creep"]["creep_1h_mm"],
+    }
     lines = [
         [
             _words(n),
-            *(number(q[key], 2) for key in ("sd_median", "sd", "width_90")),
+            *(number(value, 2) for value in (q["sd_median"], q["sd"], q["width_90"])),
             span(q["width_90_low"], q["width_90_high"], 2),
             "given" if is_given(q) else number(q["guess_sd"], 2),
         ]

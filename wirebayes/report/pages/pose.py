@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.pose import PoseJson, TimeWithin, Tolerances
+from wirebayes.json_files.values import INTERVAL
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -25,7 +27,7 @@ from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.robot import CONTROLLERS
-from wirebayes.robot.mechanics.draws import specimens_said
+from wirebayes.robot.mechanics.draws import specimens_in_words
 
 _CAPTIONS = {
     "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
@@ -42,10 +44,11 @@ _TURNED = "The same with the platform turned by the rotation vector that the tit
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``pose.json`` and the pictures beside it."""
-    pose = read_json(folder / "pose.json")
-    if "history" in pose:
-        return pose_history.page(folder, configuration, pose)
-    blocks: list[Block] = [Columns([_asked(pose), *_answers(pose)])]
+    content = read_json(folder / "pose.json")
+    if "history" in content:
+        return pose_history.page(folder, configuration, content)
+    pose: PoseJson = content
+    blocks: list[Block] = [Columns([_requested(pose), *_answers(pose)])]
     if not pose.get("feasible", True):
         said = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
         blocks.insert(0, Text(said, strong=True))
@@ -77,13 +80,13 @@ _FILES = (
 _TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "exit point")
 
 
-def _losses(pose: dict[str, Any]) -> list[str]:
+def _losses(pose: PoseJson) -> list[str]:
     """What must be read first: falls, slack wires and poses that are not held, as the command said them."""
     telling = ("falls", "slack", "cannot begin", "cannot pull", "its tension", "softest motion")
     return [w[:1].upper() + w[1:] + "." for w in pose.get("warnings", []) if any(word in w for word in telling)]
 
 
-def _asked(pose: dict[str, Any]) -> Points:
+def _requested(pose: PoseJson) -> Points:
     place = ", ".join(number(float(x)) if x else "0" for x in pose["pose"]["position_m"])
     wires = pose.get("wires", {})
     points = [f"Platform of {pose['mass_kg']:g} kg at ({place}) m."]
@@ -92,7 +95,7 @@ def _asked(pose: dict[str, Any]) -> Points:
         effects = wires["effects"]
         model = f"the plain model with {', '.join(effects).replace('_', ' ')}" if effects else "the plain model"
         points.append(f"Wires known from {wires['draws']} posterior draws of a sample of {tested}: {model}.")
-        points += specimens_said(wires)
+        points += specimens_in_words(wires)
         if pose.get("inverse"):
             low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
             rule = pose["tension_distribution"]["choice"].replace("_", " ")
@@ -103,20 +106,20 @@ def _asked(pose: dict[str, Any]) -> Points:
     return Points("What was computed", points)
 
 
-def _answers(pose: dict[str, Any]) -> list[Points]:
+def _answers(pose: PoseJson) -> list[Points]:
     known, loose = [], []
     for entry in pose.get("drift", []):
         last = entry["times_s"][-1]
         if entry["distance_mm"]["q50"]:
-            low, middle, high = (entry["distance_mm"][q][-1] for q in ("q05", "q50", "q95"))
+            low, middle, high = (entry["distance_mm"][q][-1] for q in INTERVAL)
             spread = f"{100 * entry['specimen_spread']:g} %"
             moved = f"{number(middle)} mm ({span(low, high)})"
             known.append(f"After {last:g} s the platform has moved {moved}; specimens of one line differ by {spread}.")
     claim = pose.get("claim")
     if claim:
         limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
-        for entry in claim["holds"]:
-            spread, chance = f"{100 * entry['specimen_spread']:g} %", number(entry["probability"], 2)
+        for held in claim["holds"]:
+            spread, chance = f"{100 * held['specimen_spread']:g} %", number(held["probability"], 2)
             known.append(f"It moves {limits} within {claim['time_s']:g} s: probability {chance} (spread {spread}).")
     space = pose.get("workspace")
     if space and claim:
@@ -129,9 +132,10 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
     return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
 
 
-def _slices(pose: dict[str, Any]) -> list[Block]:
+def _slices(pose: PoseJson) -> list[Block]:
     lines = []
-    for entry in (pose.get("workspace") or {}).get("slices", []):
+    space = pose.get("workspace")
+    for entry in space["slices"] if space else []:
         turn = entry["rotation_vector_rad"]
         named = f"({', '.join(f'{v:.3g}' for v in turn)}) rad" if any(turn) else "level"
         cells = [named, f"{entry['axis']} = {entry['at_m']:.3g} m", f"{100 * entry['feasible']:.0f} %"]
@@ -149,14 +153,14 @@ def _slices(pose: dict[str, Any]) -> list[Block]:
     return [Table(header, lines, caption)] if lines else []
 
 
-def _drift(pose: dict[str, Any]) -> list[Block]:
+def _drift(pose: PoseJson) -> list[Block]:
     lines = []
     for entry in pose.get("drift", []):
         for i, time in enumerate(entry["times_s"]):
             if entry["distance_mm"]["q50"] and time > 0:
                 cells = []
-                for key in ("distance_mm", "tilt_deg", "from_vertical_deg"):
-                    low, middle, high = (entry[key][q][i] for q in ("q05", "q50", "q95"))
+                for band in (entry["distance_mm"], entry["tilt_deg"], entry["from_vertical_deg"]):
+                    low, middle, high = (band[q][i] for q in INTERVAL)
                     cells += [number(middle), span(low, high)]
                 lines.append([f"{100 * entry['specimen_spread']:g} %", f"{time:g}", *cells])
     header = ["specimen spread", "after, s", "moved, mm", "90 %", "tilt, degrees", "90 %"]
@@ -165,20 +169,20 @@ def _drift(pose: dict[str, Any]) -> list[Block]:
     return [Table(header, lines, caption + "Draws whose platform falls are left out.")] if lines else []
 
 
-def _errors(pose: dict[str, Any]) -> list[Block]:
+def _errors(pose: PoseJson) -> list[Block]:
     lines = []
     for entry in pose.get("pose_error", []):
         for i, time in enumerate(entry["times_s"]):
             if not entry["distance_mm"]["q50"] or time not in (60, 600, entry["times_s"][-1]):
                 continue
-            low, middle, high = (entry["distance_mm"][q][i] for q in ("q05", "q50", "q95"))
+            low, middle, high = (entry["distance_mm"][q][i] for q in INTERVAL)
             who = [CONTROLLERS[entry["controller"]], f"{100 * entry['specimen_spread']:g} %"]
             lines.append([*who, f"{time:g}", number(middle), span(low, high), _lasts(entry)])
     header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %", "longest time within tolerance, s"]
     return [Table(header, lines, _limits(pose["pose_error"][0]))] if lines else []
 
 
-def _between(pose: dict[str, Any]) -> list[Block]:
+def _between(pose: PoseJson) -> list[Block]:
     lines = []
     for entry in pose.get("between_calibrations", []):
         loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
@@ -191,17 +195,17 @@ def _between(pose: dict[str, Any]) -> list[Block]:
     return [Table(header, lines, caption)] if lines else []
 
 
-def _limits(entry: dict[str, Any]) -> str:
+def _limits(entry: Tolerances) -> str:
     allowed = f"{entry['tolerance_mm']:g} mm and {entry['tolerance_deg']:.3g}°"
     return f"Within tolerance: less than {allowed} with a probability of 95 % at all earlier times."
 
 
-def _lasts(entry: dict[str, Any]) -> str:
+def _lasts(entry: TimeWithin) -> str:
     longest = number(float(entry["longest_time_within_s"]))
     return f"more than {longest}" if entry["still_within_at_the_end"] else longest
 
 
-def _doubts(pose: dict[str, Any]) -> list[Block]:
+def _doubts(pose: PoseJson) -> list[Block]:
     shares = pose.get("variance_shares", {}).get("shared_draw")
     if not shares:
         return []
@@ -210,7 +214,7 @@ def _doubts(pose: dict[str, Any]) -> list[Block]:
     return [Table(["parameter", "share"], lines, caption)]
 
 
-def _equilibria(pose: dict[str, Any]) -> list[Block]:
+def _equilibria(pose: PoseJson) -> list[Block]:
     found = pose.get("equilibria")
     if not found:
         return []
@@ -228,7 +232,7 @@ def _equilibria(pose: dict[str, Any]) -> list[Block]:
     alone = f"{number(1e3 * proof['alone_within_m'])} mm"
     proved = f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose."
     band = proof.get("band")
-    if not band or not band["share"]:
+    if band is None or band["low_mm"] is None or band["high_mm"] is None:
         return [Text(proved)]
     part = "all" if band["share"] == 1 else f"the middle {100 * band['share']:g} %"
     axes = zip("xyz", band["low_mm"], band["high_mm"], strict=True)

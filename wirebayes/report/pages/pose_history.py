@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.json_files.values import INTERVAL, Band, Numbers
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -20,7 +22,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.glossary import meaning
-from wirebayes.robot.mechanics.draws import specimens_said
+from wirebayes.robot.mechanics.draws import specimens_in_words
 
 _CAPTIONS = {
     "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
@@ -39,7 +41,7 @@ _ROWS = 12  # of the tables on the page
 _SMALLEST_MM = 1e-4  # less is shown as nothing: a tenth of what a dial gauge resolves, and often only rounding
 
 
-def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> Page:
+def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> Page:
     """The content of ``pose.json`` and the pictures beside it.
 
     Parameters
@@ -47,7 +49,7 @@ def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> P
     folder : Path
     configuration : dict
         Content of ``configuration.json``.
-    pose : dict
+    pose : PoseHistoryJson
         Content of ``pose.json``.
 
     Returns
@@ -59,7 +61,7 @@ def page(folder: Path, configuration: dict[str, Any], pose: dict[str, Any]) -> P
     lead += " The wires' creep is carried through the whole history of their tensions."
     if not pose["feasible"]:
         return Page(f"Robot {pose['robot']}", lead, [Section("Summary", [Text(pose["sentence"], strong=True)])])
-    first: list[Block] = [Columns([Points("What was computed", _asked(pose)), *_answers(pose)])]
+    first: list[Block] = [Columns([Points("What was computed", _requested(pose)), *_answers(pose)])]
     first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in pose["warnings"] if _loss(w)]
     files = {name: picture_file(folder, name) for name in _CAPTIONS}
     pictures = {
@@ -81,7 +83,7 @@ def _loss(warning: str) -> bool:
     return "falls" in warning or "slack" in warning
 
 
-def _asked(pose: dict[str, Any]) -> list[str]:
+def _requested(pose: PoseHistoryJson) -> list[str]:
     history, wires = pose["history"], pose["wires"]
     effects = ", ".join(wires["effects"]).replace("_", " ")
     model = f"the plain model with {effects}" if effects else "the plain model"
@@ -93,7 +95,7 @@ def _asked(pose: dict[str, Any]) -> list[str]:
         f"Wires known from {wires['draws']} posterior draws of a sample of {wires['tested_length_mm']:g} mm: {model}. "
         f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. They were new at the first row.",
     ]
-    out += specimens_said(wires)
+    out += specimens_in_words(wires)
     if history["restart_share"] is None:
         out.append(f"The wires' clocks started {history['holds']} times, as the column hold says.")
     else:
@@ -112,7 +114,7 @@ def _asked(pose: dict[str, Any]) -> list[str]:
     return out
 
 
-def _answers(pose: dict[str, Any]) -> list[Points]:
+def _answers(pose: PoseHistoryJson) -> list[Points]:
     (drift,) = pose["drift"]
     time = number(float(drift["times_s"][-1]))
     meant = "from the commanded pose" if pose["history"].get("target") != "without creep" else "from where it would be"
@@ -134,26 +136,26 @@ def _answers(pose: dict[str, Any]) -> list[Points]:
     return [Points("What is known", known), Points("What is not known", loose)]
 
 
-def _last(band: dict[str, Any]) -> str:
-    low, middle, high = (band[q][-1] for q in ("q05", "q50", "q95"))
+def _last(band: Band) -> str:
+    low, middle, high = (band[q][-1] for q in INTERVAL)
     return f"{number(middle)} ({span(low, high)})"
 
 
-def _shown(times: list[float]) -> list[int]:
+def _shown(times: Numbers) -> list[int]:
     step = max(1, -(-len(times) // _ROWS))
     return sorted({*range(0, len(times), step), len(times) - 1})
 
 
-def _poses(pose: dict[str, Any]) -> list[Block]:
+def _poses(pose: PoseHistoryJson) -> list[Block]:
     (drift,) = pose["drift"]
     place = pose["position_m"]
     lines = []
     for i in _shown(drift["times_s"]):
         cells = []
         for axis in range(3):
-            middle, sd = (None if place[q] is None else place[q][i][axis] for q in ("q50", "sd"))
+            middle, sd = (None if v is None else v[i][axis] for v in (place["q50"], place["sd"]))
             cells += [_metres(middle), _mm(None if sd is None else 1e3 * sd)]
-        low, far, high = (drift["distance_mm"][q][i] for q in ("q05", "q50", "q95"))
+        low, far, high = (drift["distance_mm"][q][i] for q in INTERVAL)
         lines.append([_seconds(drift["times_s"][i]), *cells, _mm(far), f"{_mm(low)} … {_mm(high)}"])
     header = ["time, s", "x, m", "sd, mm", "y, m", "sd, mm", "z, m", "sd, mm", "distance, mm", "90 %"]
     return [Table(header, lines, "Some of the rows; all of them, with bands and rotations: poses.csv.")]
@@ -173,7 +175,7 @@ def _seconds(time: float) -> str:
     return f"{time:,.3f}".rstrip("0").rstrip(".").replace(",", "\u202f")
 
 
-def _corrections(pose: dict[str, Any]) -> list[Block]:
+def _corrections(pose: PoseHistoryJson) -> list[Block]:
     change = pose["corrections"]["change_mm"]
     if not change["mean"]:
         return []

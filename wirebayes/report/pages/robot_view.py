@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.scene import SceneJson
 from wirebayes.report.blocks import Block, View, number
 
 FILE = "scene.json"
@@ -12,7 +13,7 @@ def robot_view(folder: Path) -> list[Block]:
     """The view, or nothing where the folder has no such file."""
     if not (folder / FILE).is_file():
         return []
-    scene = read_json(folder / FILE)
+    scene: SceneJson = read_json(folder / FILE)
     known = [tension for row in scene["tensions_N"] for tension in row if tension is not None]
     about = []
     if known:

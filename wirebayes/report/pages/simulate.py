@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
     Block,
@@ -34,7 +35,8 @@ _FILES = (
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``truth.json`` and of the experiments beside it."""
-    truths = read_json(folder / "truth.json")["experiments"]
+    content: TruthJson = read_json(folder / "truth.json")
+    truths = content["experiments"]
     experiments = read_experiments(folder / "experiments.toml")
     sections = [_section(e, truths[e.name]) for e in experiments[:_MOST]]
     if len(experiments) > _MOST:
@@ -46,7 +48,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     return Page("Simulated tests", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
-def _section(e: Any, truth: dict[str, Any]) -> Section:
+def _section(e: Experiment, truth: TrueWire) -> Section:
     effects = truth.get("effects", [])
     said = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
     picture = Picture(

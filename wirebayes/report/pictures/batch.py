@@ -1,6 +1,6 @@
 """Pictures of a batch: each parameter of all specimens, side by side by material."""
 
-from typing import Any
+from collections import Counter
 
 import matplotlib
 
@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wirebayes.json_files.batch import OutlierRow, Row
+from wirebayes.json_files.values import INTERVAL
 from wirebayes.report.figures import logarithmic, verbatim
 
 _SHOWN = {"k1": "k1 (N)", "B": "B (mm N⁻ᵁ) per m of length", "U": "U", "k2": "k2 (s⁻ᴺ)", "N": "N"}
@@ -17,7 +19,7 @@ _MOST_MATERIALS = 12  # columns whose labels can be read
 _DOT, _FAR = "#4c78a8", "#d1495b"
 
 
-def specimens_of_materials(rows: list[dict[str, Any]], far: list[dict[str, Any]]) -> Figure:
+def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
     """Posterior medians with 90 % intervals, a panel a parameter, a column a material.
 
     Parameters
@@ -31,9 +33,7 @@ def specimens_of_materials(rows: list[dict[str, Any]], far: list[dict[str, Any]]
     -------
     Figure
     """
-    count: dict[str, int] = {}
-    for row in rows:
-        count[row["material"]] = count.get(row["material"], 0) + 1
+    count = Counter(row["material"] for row in rows if row["material"])
     materials = sorted(count, key=lambda material: -count[material])[:_MOST_MATERIALS]
     marked = {(outlier["experiment"], outlier["parameter"]) for outlier in far}
     figure = Figure(figsize=(7.6, 5.0 if len(materials) < 5 else 6.4), layout="constrained")
@@ -52,12 +52,12 @@ def specimens_of_materials(rows: list[dict[str, Any]], far: list[dict[str, Any]]
     return figure
 
 
-def _column(axis: Axes, at: int, name: str, members: list[dict[str, Any]], marked: set[tuple[str, str]]) -> None:
+def _column(axis: Axes, at: int, name: str, members: list[Row], marked: set[tuple[str, str]]) -> None:
     """The specimens of one material."""
     places = at + np.linspace(-0.35, 0.35, len(members) + 2)[1:-1]
     for x, row in zip(places, members, strict=True):
-        scale = 1e3 / row["length_mm"] if name == "B" else 1.0
-        low, middle, high = (scale * row["parameters"][name][q] for q in ("q05", "q50", "q95"))
+        scale = 1e3 / row["length_mm"] if name == "B" and row["length_mm"] else 1.0
+        low, middle, high = (scale * row["parameters"][name][q] for q in INTERVAL)
         apart = (row["name"], name) in marked
         color = _FAR if apart else _DOT
         if len(members) <= _MOST_BARS or apart:

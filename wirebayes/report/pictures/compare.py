@@ -1,18 +1,19 @@
 """Pictures of a comparison: how much better or worse each model predicts, and the held-out holds themselves."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ModelJson, PredictionScores
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel
 
 _SEEN = 12.0  # worse by more than this many times the best-known spread is drawn at the edge
 
 
-def save_pictures(folder: Path, name: str, table: dict[str, Any], models: list[dict[str, Any]]) -> None:
+def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[ModelJson]) -> None:
     """Write the pictures of one experiment into its folder.
 
     Parameters
@@ -26,57 +27,61 @@ def save_pictures(folder: Path, name: str, table: dict[str, Any], models: list[d
         What `wirebayes.comparison.compare.judge` returned for each model.
     """
     save(differences(name, table), folder / "differences.svg")
-    held = {m["name"]: m for m in models if m["failed"] is None and m["held_out"]}
-    if table["base"] in held:
+    base = next((m["held_out"] for m in models if m["name"] == table["base"] and m["failed"] is None), None)
+    if base is not None:
         save(held_out_errors(name, table), folder / "held-out-errors.svg")
-        for way, readings in held[table["base"]]["held_out"].items():
-            if way in ("free", "given_first") and readings:
-                save(bands(f"{name}: {WORDS[way]}", readings), folder / f"held-out-{way.replace('_', '-')}.svg")
-                save(pit(f"{name}: {WORDS[way]}", readings), folder / f"pit-{way.replace('_', '-')}.svg")
+        for way, words in WORDS.items():
+            if scores := base[way]:
+                save(bands(f"{name}: {words}", scores), folder / f"held-out-{way.replace('_', '-')}.svg")
+                save(pit(f"{name}: {words}", scores), folder / f"pit-{way.replace('_', '-')}.svg")
 
 
-WORDS = {"free": "held out, predicted freely", "given_first": "held out, given first reading"}
+Way = Literal["free", "given_first"]
+WORDS: dict[Way, str] = {"free": "held out, predicted freely", "given_first": "held out, given first reading"}
 
 
-def differences(name: str, table: dict[str, Any]) -> Figure:
+def differences(name: str, table: ComparedModels) -> Figure:
     """Elpd difference from the base with two standard errors, one line a model."""
-    rows = [r for r in table["models"] if r["difference"] is not None and r["name"] != table["base"]]
+    rows = [(r, d) for r in table["models"] if (d := r["difference"]) is not None and r["name"] != table["base"]]
     figure, axes = panel(f"elpd − elpd of {table['base']}, all holds left out in turn", "", name,
                          (5.4, 1.2 + 0.22 * len(rows)))  # fmt: skip
     axes.axvline(0, color=QUIET, lw=1)
     axes.axvspan(-4, 4, color=QUIET, alpha=0.25, lw=0)
-    values = np.array([r["difference"]["elpd"] for r in rows], float)
+    values = np.array([d["elpd"] for _, d in rows], float)
     edge = -max(_SEEN, 3.0 * float(values.max(initial=0.0)), 40.0)
-    for place, (row, value) in enumerate(zip(rows, values, strict=True)):
+    for place, ((row, difference), value) in enumerate(zip(rows, values, strict=True)):
         colour = CHAIN if row["converged"] else QUIET
         if value < edge:
             axes.annotate(f"← {value:.0f}", (edge, place), fontsize=8, color=HOLD, va="center")
             continue
-        axes.errorbar(value, place, xerr=2 * row["difference"]["se"], fmt="o", ms=4, lw=1, color=colour)
-    _names(axes, rows)
+        axes.errorbar(value, place, xerr=2 * difference["se"], fmt="o", ms=4, lw=1, color=colour)
+    _names(axes, [row for row, _ in rows])
     axes.set_xlim(edge * 1.05, None)
     return figure
 
 
-def held_out_errors(name: str, table: dict[str, Any]) -> Figure:
+def held_out_errors(name: str, table: ComparedModels) -> Figure:
     """Root mean square error on the held-out holds, freely and given the first reading."""
-    rows = [r for r in table["models"] if r["failed"] is None and r["held_out"]]
+    rows = [(r, held) for r in table["models"] if r["failed"] is None and (held := r["held_out"])]
     figure, axes = panel("rms error on held-out holds, N", "", name, (5.4, 1.2 + 0.22 * len(rows)))
-    for way, colour, label in (("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")):
-        found = [(place, r["held_out"][way]["rmse_N"]) for place, r in enumerate(rows) if r["held_out"][way]]
+    drawn: tuple[tuple[Way, str, str], ...] = (
+        ("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")
+    )  # fmt: skip
+    for way, colour, label in drawn:
+        found = [(place, scores["rmse_N"]) for place, (_, held) in enumerate(rows) if (scores := held[way])]
         axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
     logarithmic(axes)
-    _names(axes, rows)
+    _names(axes, [row for row, _ in rows])
     legend_below(figure, axes, 4)
     return figure
 
 
-def _names(axes: Any, rows: list[dict[str, Any]]) -> None:
+def _names(axes: Any, rows: list[ComparedModel]) -> None:
     axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
     axes.set_ylim(len(rows) - 0.4, -0.6)
 
 
-def bands(title: str, scores: dict[str, Any]) -> Figure:
+def bands(title: str, scores: PredictionScores) -> Figure:
     """Measured readings minus the predictive median, in the 50, 90 and 99 % bands."""
     r = {k: np.asarray(v, float) for k, v in scores["readings"].items()}
     figure, axes = panel("hold (readings in order of time within each)", "measured − predicted, N", title)
@@ -96,7 +101,7 @@ def bands(title: str, scores: dict[str, Any]) -> Figure:
     return figure
 
 
-def pit(title: str, scores: dict[str, Any]) -> Figure:
+def pit(title: str, scores: PredictionScores) -> Figure:
     """Share of readings below each level of their predictive distribution, in its simultaneous 95 % band."""
     level, low, high = np.asarray(scores["pit_band"], float)
     values = np.asarray(scores["readings"]["pit"], float)

@@ -3,7 +3,6 @@
 import textwrap
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 
@@ -14,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wirebayes.discovery.residual_patterns import COVARIATES
+from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.model import likelihoods
 from wirebayes.report.blocks import save
 from wirebayes.results import store
@@ -23,7 +23,7 @@ from wirebayes.wire.staircase import Linearised, linearise
 _MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
 
 
-def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_effects: Path | None = None) -> None:
+def before_and_after(folder: Path, verdict: ExperimentFindings, target: Path, own_effects: Path | None = None) -> None:
     """Draw measured minus predicted tension for a folder's ``plain`` and ``final`` posteriors.
 
     Parameters
@@ -52,16 +52,16 @@ def before_and_after(folder: Path, verdict: dict[str, Any], target: Path, own_ef
     plt.close(figure)
 
 
-def waterfall(verdict: dict[str, Any]) -> Figure:
+def waterfall(verdict: ExperimentFindings) -> Figure:
     """The rms error on held-out holds, from the plain model down: a bar for each named effect, and for what is left.
 
     Parameters
     ----------
     verdict : dict
-        The experiment's part of ``discovery.json``, with at least one accepted effect.
+        The experiment's part of ``discovery.json``, with at least one accepted effect and holds that were held out.
     """
     steps, floor = verdict["steps"], verdict["held_out"]["floor_N"]
-    heights = [s["rmse_N"] for s in steps]
+    heights = [s["rmse_N"] for s in steps if s["rmse_N"] is not None]
     names = ["plain model", *(s["model"].replace("_", " ") for s in steps[1:]), "left over", "noise"]
     bars = [(0.0, heights[0], _MEASURED)]
     bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
@@ -82,7 +82,7 @@ def waterfall(verdict: dict[str, Any]) -> Figure:
     return figure
 
 
-def pictures_of_findings(folder: Path, verdict: dict[str, Any], own_effects: Path | None = None) -> None:
+def pictures_of_findings(folder: Path, verdict: ExperimentFindings, own_effects: Path | None = None) -> None:
     """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.svg``.
 
     None for a pattern over what does not vary within the experiment.

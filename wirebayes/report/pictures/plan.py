@@ -1,7 +1,6 @@
 """The picture of a plan: how narrow each test would make each parameter, and which effects it would show."""
 
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 
@@ -9,6 +8,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.json_files.plan import ExpectedWidth, PlanJson
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import verbatim
 
@@ -16,7 +16,7 @@ _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#bab0ac")
 _MOST = 6  # tests that a picture can hold
 
 
-def widths_and_effects(plan: dict[str, Any], target: Path) -> None:
+def widths_and_effects(plan: PlanJson, target: Path) -> None:
     """Draw expected widths beside the guess's, and the size δ at which each effect is seen.
 
     Parameters
@@ -33,7 +33,7 @@ def widths_and_effects(plan: dict[str, Any], target: Path) -> None:
     left, right = figure.subplots(1, 2)
     step = 0.8 / len(rows)
     for i, row in enumerate(rows):
-        quantities = row["parameters"] | row["creep"]
+        quantities = row["parameters"] | {"creep_1h_mm": row["creep"]["creep_1h_mm"]}
         share = [_share(quantities[n]) for n in names]
         places = np.arange(len(names)) + (i - (len(rows) - 1) / 2) * step
         label = f"{row['rank']}. {verbatim(row['name'])}, {row['duration_min']:.3g} min"
@@ -63,11 +63,11 @@ def widths_and_effects(plan: dict[str, Any], target: Path) -> None:
     save(figure, target)
 
 
-def _share(width: dict[str, float]) -> float:
+def _share(width: ExpectedWidth) -> float:
     return np.nan if is_given(width) else width["sd_median"] / width["guess_sd"]
 
 
-def is_given(width: dict[str, float]) -> bool:
+def is_given(width: ExpectedWidth) -> bool:
     """Whether the guess states a value without uncertainty, so that there is nothing to compare with."""
     return width["guess_sd"] <= _ROUNDING * width["sd_median"]
 

@@ -1,8 +1,8 @@
 """Pictures of a robot's pose: in 3-D with its drift exaggerated, errors against time, error budget."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,6 +10,9 @@ from matplotlib.ticker import FuncFormatter
 from scipy.spatial import ConvexHull, QhullError
 
 from wirebayes.io.run_folder import write_json
+from wirebayes.json_files.pose import ControllerError, Drift, VarianceShares
+from wirebayes.json_files.scene import SceneJson
+from wirebayes.json_files.values import Band, Numbers
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
 from wirebayes.report.pictures.robot_space import orientation, workspace_maps
@@ -27,6 +30,7 @@ CONTROLLERS = {
     "held_still": "does not move",
 }
 _COLOURS = (HOLD, CHAIN, "#5d8c4a")
+Distance = Literal["distance_mm", "rotation_deg"]  # bands of a drift that are drawn over time
 
 
 def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
@@ -76,7 +80,7 @@ def scene(
         Default: a round factor that makes the drift a twentieth of the robot.
     """
     view = scene_points(robot, position_m, rotation, course, exaggeration)
-    exaggeration, here = view["exaggeration"], view["platform"]
+    exaggeration, here = view["exaggeration"], np.asarray(view["platform"])
     there = here + exaggeration * (view["drifted"][-1] - here)
     size = np.ptp(robot.exit_m, axis=0).max()
     figure = Figure(figsize=(6.0, 5.2))
@@ -106,7 +110,7 @@ def scene(
 
 def scene_points(
     robot: Robot, position_m: Floats, rotation: Floats, course: Course, exaggeration: float | None = None
-) -> dict[str, Any]:
+) -> SceneJson:
     """What a view of the robot draws: exit points, platform points and edges, and the mean drift at each time.
 
     Parameters
@@ -120,9 +124,8 @@ def scene_points(
 
     Returns
     -------
-    dict
-        ``name``, ``exits``, ``platform`` (w, 3), ``drifted`` (t, w, 3), ``wires`` (w lines, about their pulleys), all
-        in m and in the world; ``edges``, ``times``, ``exaggeration``, ``tensions_N`` (t, w), medians, at nine times.
+    SceneJson
+        At nine times or fewer.
     """
     position, turned = course.position_m[course.found].mean(0), course.rotation[course.found].mean(0)
     shown = np.unique(np.linspace(0, len(position) - 1, min(len(position), _MOST_TIMES)).round().astype(int))
@@ -138,7 +141,7 @@ def scene_points(
     }
 
 
-def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> dict[str, Any]:
+def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> SceneJson:
     """What `scene_points` returns, for a robot that stays where it is.
 
     Parameters
@@ -190,7 +193,7 @@ def round_factor(value: float) -> float:
     return float(max(1.0, decade * max(f for f in (1, 2, 5) if f * decade <= max(value, 1.0))))
 
 
-def in_time(drifts: Sequence[Mapping[str, Any]], key: str, label: str, title: str) -> Figure:
+def in_time(drifts: Sequence[Drift], key: Distance, label: str, title: str) -> Figure:
     """One quantity against time with 90 % bands, one colour a specimen spread.
 
     Parameters
@@ -211,18 +214,18 @@ def in_time(drifts: Sequence[Mapping[str, Any]], key: str, label: str, title: st
     for entry, colour in zip(drifts, (CHAIN, HOLD), strict=True):
         spread = entry["specimen_spread"]
         name = f"specimens differ by {100 * spread:g} %" if spread else "identical specimens"
-        _banded(axes, entry, key, colour, name)
+        _banded(axes, entry["times_s"], entry[key], colour, name)
     _since(axes)
     legend_below(figure, axes)
     return figure
 
 
-def error_in_time(errors: Sequence[Mapping[str, Any]]) -> Figure:
+def error_in_time(errors: Sequence[ControllerError]) -> Figure:
     """Pose error of the controllers against time, specimens alike; the tolerance dashed."""
     figure, axes = panel("time, s", "pose error, mm", "Pose error by controller")
     alike = [e for e in errors if e["specimen_spread"] == 0]
     for entry, colour in zip(alike, _COLOURS, strict=False):
-        _banded(axes, entry, "distance_mm", colour, CONTROLLERS[entry["controller"]])
+        _banded(axes, entry["times_s"], entry["distance_mm"], colour, CONTROLLERS[entry["controller"]])
     axes.axhline(alike[0]["tolerance_mm"], color=INK, lw=0.9, ls="--", label="tolerance")
     _since(axes)
     legend_below(figure, axes)
@@ -236,15 +239,14 @@ def _since(axes: Any) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _banded(axes: Any, entry: Mapping[str, Any], key: str, colour: str, label: str) -> None:
-    band = entry[key]
+def _banded(axes: Any, times_s: Numbers, band: Band, colour: str, label: str) -> None:
     if band["mean"] is None:
         return
-    axes.plot(entry["times_s"], band["q50"], color=colour, label=label)
-    axes.fill_between(entry["times_s"], band["q05"], band["q95"], color=colour, alpha=0.22, lw=0)
+    axes.plot(times_s, band["q50"], color=colour, label=label)
+    axes.fill_between(times_s, band["q05"], band["q95"], color=colour, alpha=0.22, lw=0)
 
 
-def error_budget(result: Mapping[str, Any]) -> Figure:
+def error_budget(result: VarianceShares) -> Figure:
     """Shares of the drift's variance by parameter."""
     label = f"share of the variance of the drift\nafter {result['time_s']:g} s, %"
     figure, axes = panel(label, "", "Sources of uncertainty", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))

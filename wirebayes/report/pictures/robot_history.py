@@ -9,9 +9,11 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from wirebayes.io.run_folder import write_bytes, write_text
+from wirebayes.json_files.pose_history import Corrections, DriftOverTime
+from wirebayes.json_files.values import INTERVAL, Numbers
 from wirebayes.report.blocks import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
-from wirebayes.report.pictures.robot import platform_edges, round_factor
+from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor
 from wirebayes.robot.history.answer import HistoryAnswer
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
@@ -50,7 +52,7 @@ def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> 
     write_text(folder / "motion.svg", moving(robot, history, found))
 
 
-def banded(drift: dict[str, Any], key: str, label: str, title: str, history: History) -> Figure:
+def banded(drift: DriftOverTime, key: Distance, label: str, title: str, history: History) -> Figure:
     """One quantity over time with its 90 % band; what the platform carries below it, where that changes.
 
     Parameters
@@ -70,27 +72,29 @@ def banded(drift: dict[str, Any], key: str, label: str, title: str, history: His
     matplotlib.figure.Figure
     """
     figure, axes = panel("time, s", label, title)
-    _band(axes, drift["times_s"], drift[key], CHAIN, "median and 90 % of the draws")
+    _band(axes, drift["times_s"], np.array([drift[key][q] for q in INTERVAL]), CHAIN, "median and 90 % of the draws")
     axes.set_ylim(bottom=0)
     _in_time(figure, axes, history)
     return figure
 
 
-def corrected(corrections: dict[str, Any], history: History) -> Figure:
+def corrected(corrections: Corrections, history: History) -> Figure:
     """The change of every joint value that brings the platform back, over time."""
     figure, axes = panel("time, s", "change of the joint value, mm", "Corrections")
-    change = {key: np.asarray(value) for key, value in corrections["change_mm"].items() if value is not None}
-    for i in range(change["q50"].shape[1] if change else 0):
-        own = {key: value[:, i] for key, value in change.items()}
-        _band(axes, corrections["times_s"], own, _COLOURS[i % len(_COLOURS)], f"joint {i + 1}", 0.14)
+    change = corrections["change_mm"]
+    if change["q50"] is not None:
+        for i, ends in enumerate(np.moveaxis(np.array([change[q] for q in INTERVAL]), -1, 0)):
+            _band(axes, corrections["times_s"], ends, _COLOURS[i % len(_COLOURS)], f"joint {i + 1}", 0.14)
     axes.axhline(0, color=QUIET, lw=0.8, zorder=0)
     _in_time(figure, axes, history, 4)
     return figure
 
 
-def _band(axes: Any, times: Floats, band: dict[str, Any], colour: str, label: str, alpha: float = 0.22) -> None:
-    axes.plot(times, band["q50"], color=colour, label=label)
-    axes.fill_between(times, band["q05"], band["q95"], color=colour, alpha=alpha, lw=0)
+def _band(axes: Any, times: Numbers, ends: Floats, colour: str, label: str, alpha: float = 0.22) -> None:
+    """The (3, t) ends of a band and the median between them."""
+    low, middle, high = ends
+    axes.plot(times, middle, color=colour, label=label)
+    axes.fill_between(times, low, high, color=colour, alpha=alpha, lw=0)
 
 
 def _in_time(figure: Figure, axes: Any, history: History, columns: int = 2) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.json_files.pose_history import Clock, DriftOverTime, PoseHistoryJson
+from wirebayes.json_files.values import Band, Statistic
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate, Progress, estimate
@@ -49,7 +51,7 @@ class HistoryAnswer:
     to : Target or None
     """
 
-    content: dict[str, Any]
+    content: PoseHistoryJson
     tables: dict[str, tuple[list[str], list[list[Any]]]]
     rows: NDArray[np.intp]
     found: Estimate | None = None
@@ -80,7 +82,7 @@ def answer(
     """
     rng = np.random.default_rng(seed)
     rows = np.unique(np.linspace(0, len(history.times_s) - 1, _SHOWN).round().astype(int))
-    content = _asked(robot, line, history, errors)
+    content = _requested(robot, line, history, errors)
     if history.position_m is not None and history.rotation is not None:
         start = history.position_m[0], history.rotation[0]
     if history.joint_m is not None:
@@ -133,9 +135,10 @@ def answer(
     return HistoryAnswer(content, tables, rows, found, to)
 
 
-def _asked(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -> dict[str, Any]:
+def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -> PoseHistoryJson:
+    """The history, the robot and the wires."""
     kind = "measured" if history.joint_m is not None else "commanded"
-    out: dict[str, Any] = {
+    out: PoseHistoryJson = {
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
@@ -180,7 +183,7 @@ def _moved(course: Course, to: Target, rows: NDArray[np.intp]) -> tuple[Floats, 
     return shift, angle, tilt
 
 
-def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) -> dict[str, Any]:
+def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) -> DriftOverTime:
     shift, angle, tilt = _moved(course, to, rows)
     return {
         "specimen_spread": spread,
@@ -196,14 +199,19 @@ def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) ->
     }
 
 
-def _bands(values: Floats) -> dict[str, Any]:
+def _bands(values: Floats) -> Band:
     """Bands at each time of ``(n, r, ...)`` over the draws whose platform still hangs then."""
-    each = [dict(band(values[:, i])) for i in range(values.shape[1])]
+    each = [band(values[:, i]) for i in range(values.shape[1])]
     empty = np.full(values.shape[2:], np.nan)
-    return {key: np.array([empty if one[key] is None else one[key] for one in each]) for key in each[0]}
+
+    def over_time(key: Statistic) -> Floats:
+        return np.array([empty if one[key] is None else one[key] for one in each])
+
+    return {"mean": over_time("mean"), "sd": over_time("sd"), "q05": over_time("q05"), "q50": over_time("q50"),
+            "q95": over_time("q95")}  # fmt: skip
 
 
-def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> dict[str, Any]:
+def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> Clock:
     """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
     anew, once = run(few, RESTART), run(few, np.inf)
@@ -213,7 +221,7 @@ def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> dict[st
 
 
 def _warnings(
-    robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: dict[str, Any]
+    robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: PoseHistoryJson
 ) -> list[str]:
     out, held = [], found.track.held
     lost = 1.0 - held[:, -1].mean()

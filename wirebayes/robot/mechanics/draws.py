@@ -186,12 +186,12 @@ def typical_spread(line: WireDraws, stated: float) -> float:
     return round(float(np.sqrt(np.mean([line.spread[name] ** 2 for name in DIFFER]))), 4)
 
 
-def specimens_said(wires: Mapping[str, Any]) -> list[str]:
+def specimens_in_words(wires: WiresUsed) -> list[str]:
     """A sentence for each line whose spread was estimated, of `summary`'s content.
 
     Parameters
     ----------
-    wires : mapping
+    wires : WiresUsed
         ``wires`` of ``pose.json``.
     """
     return [

@@ -1,0 +1,69 @@
+"""``pose.json`` of a robot over time: poses from measured joint values, or where commanded poses lead."""
+
+from typing import NotRequired, TypedDict
+
+from wirebayes.json_files.pose import Drift, RobotOnWires
+from wirebayes.json_files.values import Band, Numbers
+
+
+class HistoryOfRobot(TypedDict):
+    """What the robot went through; `target` is what drift is counted from."""
+
+    kind: str
+    rows: int
+    duration_s: float
+    highest_payload_kg: float
+    restart_share: float | None
+    specimen_spread: float
+    reference_sd_mm: NotRequired[float]
+    target: NotRequired[str]
+    holds: NotRequired[int]
+
+
+class HistoryReadings(TypedDict):
+    """Tensions and tilts that were read on the way, and how well they agree with joint values and wires.
+
+    Given them, the draws are worth `effective_draws` independent ones; with too few the readings are not `used`.
+    """
+
+    tensions: int
+    tilts: int
+    tension_sd_N: float
+    tilt_sd_rad: float
+    misfit: NotRequired[float | None]
+    converged: NotRequired[bool]
+    effective_draws: NotRequired[float | None]
+    used: NotRequired[bool]
+
+
+class Corrections(TypedDict):
+    """Changes of the joint values that bring the platform back, and what they leave."""
+
+    times_s: Numbers
+    change_mm: Band
+    left_mm: Band
+
+
+class Clock(TypedDict):
+    """How far poses move if the wires' clocks run on instead of starting anew."""
+
+    largest_mm: float
+    at_the_end_mm: float
+
+
+class DriftOverTime(Drift):
+    """From where the platform is meant to be; `held` is the share of the draws that hold it at each time."""
+
+    held: Numbers
+
+
+class PoseHistoryJson(RobotOnWires):
+    """The whole file for a history."""
+
+    history: HistoryOfRobot
+    readings: NotRequired[HistoryReadings]
+    drift: NotRequired[list[DriftOverTime]]
+    position_m: NotRequired[Band]
+    rotation_vector_rad: NotRequired[Band | None]
+    corrections: NotRequired[Corrections]
+    clock: NotRequired[Clock]
