@@ -203,7 +203,7 @@ def test_commanded_poses_need_no_rows_between():
         history = _told(robot, columns[0], np.stack(columns[1:], 1))
         history = replace(history, joint_m=None, position_m=np.stack(columns[1:], 1),
                           rotation=np.tile(np.eye(3), (len(columns[0]), 1, 1)))  # fmt: skip
-        found, joint = commanded.drift(robot, _line(3), history, 0.05, np.random.default_rng(0))
+        found, joint = commanded.drift(robot, _line(3), history, Uncertain(), np.random.default_rng(0))
         assert joint.shape == (3, len(columns[0]), 8)
         drifts[name] = found.track.position_m[:, -1] - robot.home_m
         assert np.abs(found.track.position_m[:, 0] - robot.home_m).max() < 1e-9

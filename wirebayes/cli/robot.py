@@ -64,6 +64,12 @@ def pose(
     reference_sd: Annotated[
         float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the lengths that joints stand for.")
     ] = 0.0,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(
+            "--calibration", metavar="FOLDER", help="What calibrate found; --joints and --trajectory go on from there."
+        ),
+    ] = None,
     draws: Annotated[
         int | None, typer.Option("--draws", min=1, help="Posterior draws used; default: 1000, 200 over time.")
     ] = None,
@@ -89,8 +95,9 @@ def pose(
             robot, named_lines(wires), position=position, rotation=rotation, times=times, tolerance=tolerance,
             tolerance_tilt=tolerance_tilt, specimen_spread=spread, map_heights=map_heights,
             map_rotations=map_rotation, other_fit=other_fit, joints=joints, trajectory=trajectory, payload=payload,
-            payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd, draws=draws,
-            experiment=experiment, own_effects=own_effects, seed=seed, output=output, progress=report,
+            payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
+            calibration=calibration, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed,
+            output=output, progress=report,
         )  # fmt: skip
     for line in found.messages if found.computed else ():
         typer.echo(line, err=True)

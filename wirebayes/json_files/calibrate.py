@@ -64,6 +64,31 @@ class CalibratedPoses(TypedDict):
     motor_angles_for_home_rad: NotRequired[Numbers]
 
 
+class SessionDone(TypedDict):
+    """What the robot did, a row a hold."""
+
+    position_m: Numbers
+    rotation_vector_rad: Numbers
+    joint_m: Numbers
+    duration_s: Numbers
+
+
+class CalibratedUnknowns(TypedDict):
+    """``unknowns.json``: the posterior that ``pose --calibration`` starts from.
+
+    `mean` and `covariance` are of the reference errors of all wires (m), the line's parameters (`line` names them;
+    logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters.
+    """
+
+    version: int
+    reference_sd_mm: float
+    specimen_spread: float
+    line: list[str]
+    mean: Numbers
+    covariance: Numbers
+    session: SessionDone
+
+
 class CalibrateJson(CalibratedPoses, Observed):
     """The whole file."""
 

@@ -3,7 +3,15 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.pose import Drift, RobotOnWires
-from wirebayes.json_files.values import Band, Numbers
+from wirebayes.json_files.values import Band, MeanAndSd, Numbers
+
+
+class CalibratedStart(TypedDict):
+    """The session that the history goes on from, and what it left known of the wires' reference lengths."""
+
+    holds: int
+    duration_s: float
+    reference_error_mm: MeanAndSd
 
 
 class HistoryOfRobot(TypedDict):
@@ -16,6 +24,7 @@ class HistoryOfRobot(TypedDict):
     restart_share: float | None
     specimen_spread: float
     reference_sd_mm: NotRequired[float]
+    calibration: NotRequired[CalibratedStart]
     target: NotRequired[str]
     holds: NotRequired[int]
 

@@ -2,18 +2,20 @@
 
 import math
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import open_run, write_json
+from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import typical_spread
+from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration import session_file
 from wirebayes.robot.self_calibration.answer import answer
+from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.session import Prior
 from wirebayes.workflows.options import PathLike, above_zero, check_seed, path_of
 from wirebayes.workflows.results import Calibration, Place
@@ -28,6 +30,8 @@ from wirebayes.workflows.wires import (
     posterior_of,
     robot_of,
 )
+
+UNKNOWNS = "unknowns.json"  # the posterior that a history can start from
 
 
 def calibrate(
@@ -118,8 +122,10 @@ def calibrate(
         if run.state != "done":
             prior = Prior(line, 1e-3 * reference_sd, typical_spread(line, specimen_spread), bias_sd_N=bias)
             with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-                found = answer(machine, prior, session, values, seed)
+                found, known = answer(machine, prior, session, values, seed)
             write_json(run.directory / "calibrate.json", found)
+            if found["with_creep_model"]["converged"]:
+                write_json(run.directory / UNKNOWNS, {**_belongs_to(machine, wires, experiment), **to_dict(known)})
             if found["pose_now"] is not None:
                 from wirebayes.report.pictures.robot import still_points  # matplotlib only where it is needed
 
@@ -127,6 +133,59 @@ def calibrate(
                 write_json(run.directory / "scene.json", still_points(machine, here, matrix(turn)))
             run.finish()
     return Calibration(place, own, computed=run.state != "done")
+
+
+def calibrated_of(
+    calibration: PathLike | Calibration, robot: Robot, line: WireDraws, wires: Wires, experiment: str | None
+) -> Calibrated:
+    """What a calibration left known, for a robot and a line that must be those it was done with.
+
+    Parameters
+    ----------
+    calibration : Calibration or path of its folder
+    robot : Robot
+        Without payload.
+    line : WireDraws
+    wires : Posterior, path or mapping
+        What `line` was read from.
+    experiment : str or None
+
+    Returns
+    -------
+    Calibrated
+
+    Raises
+    ------
+    InputError
+        It has not converged, is of another robot or line, or is no calibration.
+    """
+    folder = calibration.folder if isinstance(calibration, Calibration) else Path(calibration)
+    expected = f"expected a calibration of {robot.name} that has converged"
+    summary = folder / "calibrate.json"
+    found = read_json(summary, f"--calibration: found no calibrate.json in {folder}, {expected}")
+    with stored_results(summary):
+        name, converged = str(found["robot"]), bool(found["with_creep_model"]["converged"])
+    if name != robot.name:
+        raise InputError(f"--calibration: found one of {name} in {folder}, {expected}")
+    if not converged:
+        raise InputError(f"--calibration: found one that has not converged in {folder}, {expected}")
+    path = folder / UNKNOWNS
+    absent = f"{path}: found no such file, expected what calibrate writes; run it again in a new folder"
+    stored = read_json(path, absent)
+    with stored_results(path):
+        own = _belongs_to(robot, wires, experiment)
+        if stored["robot"] != own["robot"]:
+            raise InputError(f"--calibration: found one of another {name} in {folder}, expected one of the robot given")
+        if stored["wires"] != own["wires"]:
+            raise InputError(f"--calibration: found one with other wires in {folder}, expected those of --wires")
+        return from_dict(stored, robot, line)
+
+
+def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> dict[str, str]:
+    """What tells a robot and the posterior of its wires from others."""
+    posterior = posterior_of(wires, experiment)
+    kept = posterior if isinstance(posterior, str) else content(posterior)
+    return {"robot": hash_of(asdict(robot)), "wires": kept}
 
 
 def _as_csv(columns: Any, robot: Robot) -> str:

@@ -3,7 +3,8 @@
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, path_of
-from wirebayes.workflows.pose_history import checked_errors
+from wirebayes.workflows.pose_history import calibrated_errors, checked_errors
+from wirebayes.workflows.results import Calibration
 from wirebayes.workflows.wires import RobotLike, Wires, draws_for, robot_of
 
 
@@ -18,6 +19,7 @@ def live(
     tilt_sd: float = 1e-3,
     reference_sd: float = 0.0,
     specimen_spread: float = 0.05,
+    calibration: PathLike | Calibration | None = None,
     draws: int = 64,
     experiment: str | None = None,
     own_effects: PathLike | None = None,
@@ -39,6 +41,8 @@ def live(
         Standard error of the lengths that joint values stand for, mm.
     specimen_spread : float
         Relative difference between wires of one line.
+    calibration : Calibration or path of its folder, optional
+        What `calibrate` found for this robot; the first step goes on where its session ended.
     draws : int
         Posterior draws carried along, evenly thinned.
     experiment : str, optional
@@ -68,4 +72,5 @@ def live(
     turn = machine.home_rotation_rad if rotation is None else numbers("rotation", rotation, 3)
     errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
     line = draws_for(machine, wires, draws, experiment, path_of(own_effects))
+    errors = calibrated_errors(errors, calibration, machine, line, wires, experiment)
     return LiveEstimator(machine, line, errors, (where, matrix(turn)), reads, check_seed(seed))

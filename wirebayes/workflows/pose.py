@@ -28,8 +28,8 @@ from wirebayes.workflows.options import (
     silent,
     text_of,
 )
-from wirebayes.workflows.pose_history import checked_errors, pose_history
-from wirebayes.workflows.results import POSTERIOR, Place, Pose
+from wirebayes.workflows.pose_history import calibrated_errors, checked_errors, pose_history
+from wirebayes.workflows.results import POSTERIOR, Calibration, Place, Pose
 from wirebayes.workflows.wires import (
     RobotLike,
     Wires,
@@ -66,6 +66,7 @@ def pose(
     tension_sd: float = 0.02,
     tilt_sd: float = 1e-3,
     reference_sd: float = 0.0,
+    calibration: PathLike | Calibration | None = None,
     draws: int | None = None,
     experiment: str | None = None,
     own_effects: PathLike | None = None,
@@ -114,6 +115,8 @@ def pose(
         Standard errors of measured tensions, N, and of roll and pitch, rad.
     reference_sd : float
         Standard error of the lengths that measured joint values stand for, mm.
+    calibration : Calibration or path of its folder, optional
+        What `calibrate` found for this robot: with `joints` or `trajectory`, which then go on where its session ended.
     draws : int, optional
         Posterior draws used, evenly thinned; 1000 when left out, 200 over time.
     experiment : str, optional
@@ -144,12 +147,19 @@ def pose(
     >>> moved = wb.pose("linear-7", posterior, trajectory=path | {"payload_kg": [0, 0.2, 0.2]}, draws=20)
     >>> moved.summary()["history"]["rows"]
     3
+
+    After a calibration, whose session wore the wires in and told their lengths:
+
+    >>> known = wb.pose("linear-7", posterior, trajectory=path, calibration=lengths, draws=20)
+    >>> known.summary()["history"]["calibration"]["holds"]
+    9
     """
     own, seed = path_of(own_effects), check_seed(seed)
     over_time = joints is not None or trajectory is not None
     draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
-    payload = float(payload)
-    machine = _loaded(robot_of(robot), payload, payload_at)
+    _refuse_calibration(calibration is not None and not over_time)
+    payload, bare = float(payload), robot_of(robot)
+    machine = _loaded(bare, payload, payload_at)
     line = draws_for(machine, wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
@@ -162,6 +172,7 @@ def pose(
         _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
         _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
+        errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
         decides = configuration(
             "pose", robot, posterior_of(wires, experiment), draws, seed, own, experiment, *carried,
             None if position is None else text_of(position), None if rotation is None else text_of(rotation),
@@ -170,16 +181,13 @@ def pose(
                             Place.at(output), own, progress)  # fmt: skip
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
-    request = PoseRequest(
-        where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread, seed, slices
-    )
-    limits = (tolerance, tolerance_tilt, specimen_spread)
+    request = PoseRequest(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread,
+                          seed, slices)  # fmt: skip
     at = (None if values is None else text_of(values) for values in (position, rotation))
     other_draws = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
-    options = (experiment, *at, text_of(times), *limits, other_draws, *carried)
+    options = (experiment, *at, text_of(times), tolerance, tolerance_tilt, specimen_spread, other_draws, *carried)
     mapped = () if slices is LEVEL else (plain(asdict(slices)),)
-    place = Place.at(output)
-    posterior = posterior_of(wires, experiment)
+    place, posterior = Place.at(output), posterior_of(wires, experiment)
     decides = configuration("pose", robot, posterior, draws, seed, own, *options, *mapped)
     with open_run(place.path, decides) as run:
         if run.state == "done":
@@ -205,6 +213,11 @@ def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
 def _refuse_beside_history(options: str, given: bool) -> None:
     if given:
         raise InputError(f"{options}: found beside a history; expected them for a single pose only")
+
+
+def _refuse_calibration(alone: bool) -> None:
+    if alone:
+        raise InputError("--calibration: found beside a single pose; expected it beside --joints or --trajectory")
 
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:

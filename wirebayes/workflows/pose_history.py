@@ -1,6 +1,7 @@
 """A robot's measured or commanded history: what `pose` does where it is given one."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,13 @@ from wirebayes.robot.history.answer import answer
 from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.self_calibration.calibrated import to_dict
 from wirebayes.typing import Floats
-from wirebayes.workflows.options import Progress, above_zero
-from wirebayes.workflows.results import Place, Pose
+from wirebayes.workflows.calibrate import calibrated_of
+from wirebayes.workflows.options import PathLike, Progress, above_zero
+from wirebayes.workflows.results import Calibration, Place, Pose
 from wirebayes.workflows.tables import as_csv, row_place
-from wirebayes.workflows.wires import content, hash_of
+from wirebayes.workflows.wires import Wires, content, hash_of
 
 
 def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:
@@ -48,6 +51,45 @@ def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: floa
     if not 0 <= reference_sd < np.inf:
         raise InputError(f"--reference-sd: found {reference_sd:g}; expected millimetres, 0 or more")
     return Uncertain(1e-3 * reference_sd, float(specimen_spread), tension_sd, tilt_sd)
+
+
+def calibrated_errors(
+    errors: Uncertain,
+    calibration: PathLike | Calibration | None,
+    robot: Robot,
+    line: WireDraws,
+    wires: Wires,
+    experiment: str | None,
+) -> Uncertain:
+    """The same standard errors, with what a calibration left known in the place of reference error and spread.
+
+    Parameters
+    ----------
+    errors : Uncertain
+    calibration : Calibration, path of its folder, or None
+        None leaves the errors as they are.
+    robot : Robot
+        Without payload.
+    line : WireDraws
+    wires : Posterior, path or mapping
+        What `line` was read from.
+    experiment : str or None
+
+    Returns
+    -------
+    Uncertain
+
+    Raises
+    ------
+    InputError
+        The calibration is not one of this robot and these wires, or a reference error was given beside it.
+    """
+    if calibration is None:
+        return errors
+    if errors.reference_m:
+        raise InputError("--reference-sd: found beside --calibration, which knows the lengths; expected one of them")
+    known = calibrated_of(calibration, robot, line, wires, experiment)
+    return replace(errors, spread=known.prior.spread, calibrated=known)
 
 
 def pose_history(
@@ -105,7 +147,8 @@ def pose_history(
         history = table.parse(option[2:], text, robot, columns, row_place)
         read = hash_of({option: text})
     spread = [errors.reference_m, errors.spread, errors.tension_N, errors.tilt_rad]
-    with open_run(place.path, decides | {"history": [option[2:], read, *spread]}) as run:
+    known = () if errors.calibrated is None else (hash_of(to_dict(errors.calibrated)),)
+    with open_run(place.path, decides | {"history": [option[2:], read, *spread, *known]}) as run:
         if run.state == "done":
             return Pose(place, own_effects, computed=False)
         with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers

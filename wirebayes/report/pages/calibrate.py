@@ -31,6 +31,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 _FILES = (
     ("calibrate.json", "every number of this page as JSON"),
+    ("unknowns.json", "the posterior that pose --calibration starts from"),
     ("scene.json", "points of the view that can be turned"),
     ("configuration.json", "the options of this run, with version and seed"),
 )

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.json_files.pose_history import HistoryOfRobot, PoseHistoryJson
 from wirebayes.json_files.values import INTERVAL, Band, Numbers
 from wirebayes.report.blocks import (
     Block,
@@ -93,7 +93,7 @@ def _requested(pose: PoseHistoryJson) -> list[str]:
         f"{pose['mass_kg']:g} kg"
         + (f", payload up to {history['highest_payload_kg']:g} kg." if history["highest_payload_kg"] else "."),
         f"Wires known from {wires['draws']} posterior draws of a sample of {wires['tested_length_mm']:g} mm: {model}. "
-        f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. They were new at the first row.",
+        f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. {_began(history)}",
     ]
     out += specimens_in_words(wires)
     if history["restart_share"] is None:
@@ -114,6 +114,19 @@ def _requested(pose: PoseHistoryJson) -> list[str]:
     return out
 
 
+def _began(history: HistoryOfRobot) -> str:
+    """What the wires were at the first row."""
+    known = history.get("calibration")
+    if known is None:
+        return "They were new at the first row."
+    sd = known["reference_error_mm"]["sd"]
+    return (
+        f"The history goes on where a calibration of {known['holds']} holds and {_seconds(known['duration_s'])} s "
+        "ended: its posterior gives the wires, their creep so far and their reference lengths, which it knows to "
+        f"{span(min(sd), max(sd), 2)} mm (standard error)."
+    )
+
+
 def _answers(pose: PoseHistoryJson) -> list[Points]:
     (drift,) = pose["drift"]
     time = number(float(drift["times_s"][-1]))
@@ -131,7 +144,8 @@ def _answers(pose: PoseHistoryJson) -> list[Points]:
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
         f"differ by {_mm(clock['largest_mm'])} mm at most, {_mm(clock['at_the_end_mm'])} mm at the end."
     )
-    if not pose["history"].get("reference_sd_mm") and pose["history"]["kind"] == "measured":
+    exact = "calibration" not in pose["history"] and not pose["history"].get("reference_sd_mm")
+    if exact and pose["history"]["kind"] == "measured":
         loose.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")
     return [Points("What is known", known), Points("What is not known", loose)]
 

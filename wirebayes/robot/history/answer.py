@@ -85,23 +85,25 @@ def answer(
     content = _requested(robot, line, history, errors)
     if history.position_m is not None and history.rotation is not None:
         start = history.position_m[0], history.rotation[0]
+    alike = replace(errors, reference_m=0.0, spread=0.0)  # one way of starting the clocks is compared with another
     if history.joint_m is not None:
         found = estimate(robot, line, history, start, errors, rng, progress)
         joint = history.joint_m
 
         def again(few: WireDraws, restart: float) -> Track:
-            known = unknowns(robot, few, Uncertain(0.0, 0.0), rng)
+            known = unknowns(robot, few, alike, rng)
             starts = clock_starts(history, found.plain.tension_N[0], restart)
-            return follow(robot, known.columns(known.draws)[0], history, joint, start, starts)
+            wires, error = known.columns(known.draws)
+            return follow(robot, wires, history, joint, start, starts, error, carried=known.carried(known.draws))
     else:
         try:
-            found, joint = commanded.drift(robot, line, history, errors.spread, rng, progress)
+            found, joint = commanded.drift(robot, line, history, errors, rng, progress)
         except commanded.Unheld as unheld:
             said = f"No{str(unheld)[2:]}."
             return HistoryAnswer(content | {"feasible": False, "sentence": said}, {}, rows)
 
         def again(few: WireDraws, restart: float) -> Track:
-            return commanded.drift(robot, few, history, 0.0, rng, restart=restart)[0].track
+            return commanded.drift(robot, few, history, alike, rng, restart=restart)[0].track
 
     if not found.track.held[:, 0].any():
         said = "No draw of the wires holds the platform at the first row; see --position for where it starts."
@@ -153,8 +155,16 @@ def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertai
             "specimen_spread": errors.spread,
         },
     }
+    known = errors.calibrated
+    if known is not None:
+        out["history"]["calibration"] = {
+            "holds": len(known.session.duration_s),
+            "duration_s": known.session.duration_s.sum(),
+            "reference_error_mm": {"mean": 1e3 * known.mean[: robot.legs], "sd": 1e3 * known.reference_sd_m},
+        }
     if kind == "measured":
-        out["history"]["reference_sd_mm"] = 1e3 * errors.reference_m
+        if known is None:
+            out["history"]["reference_sd_mm"] = 1e3 * errors.reference_m
         out["history"]["target"] = "commanded" if history.position_m is not None else "without creep"
     if history.read:
         counts = [0 if v is None else int(np.isfinite(v).sum()) for v in (history.tension_N, history.tilt_rad)]

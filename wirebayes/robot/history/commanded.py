@@ -22,7 +22,7 @@ def drift(
     robot: Robot,
     line: WireDraws,
     history: History,
-    spread: float,
+    errors: Uncertain,
     rng: np.random.Generator,
     progress: Progress = lambda name, done, total: None,
     restart: float = RESTART,
@@ -35,8 +35,9 @@ def drift(
     line : WireDraws
     history : History
         With poses.
-    spread : float
-        Relative, from wire to wire.
+    errors : Uncertain
+        Of it the spread from wire to wire, or what a calibration left known: each draw's joint values then allow for
+        its own lengths, and for the creep that its wires bring along.
     rng : numpy Generator
     progress : function of name, done and total
     restart : float
@@ -55,23 +56,27 @@ def drift(
         No tensions within the bounds hold the platform at some row.
     """
     fine, kept = refined(robot, history)
-    known = unknowns(robot, line, Uncertain(0.0, spread), rng)
-    wires, _ = known.columns(known.draws)
+    known = unknowns(robot, line, replace(errors, reference_m=0.0), rng)
+    wires, error = known.columns(known.draws)
+    if errors.calibrated is None:
+        error = np.zeros_like(error)  # of lengths that nobody measured nothing but creep is followed
+    carried = known.carried(known.draws)
+    strain = carried.strain(wires)
     tau = wanted_tensions(robot, fine)
     assert fine.position_m is not None and fine.rotation is not None
     bad = np.flatnonzero(~np.isfinite(tau).all(1))
     if bad.size:
         raise Unheld(float(fine.times_s[bad[0]]))
     joint = np.stack([
-        inverse.commands(fine.robot_at(robot, k), wires, x[None], R[None], t[None]).joint_m
+        inverse.commands(fine.robot_at(robot, k), wires, x[None], R[None], t[None], strain, error.T).joint_m
         for k, (x, R, t) in enumerate(zip(fine.position_m, fine.rotation, tau, strict=True))
     ])  # fmt: skip
     rows, starts = len(fine.times_s), clock_starts(fine, tau, restart)
     start = fine.position_m[0], fine.rotation[0]
-    track = follow(robot, wires, fine, joint, start, starts, progress=lambda k: progress("poses", k + 1, rows))
+    track = follow(robot, wires, fine, joint, start, starts, error,
+                   lambda k: progress("poses", k + 1, rows), carried)  # fmt: skip
     plain = Track(fine.position_m[None], fine.rotation[None], tau[None], np.zeros((1, *tau.shape)), track.hold)
-    errors = np.zeros((line.count, robot.legs))
-    return Estimate(_at(track, kept), _at(plain, kept), wires, errors), np.swapaxes(joint[kept], 0, 1)
+    return Estimate(_at(track, kept), _at(plain, kept), wires, error), np.swapaxes(joint[kept], 0, 1)
 
 
 class Unheld(Exception):

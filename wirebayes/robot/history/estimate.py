@@ -14,6 +14,7 @@ from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion.creep import CreepState
 from wirebayes.typing import Floats
 
 Progress = Callable[[str, float, float], None]
@@ -161,7 +162,7 @@ class _Way:
     plain: Track
     progress: Progress
 
-    def track(self, wires: Wires, error_m: Floats, name: str) -> Track:
+    def track(self, wires: Wires, error_m: Floats, carried: CreepState, name: str) -> Track:
         """The platform's way on given wires.
 
         Parameters
@@ -170,6 +171,7 @@ class _Way:
             n draws.
         error_m : (n, w) array
             Errors of the reference lengths.
+        carried : CreepState
         name : str
             For the progress.
 
@@ -181,7 +183,7 @@ class _Way:
         assert history.joint_m is not None
         starts = clock_starts(history, self.plain.tension_N[0])
         return follow(self.known.robot, wires, history, history.joint_m, self.start, starts, error_m,
-                      lambda row: self.progress(name, row + 1, rows))  # fmt: skip
+                      lambda row: self.progress(name, row + 1, rows), carried)  # fmt: skip
 
     def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:
         """White unknowns followed, some wires without stiffness.
@@ -198,9 +200,9 @@ class _Way:
         if without.any():
             stiffness = np.where(without[:, None], _NONE * wires.theta["k1"], wires.theta["k1"])
             wires = replace(wires, theta=dict(wires.theta) | {"k1": stiffness})
-        return self.track(wires, error, name)
+        return self.track(wires, error, self.known.carried(white), name)
 
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""
         wires, error = self.known.columns(white)
-        return Estimate(self.track(wires, error, "poses"), self.plain, wires, error)
+        return Estimate(self.track(wires, error, self.known.carried(white), "poses"), self.plain, wires, error)

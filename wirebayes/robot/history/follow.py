@@ -71,6 +71,7 @@ def follow(
     starts_s: Floats,
     error_m: Floats | float = 0.0,
     progress: Callable[[int], None] = lambda row: None,
+    carried: CreepState | None = None,
 ) -> Track:
     """Follow every column's equilibrium through a history, its creep under its own tensions.
 
@@ -89,6 +90,8 @@ def follow(
     error_m : (n, w) array or float
         What the zero-tension lengths before creep are beyond what the joint values say.
     progress : function of a row
+    carried : CreepState, optional
+        What the wires bring along; default: they were never loaded.
 
     Returns
     -------
@@ -99,19 +102,20 @@ def follow(
     shapes = ((3,), (3, 3), (legs,), (legs,))
     position, rotation, tension, strain = (np.full((n, len(times), *shape), np.nan) for shape in shapes)
     schedule, since = _schedule(times, joint_m), float(times[0])
-    walk = _begin(history.robot_at(robot, 0), wires, schedule, since, start, fresh(legs, n), error_m)
+    brought = fresh(legs, n) if carried is None else _without_clocks(carried, wires)
+    walk = _begin(history.robot_at(robot, 0), wires, schedule, since, start, brought, error_m)
     ahead = [float(time) for time in starts_s if time > since]
     for k, time in enumerate(times):
         while ahead and ahead[0] < time:
             walk.to(ahead[0] - since)
             since = ahead.pop(0)
-            walk = _begin(walk.robot, wires, schedule, since, _pose(walk), _carried(walk, wires), error_m)
+            walk = _again(walk, schedule, since)
         walk.to(float(time) - since)
         if k and _loaded(history, k):
             walk.load(history.robot_at(robot, k))
         if ahead and ahead[0] == time:
             since = ahead.pop(0)
-            walk = _begin(walk.robot, wires, schedule, since, _pose(walk), _carried(walk, wires), error_m)
+            walk = _again(walk, schedule, since)
         live = walk.live
         position[live, k], rotation[live, k] = walk.here.position_m[live], walk.here.rotation[live]
         tension[live, k] = walk.here.tension_N[live]
@@ -168,6 +172,12 @@ def _begin(
     return Walk(robot, wires, lambda time_s: schedule(since_s + time_s), start, carried, error_m=error_m)
 
 
+def _again(walk: Walk, schedule: Callable[[float], Floats], since_s: float) -> Walk:
+    """The hold that follows one: from its pose, with its creep."""
+    carried = _without_clocks(walk.creep.state(), walk.wires)
+    return _begin(walk.robot, walk.wires, schedule, since_s, _pose(walk), carried, walk.error_m)
+
+
 def _loaded(history: History, row: int) -> bool:
     """Whether what the platform carries changes at a row."""
     now, before = history.payload_kg[row], history.payload_kg[row - 1]
@@ -185,9 +195,8 @@ def _schedule(times_s: Floats, joint_m: Floats) -> Callable[[float], Floats]:
     return joint
 
 
-def _carried(walk: Walk, wires: Wires) -> CreepState:
+def _without_clocks(state: CreepState, wires: Wires) -> CreepState:
     """What goes into the next hold; the clocks of earlier ones only where an effect may remember them."""
-    state = walk.creep.state()
     return state if wires.effects else replace(state, past=())
 
 

@@ -21,7 +21,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, path
-from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.motion.creep import CreepState, HoldCreep
 from wirebayes.typing import Floats
 
 _LONG = 5e-2  # of the platform's size: a longer Newton step is followed with care instead
@@ -127,7 +127,7 @@ class LiveEstimator:
         self._information = Information.none(d, m, n)
         self._moves, self._sane = np.zeros((n, d)), np.ones(n, bool)
         self._refreshed = self._last = -np.inf
-        self._start, self._state = start, fresh(robot.legs, self._columns)
+        self._start, self._state = start, _beside_fresh(known.carried(white), robot.legs)
         self._live = np.ones(self._columns, bool)
         self._joint = np.empty((self._columns, robot.legs))
 
@@ -215,7 +215,7 @@ class LiveEstimator:
     def _settle(self, joint_m: Floats) -> None:
         """The first pose, found from afar."""
         bare, offset = inverse.lengths(self.robot, joint_m)
-        bare = bare + self._error
+        bare = (bare + self._error) * (1.0 + self._state.strain(self._wires).T)
         here = forward.solve(self.robot, self._wires, bare, offset, *self._start)
         self._live = here.found
         x, R = self._start
@@ -315,3 +315,19 @@ def _beside(first: Wires, other: Wires) -> Wires:
         both = [np.broadcast_to(v, (rows, n)) for v, n in zip((value, other.theta[name]), counts, strict=True)]
         theta[name] = np.concatenate(both, 1)
     return replace(first, theta=theta)
+
+
+def _beside_fresh(carried: CreepState, legs: int) -> CreepState:
+    """What columns of wires carry, and beside them that of a column which never crept."""
+
+    def one_more(values: Floats | float, last: Floats | float = 0.0) -> Floats:
+        whole = np.broadcast_to(values, carried.creep_mm.shape)
+        return np.concatenate([whole, np.broadcast_to(last, (legs, 1))], 1)
+
+    return replace(
+        carried,
+        creep_mm=one_more(carried.creep_mm),
+        beside_mm={key: one_more(value) for key, value in carried.beside_mm.items()},
+        past=tuple((start, one_more(amount), one_more(k2, k2[:, :1])) for start, amount, k2 in carried.past),
+        elongation_mm=one_more(carried.elongation_mm),
+    )

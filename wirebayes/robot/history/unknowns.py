@@ -9,6 +9,8 @@ from wirebayes.robot.history.follow import uncreeping
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion.creep import CreepState, fresh
+from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.session import Prior
 from wirebayes.typing import Floats
 
@@ -29,12 +31,16 @@ class Uncertain:
     tension_N, tilt_rad : float
         Standard error of a reading. Half its variance is an offset that the sensor keeps, so that no number of
         readings says more than that.
+    calibrated : Calibrated, optional
+        What a calibration left known of lengths and wires, in the place of reference error and spread. The history
+        then goes on where its session ended.
     """
 
     reference_m: float = 0.0
     spread: float = 0.05
     tension_N: float = 0.02
     tilt_rad: float = 1e-3
+    calibrated: Calibrated | None = None
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,7 @@ class Unknowns:
         Cholesky factor of the prior covariance.
     draws : (n, d) array
         White draws of the prior, the line's as the posterior of its fit has them.
+    calibrated : Calibrated or None
     """
 
     robot: Robot
@@ -57,6 +64,7 @@ class Unknowns:
     mean: Floats
     root: Floats
     draws: Floats
+    calibrated: Calibrated | None = None
 
     @property
     def count(self) -> int:
@@ -66,6 +74,12 @@ class Unknowns:
     def columns(self, white: Floats) -> tuple[Wires, Floats]:
         """Wires of white unknowns ``(n, d)``, and reference errors ``(n, w)``, m."""
         return self.prior.wires(self.robot, self.mean + white @ self.root.T)
+
+    def carried(self, white: Floats) -> CreepState:
+        """What wires of white unknowns ``(n, d)`` carry into the history."""
+        if self.calibrated is None:
+            return fresh(self.robot.legs, len(white))
+        return self.calibrated.carried(self.mean + white @ self.root.T)
 
     @property
     def plain(self) -> Wires:
@@ -93,6 +107,10 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     rng : numpy Generator
         For reference lengths and specimens of the draws.
     """
+    known = errors.calibrated
+    if known is not None:
+        draws = rng.standard_normal((line.count, len(known.mean)))
+        return Unknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
     prior = Prior(line, max(errors.reference_m, _EXACT_M), errors.spread)
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
@@ -101,3 +119,9 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     values = np.concatenate([rng.standard_normal((n, legs)) * prior.reference_sd_m, prior.fitted.T, own], 1)
     white = solve_triangular(root, (values - mean).T, lower=True).T
     return Unknowns(robot, prior, mean, root, np.asarray(white))
+
+
+def _root(covariance: Floats) -> Floats:
+    """Cholesky factor of a covariance whose unknowns have very different units."""
+    sd = np.sqrt(np.diag(covariance))
+    return np.asarray(sd[:, None] * np.linalg.cholesky(covariance / (sd[:, None] * sd)), np.float64)

@@ -10,6 +10,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
 from wirebayes.robot.self_calibration.session import Prior, Session
 from wirebayes.typing import Floats
@@ -17,7 +18,9 @@ from wirebayes.typing import Floats
 CANDIDATES, NEXT = 200, 5
 
 
-def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0) -> CalibrateJson:
+def answer(
+    robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0
+) -> tuple[CalibrateJson, Calibrated]:
     """Calibrate one robot and say how far the answer can be trusted.
 
     Parameters
@@ -31,8 +34,10 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
 
     Returns
     -------
-    dict
-        The content of ``calibrate.json``; without a pose and joint values where the search did not converge.
+    content : dict
+        Of ``calibrate.json``; without a pose and joint values where the search did not converge.
+    known : Calibrated
+        What a history can start from.
     """
     known = calibrate(robot, prior, session, readings[None])
     plain = calibrate(robot, replace(prior, creeps=False), session, readings[None])
@@ -40,7 +45,7 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
     if prior.bias_sd_N > 0:
         given["tension_bias_sd_N"] = prior.bias_sd_N
         given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
-    return {
+    content: CalibrateJson = {
         "version": 1,
         "robot": robot.name,
         "holds": len(session.duration_s),
@@ -51,6 +56,7 @@ def answer(robot: Robot, prior: Prior, session: Session, readings: Floats, seed:
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed)),
     }
+    return content, calibrated(robot, prior, session, known)
 
 
 def _poses(robot: Robot, prior: Prior, known: Calibration) -> CalibratedPoses:

@@ -4,6 +4,7 @@ Unknown are the error of every wire's reference length, the line's parameters, e
 a prior allows it, the bias of each tension sensor: its zero, or friction of guides and winch between it and the wire.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,10 +22,11 @@ from wirebayes.robot.mechanics.draws import (
 )
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
 from wirebayes.typing import Floats
 
+_LONGEST = 2.5  # in the logarithm of time: a third of a hold's thousandfold, between two updates of the tensions
 _LEAST = 1e-6  # relative: wires that are said to be alike still get a spread, far below anything that matters
 
 
@@ -195,7 +197,7 @@ def predict(
     prior: Prior,
     session: Session,
     unknowns: Floats,
-    longest_step: float = 2.5,
+    longest_step: float = _LONGEST,
     near: tuple[Floats, Floats] | None = None,
 ) -> Prediction:
     """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
@@ -214,37 +216,84 @@ def predict(
     wires, error = prior.wires(robot, unknowns)
     n, legs = len(unknowns), robot.legs
     bias, sign = prior.bias_N(legs, unknowns), iter(session.bias_sign)
-    state = fresh(legs, n)
     solved = np.ones(n, bool)
     tensions, poses, turns, lengths, begun = [], [], [], [], []
+    for k, hold in enumerate(_holds(robot, wires, error, session, longest_step, near)):
+        here, length = hold.here, hold.bare_m * (1 + hold.state.strain(wires).T)
+        begun.append(hold.begun)
+        solved &= here.found
+        if session.read[k]:
+            tensions.append(here.tension_N + bias * next(sign))
+            poses.append(here.position_m)
+            turns.append(here.rotation)
+            lengths.append(length)
+    normals = np.stack(turns, 1)[:, :, :2, 2].reshape(n, -1)
+    readings = np.concatenate(tensions, 1) / session.tension_sd_N
+    if session.tilt_sd_rad is not None:
+        readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
+    strain = np.broadcast_to(hold.state.strain(wires).T, length.shape)
+    return Prediction(
+        readings, length, strain, np.stack(poses, 1), np.stack(turns, 1),
+        np.stack([b.position_m for b in begun], 1), np.stack([b.rotation for b in begun], 1),
+        np.stack(lengths, 1), solved,
+    )  # fmt: skip
+
+
+def carried(robot: Robot, prior: Prior, session: Session, unknowns: Floats) -> CreepState:
+    """What the wires of every row of unknowns ``(n, d)`` carry out of the session.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : Prior
+    session : Session
+    unknowns : (n, d) array
+
+    Returns
+    -------
+    CreepState
+        NaN where a row does not hold the platform.
+    """
+    wires, error = prior.wires(robot, unknowns)
+    lost = np.zeros(len(unknowns), bool)
+    for hold in _holds(robot, wires, error, session, _LONGEST):
+        lost |= ~hold.here.found
+    return replace(hold.state, elongation_mm=np.where(lost, np.nan, hold.state.elongation_mm))
+
+
+@dataclass(frozen=True)
+class _Hold:
+    """A hold of the session: the poses at its beginning and end, lengths before creep, and what is carried out."""
+
+    begun: forward.Equilibria
+    here: forward.Equilibria
+    bare_m: Floats
+    state: CreepState
+
+
+def _holds(
+    robot: Robot,
+    wires: Wires,
+    error_m: Floats,
+    session: Session,
+    longest_step: float,
+    near: tuple[Floats, Floats] | None = None,
+) -> Iterator[_Hold]:
+    """Every creep step of a session under the tensions it meets; arguments as in `predict`."""
+    n, legs = error_m.shape
+    state = fresh(legs, n)
     for k, (joint, duration) in enumerate(zip(session.joint_m, session.duration_s, strict=True)):
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
-        bare = bare + error
+        bare = bare + error_m
         begin = (session.position_m[k], session.rotation[k]) if near is None else (near[0][:, k], near[1][:, k])
-        here = forward.solve(robot, wires, bare * (1 + state.strain(wires).T), offset, *begin)
-        begun.append(here)
+        begun = here = forward.solve(robot, wires, bare * (1 + state.strain(wires).T), offset, *begin)
         creep = HoldCreep(wires, state, here.tension_N.T)
         for time in _steps(float(duration), longest_step):
             state = creep.advance(time, here.tension_N.T)
             here = forward.solve(
                 robot, wires, bare * (1 + state.strain(wires).T), offset, here.position_m, here.rotation
             )
-        solved &= here.found
-        if session.read[k]:
-            tensions.append(here.tension_N + bias * next(sign))
-            poses.append(here.position_m)
-            turns.append(here.rotation)
-            lengths.append(bare * (1 + state.strain(wires).T))
-    normals = np.stack(turns, 1)[:, :, :2, 2].reshape(n, -1)
-    readings = np.concatenate(tensions, 1) / session.tension_sd_N
-    if session.tilt_sd_rad is not None:
-        readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
-    strain = np.broadcast_to(state.strain(wires).T, bare.shape)
-    return Prediction(
-        readings, bare * (1 + strain), strain, np.stack(poses, 1), np.stack(turns, 1),
-        np.stack([b.position_m for b in begun], 1), np.stack([b.rotation for b in begun], 1),
-        np.stack(lengths, 1), solved,
-    )  # fmt: skip
+        yield _Hold(begun, here, bare, state)
 
 
 def _steps(duration_s: float, longest: float) -> Floats:

@@ -1,0 +1,111 @@
+"""What a calibration leaves known: the start of a history that goes on where the session ended."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wirebayes.json_files.calibrate import CalibratedUnknowns
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix, vector
+from wirebayes.robot.motion.creep import CreepState
+from wirebayes.robot.self_calibration import session as sessions
+from wirebayes.robot.self_calibration.estimate import Calibration
+from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.typing import Floats
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """The posterior of a calibrated robot's unknowns, and what its wires went through.
+
+    Attributes
+    ----------
+    robot : Robot
+    prior : Prior
+        Says what the unknowns are.
+    session : Session
+    mean : (d,) array
+        Reference errors, parameters and specimens' deviations in the order of `Prior.moments`, without biases.
+    covariance : (d, d) array
+    """
+
+    robot: Robot
+    prior: Prior
+    session: Session
+    mean: Floats
+    covariance: Floats
+
+    @property
+    def reference_sd_m(self) -> Floats:
+        """(w,) what is still not known of the reference lengths."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)[: self.robot.legs]))
+
+    def carried(self, unknowns: Floats) -> CreepState:
+        """Creep that wires of unknowns ``(n, d)`` carry out of the session; it depends on them as the readings do."""
+        return sessions.carried(self.robot, self.prior, self.session, unknowns)
+
+
+def calibrated(robot: Robot, prior: Prior, session: Session, known: Calibration) -> Calibrated:
+    """What the calibration of one robot leaves known.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : Prior
+    session : Session
+    known : Calibration
+        Of one robot. Biases of its sensors are averaged over.
+    """
+    own = replace(prior, bias_sd_N=0.0)
+    d = len(own.moments(robot.legs)[0])
+    return Calibrated(robot, own, session, known.unknowns[0, :d], known.covariance[0, :d, :d])
+
+
+def to_dict(found: Calibrated) -> CalibratedUnknowns:
+    """Everything but the robot and the line, which a command is given anyway."""
+    session = found.session
+    return {
+        "version": 1,
+        "reference_sd_mm": 1e3 * found.prior.reference_sd_m,
+        "specimen_spread": found.prior.spread,
+        "line": found.prior.names,
+        "mean": found.mean,
+        "covariance": found.covariance,
+        "session": {
+            "position_m": session.position_m,
+            "rotation_vector_rad": vector(session.rotation),
+            "joint_m": session.joint_m,
+            "duration_s": session.duration_s,
+        },
+    }
+
+
+def from_dict(values: Any, robot: Robot, line: WireDraws) -> Calibrated:
+    """The inverse of `to_dict`.
+
+    Parameters
+    ----------
+    values : mapping
+    robot : Robot
+    line : WireDraws
+        Of the posterior that was calibrated with.
+
+    Raises
+    ------
+    ValueError
+        The values are not those of such a robot and line.
+    """
+    prior = Prior(line, 1e-3 * float(values["reference_sd_mm"]), float(values["specimen_spread"]))
+    mean, covariance = np.array(values["mean"], float), np.array(values["covariance"], float)
+    d = len(prior.moments(robot.legs)[0])
+    if list(values["line"]) != prior.names or mean.shape != (d,) or covariance.shape != (d, d):
+        raise ValueError("other unknowns")
+    gone = values["session"]
+    joint, duration = np.array(gone["joint_m"], float), np.array(gone["duration_s"], float)
+    place, turn = np.array(gone["position_m"], float), np.array(gone["rotation_vector_rad"], float)
+    if joint.shape != (len(duration), robot.legs) or place.shape != (len(duration), 3):
+        raise ValueError("another robot's session")
+    unread = np.zeros(len(duration), bool)  # the readings are in the posterior
+    return Calibrated(robot, prior, Session(place, matrix(turn), joint, duration, unread, np.nan), mean, covariance)
