@@ -1,6 +1,7 @@
 """What the documentation shows is true: mistakes and their answers, the effect of one's own, the example."""
 
 import ast
+import importlib
 import importlib.util
 import json
 import re
@@ -15,6 +16,7 @@ import pytest
 
 from wirebayes.cli import COMMANDS, main
 from wirebayes.io.experiment import read_experiments
+from wirebayes.robot.mechanics import schema
 from wirebayes.wire.staircase import Model, simulate
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -143,3 +145,39 @@ def test_the_readmes_mistake_is_answered_as_shown(tmp_path):
 
 
 THETA = {"k1": 1545.0, "B": 2.0, "U": 0.14, "k2": 0.015, "N": 0.5, "preload": 1.0}
+
+
+ROBOTS = (DOCS / "robot.rst").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", ["pose", "calibrate", "export"])
+def test_the_page_on_robots_has_every_option(command):
+    import typer
+
+    app = typer.Typer(add_completion=False)
+    app.command()(getattr(importlib.import_module("wirebayes.cli.robot"), command))
+    after = ROBOTS.split(f"\n``{command}``\n{'^' * (len(command) + 4)}\n")[1]
+    listed = re.findall(r"\* - ``(--[a-z-]+)", after.split("^^^^")[0])
+    options = [name for one in typer.main.get_command(app).params for name in one.opts if name.startswith("--")]
+    assert sorted({*listed, "--json", "--quiet"}) == sorted({*options, "--json", "--quiet"})
+
+
+def test_the_page_on_robots_has_every_key_of_a_robots_file(monkeypatch):
+    """The keys that the reader asks for, of robots with everything that a robot can have."""
+    asked, take = set(), schema._Table.take
+
+    def noted(self, key, *rest):
+        asked.add(re.sub(r"\[\d+\]", "", f"{self.path}.{key}"))
+        return take(self, key, *rest)
+
+    monkeypatch.setattr(schema._Table, "take", noted)
+    text = (Path(schema.__file__).parents[2] / "data" / "robots" / "hangprinter-4.toml").read_text()
+    drum = "drum_radius_m = 0.03\ndrum_layer_turns = 20\ndrum_layer_height_m = 1e-3\nwire_length_m = 9.0\n"
+    leg = "[[leg]]\nwire = 'own'\npulley_radius_m = 0.01\nswivel_axis = [0, 0, 1]\n" + drum
+    wire = "[wires.own]\nk1_N = 800\nB_mm = 0.3\nU = 0.8\nk2 = 0.03\nN = 0.64\nlength_mm = 1000\n"
+    schema.parse(text.replace("[[leg]]\n", leg) + wire, "whole")
+    schema.read("linear-7")
+    known = set(re.findall(r"[A-Za-z]\w+|[UN]\b", " ".join(re.findall(r"\* - (.+)", ROBOTS))))
+    missing = {key for key in asked if key.rpartition(".")[2] not in known and key != "wires.own"}
+    assert len(asked) > 40
+    assert not missing
