@@ -55,7 +55,7 @@ def calibrated(robot: Robot, prior: Prior, session: Session, known: Calibration)
     robot : Robot
     prior : Prior
     session : Session
-    known : Calibration
+    known : estimate.Calibration
         Of one robot. Biases of its sensors are averaged over.
     """
     own = replace(prior, bias_sd_N=0.0)
