@@ -22,15 +22,15 @@ def cell(model: dict[str, Any] | None) -> str:
     free = (model["held_out"] or {}).get("free")
     parts = []
     if difference:
-        parts.append(_told(difference) + ("" if model["converged"] else " !"))
+        parts.append(_cell(difference) + ("" if model["converged"] else " !"))
     elif given:
-        parts.append(f"({_told(given)})")
+        parts.append(f"({_cell(given)})")
     if free:
         parts.append(f"{free['rmse_N']:.3f} N")
     return "; ".join(parts) or "–"
 
 
-def _told(difference: dict[str, float]) -> str:
+def _cell(difference: dict[str, float]) -> str:
     return f"{difference['elpd']:+.1f} ± {difference['se']:.1f}".replace("-", "−")
 
 

@@ -98,10 +98,10 @@ def main() -> int:
                                   "ratio": float(ratio), "se": float(error),
                                   "ratio_of_median_sds": float(middle)}  # fmt: skip
             result[name] = {"fits": len(kept), "not_converged": len(rows) - len(kept), "ratios": ratios}
-            said = ", ".join(
+            line = ", ".join(
                 f"{c} {r['ratio']:.2f} ({r['se']:.2f}), {r['ratio_of_median_sds']:.2f}" for c, r in ratios.items()
             )
-            print(f"{name}: {len(kept)} fits, {len(rows) - len(kept)} not converged: {said}", flush=True)
+            print(f"{name}: {len(kept)} fits, {len(rows) - len(kept)} not converged: {line}", flush=True)
     write_json(options.output / "plan-widths.json", result)
     far = [r for p in result.values() for r in p["ratios"].values() if abs(r["ratio"] - 1.0) > 0.15]
     print(f"{len(far)} of {sum(len(p['ratios']) for p in result.values())} widths farther than 15 % from the fits'")

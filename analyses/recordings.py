@@ -124,11 +124,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tests", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with workers() as parallel_map:
-        results = list(parallel_map(one, [(asked.seed, number) for number in range(asked.tests)]))
+        results = list(parallel_map(one, [(options.seed, number) for number in range(options.tests)]))
     whole = [result for result in results if result is not None]
-    print(f"{asked.tests} recordings, all holds found in {len(whole)}")
+    print(f"{options.tests} recordings, all holds found in {len(whole)}")
     for name in WIRES:
         error, rank = np.array([result[name] for result in whole]).T
         inside = int(((rank > 0.05) & (rank < 0.95)).sum())

@@ -81,9 +81,9 @@ def main() -> None:
         gained = left.elpd - base
         print(f"{name:45s} {left.total:8.1f}  {gained.sum():+7.1f} ± {np.sqrt(len(gained) * gained.var(ddof=1)):.1f}"
               + ("" if left.converged else "  a refit did not converge"))  # fmt: skip
-    print("\nwhat the data taught, both samples together")
-    for taught in identifiability(together):
-        print(f"  {taught.sentence}")
+    print("\nwhat the data determine, both samples together")
+    for found in identifiability(together).values():
+        print(f"  {found['sentence']}")
 
 
 if __name__ == "__main__":

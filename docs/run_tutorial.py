@@ -52,15 +52,15 @@ def follow(folder: Path) -> dict[str, str]:
     """
     for name in ("bench.csv", "next.csv"):
         shutil.copy(DOCS / "example" / name, folder)
-    said = {}
+    outputs = {}
     for command in commands():
         done = subprocess.run(
             [sys.executable, "-m", "wirebayes", *command], cwd=folder, capture_output=True, text=True, check=True
         )
-        said[f"{command[0]}.txt"] = "\n".join(filter(None, (done.stdout.rstrip(), done.stderr.rstrip()))) + "\n"
-    said["predicted.csv"] = _rounded((folder / "predicted.csv").read_text())
-    said["pose-error.inc"] = _errors(json.loads((folder / "out/pose/pose.json").read_text()))
-    return said
+        outputs[f"{command[0]}.txt"] = "\n".join(filter(None, (done.stdout.rstrip(), done.stderr.rstrip()))) + "\n"
+    outputs["predicted.csv"] = _rounded((folder / "predicted.csv").read_text())
+    outputs["pose-error.inc"] = _errors(json.loads((folder / "out/pose/pose.json").read_text()))
+    return outputs
 
 
 def _rounded(text: str) -> str:

@@ -41,7 +41,7 @@ def test_the_version_is_printed(capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["fti"], "No such command 'fti'."),
         (["--colour"], "No such option"),
@@ -57,17 +57,17 @@ def test_the_version_is_printed(capsys):
         ),
     ],
 )
-def test_wrong_usage_is_exit_code_2_and_plain_lines(arguments, said, tmp_path):
+def test_wrong_usage_is_exit_code_2_and_plain_lines(arguments, message, tmp_path):
     result = run(*arguments, cwd=tmp_path)
     assert result.returncode == 2
-    assert said in result.stderr
+    assert message in result.stderr
     assert "Traceback" not in result.stderr
     assert len(result.stderr.splitlines()) <= 5
     assert result.stdout == ""
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_asked_shows_the_help(capsys):
+def test_no_arguments_show_the_help(capsys):
     assert main([]) == 2
     assert "Usage: wirebayes" in "".join(capsys.readouterr())
 

@@ -60,7 +60,7 @@ READERS = {
 }
 
 
-def said(arguments: list[str], out: Path, capsys: pytest.CaptureFixture[str]) -> str:
+def output_of(arguments: list[str], out: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """The plain line of a command that refused, or nothing; anything else fails."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -93,7 +93,7 @@ def damage_stored(seed: int, results: Path, folder: Path, capsys: pytest.Capture
     (results / name).write_bytes(content)
     try:
         command = rng.choice(READERS[name])
-        return said([word.format(r=results, o=out) for word in command], out, capsys)
+        return output_of([word.format(r=results, o=out) for word in command], out, capsys)
     finally:
         (results / name).write_bytes(original)
         (results / name.split("/")[0] / "report.html").unlink(missing_ok=True)
@@ -112,7 +112,7 @@ def damage_robot(seed: int, results: Path, folder: Path, capsys: pytest.CaptureF
         Path(robot).write_bytes(text_changed(rng, text))
     wires = ["--wires", str(results / "fit" / "simulated"), "--draws", "5", "--output", str(out)]
     command = ["calibrate", robot, str(session)] if session != SESSION or rng.random() < 0.3 else ["export", robot]
-    return said([*command, *wires], out, capsys)
+    return output_of([*command, *wires], out, capsys)
 
 
 def count(lines: list[str]) -> str:

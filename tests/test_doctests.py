@@ -35,9 +35,9 @@ def shared(tmp_path_factory):
 
 def ran(examples: doctest.DocTest) -> list[str]:
     """What went otherwise than shown."""
-    said: list[str] = []
-    doctest.DocTestRunner(optionflags=FLAGS).run(examples, out=said.append, clear_globs=False)
-    return said
+    output: list[str] = []
+    doctest.DocTestRunner(optionflags=FLAGS).run(examples, out=output.append, clear_globs=False)
+    return output
 
 
 def test_the_page_from_python_runs_as_shown(shared):
@@ -68,8 +68,8 @@ def test_the_examples_of_a_docstring_run_as_shown(name, shared):
     value = getattr(wb, name)
     (examples,) = doctest.DocTestFinder(recurse=False, exclude_empty=False).find(value, name, globs=names)
     assert examples.examples
-    said = ran(examples)
-    assert not said, "".join(said)
+    output = ran(examples)
+    assert not output, "".join(output)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

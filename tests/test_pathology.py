@@ -60,9 +60,9 @@ def test_what_no_model_deserves_is_said(what: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         summary = wb.fit(experiment, policy=POLICY, check=False).summary()
-    said = [*cautions(summary), *(known["sentence"] for known in summary["identifiability"].values())]
-    assert any(words in sentence for sentence in said), said
-    assert summary["converged"] or any(sentence.startswith("not converged") for sentence in said)
+    sentences = [*cautions(summary), *(known["sentence"] for known in summary["identifiability"].values())]
+    assert any(words in sentence for sentence in sentences), sentences
+    assert summary["converged"] or any(sentence.startswith("not converged") for sentence in sentences)
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ ABOUT = {"length_mm": 1200.0, "name": "wire", "material": "line"}
 
 
 @pytest.mark.parametrize(
-    ("column", "values", "said"),
+    ("column", "values", "message"),
     [
         ("time_s", [0, 30, 30, 0, 30], r"row 2 .from 0., column time_s: found 30, expected a time after 30 s"),
         ("tension_N", [2, 1.9, np.nan, 2, 2], r"row 2 \(from 0\), column tension_N: found 'nan', expected a finite"),
@@ -88,13 +88,13 @@ ABOUT = {"length_mm": 1200.0, "name": "wire", "material": "line"}
         ("temperature_C", [20, 20, -300, 20, 20], r"row 2 .from 0., column temperature_C: found -300, expected"),
     ],
 )
-def test_a_mistake_in_arrays_is_named_by_row_and_column(column, values, said):
-    with pytest.raises(wb.InputError, match=f"^from_arrays, {said}"):
+def test_a_mistake_in_arrays_is_named_by_row_and_column(column, values, message):
+    with pytest.raises(wb.InputError, match=f"^from_arrays, {message}"):
         wb.from_arrays(**GOOD | {column: values}, **ABOUT)
 
 
 @pytest.mark.parametrize(
-    ("about", "said"),
+    ("about", "message"),
     [
         ({"length_mm": -1}, "argument length_mm: found -1, expected a length above 0 mm"),
         ({"name": "a b"}, "argument name: found 'a b', expected a name of letters"),
@@ -105,8 +105,8 @@ def test_a_mistake_in_arrays_is_named_by_row_and_column(column, values, said):
         ),
     ],
 )
-def test_a_wrong_argument_is_named(about, said):
-    with pytest.raises(wb.InputError, match=f"^from_arrays, {said}"):
+def test_a_wrong_argument_is_named(about, message):
+    with pytest.raises(wb.InputError, match=f"^from_arrays, {message}"):
         wb.from_arrays(**GOOD, **ABOUT | about)
 
 
@@ -118,7 +118,7 @@ def test_a_table_without_a_column_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         ({"elastic_law": "hook"}, "elastic_law: found 'hook'.* expected hooke or modified"),
         ({"seed": -1}, "seed: found -1, expected a whole number, 0 or more"),
@@ -127,8 +127,8 @@ def test_a_table_without_a_column_is_refused():
         ({"experiment": "x"}, "found no experiment 'x'"),
     ],
 )
-def test_a_wrong_option_of_fit_is_named(options, said):
-    with pytest.raises(wb.InputError, match=said):
+def test_a_wrong_option_of_fit_is_named(options, message):
+    with pytest.raises(wb.InputError, match=message):
         wb.fit(wb.from_arrays(**GOOD, **ABOUT), **options)
 
 
@@ -249,8 +249,8 @@ def test_a_data_frame_is_taken_as_it_is(folders):
 def test_a_session_in_memory_is_checked_by_row_and_column(folders):
     frame = pandas.read_csv(DOCS / "example" / "linear-7-session.csv")
     frame.loc[2, "duration_s"] = 0.0
-    said = r"^readings: row 2 \(from 0\), column duration_s: found '0'; expected a number above 0"
-    with pytest.raises(wb.InputError, match=said):
+    message = r"^readings: row 2 \(from 0\), column duration_s: found '0'; expected a number above 0"
+    with pytest.raises(wb.InputError, match=message):
         wb.calibrate("linear-7", frame, folders / "fit" / "wire")
     with pytest.raises(wb.InputError, match="^readings: columns: found hold; expected the header hold,x_m"):
         wb.calibrate("linear-7", {"hold": [1]}, folders / "fit" / "wire")

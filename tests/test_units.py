@@ -9,7 +9,7 @@ COLUMNS = (*REQUIRED, *OPTIONAL)
 
 
 @pytest.mark.parametrize(
-    ("word", "said"),
+    ("word", "message"),
     [
         ("tension_kgf", "1 kgf = 9.80665 N; convert it to tension_N"),
         ("tension_kN", "1 kN = 1000 N"),
@@ -27,9 +27,9 @@ COLUMNS = (*REQUIRED, *OPTIONAL)
         ("temperature_F", "°C = (°F - 32) / 1.8"),
     ],
 )
-def test_another_unit_is_named_with_its_factor(word, said):
+def test_another_unit_is_named_with_its_factor(word, message):
     hint = nearest(word, COLUMNS)
-    assert said in hint
+    assert message in hint
     assert "did you mean" not in hint
 
 

@@ -121,13 +121,13 @@ def executor(
     try:
         from distributed import Client
     except ImportError:
-        said = "found no dask.distributed, expected it installed: pip install 'wirebayes[cluster]'"
-        raise InputError(f"--scheduler: {said}") from None
+        message = "found no dask.distributed, expected it installed: pip install 'wirebayes[cluster]'"
+        raise InputError(f"--scheduler: {message}") from None
     try:
         client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        said = f"found no Dask scheduler there ({type(error).__name__}), expected an address such as tcp://HOST:8786"
-        raise InputError(f"--scheduler {scheduler}: {said}") from None
+        message = f"found no Dask scheduler there ({type(error).__name__}), expected an address such as tcp://HOST:8786"
+        raise InputError(f"--scheduler {scheduler}: {message}") from None
     with client:
         try:
             client.wait_for_workers(1, timeout=_PATIENCE_S)
@@ -138,11 +138,11 @@ def executor(
         there = {worker: found for worker, found in versions.items() if not isinstance(found, OSError)}
         for worker, found in there.items():
             if isinstance(found, BaseException):
-                said = f"found no wirebayes on {worker} ({found}), expected version {__version__} on each"
-                raise InputError(f"--scheduler {scheduler}: {said}")
+                message = f"found no wirebayes on {worker} ({found}), expected version {__version__} on each"
+                raise InputError(f"--scheduler {scheduler}: {message}")
             if found != __version__:
-                said = f"found wirebayes {found} on {worker}, expected {__version__}, as here"
-                raise InputError(f"--scheduler {scheduler}: {said}")
+                message = f"found wirebayes {found} on {worker}, expected {__version__}, as here"
+                raise InputError(f"--scheduler {scheduler}: {message}")
         if not there:
             raise InputError(f"--scheduler {scheduler}: found no workers there, expected one or more")
         yield client.get_executor(pure=False)

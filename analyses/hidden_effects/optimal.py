@@ -187,8 +187,8 @@ def optimal_two(
         np.maximum.at(top, where, height)
         total = np.bincount(where, np.exp(height - top[where]), len(each))
         best = int(each[np.argmax(top + np.log(total))])
-        said = [names[best // len(names)], names[best % len(names)]]
-        right += set(said) == hidden
-        orders = (said, said[::-1])
+        pair = [names[best // len(names)], names[best % len(names)]]
+        right += set(pair) == hidden
+        orders = (pair, pair[::-1])
         together += any(one in groups[0] and other in groups[1] for one, other in orders)
     return {"right": right / draws, "group": together / draws}

@@ -208,8 +208,8 @@ def calibration(rows: list[Row]) -> list[dict[str, Any]]:
         part = [r for r in rows if r["detected"] and r["remainder"] is not None and r["names"]]
         part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] == 1.0)]
         left = [not all(any(a in g for a in r["accepted"]) for g in r["groups"]) for r in part]
-        said = float(np.mean([r["remainder"] for r in part])) if part else None
-        out.append({"from": low, "said": said, "found": rate(left)})
+        stated = float(np.mean([r["remainder"] for r in part])) if part else None
+        out.append({"from": low, "said": stated, "found": rate(left)})
     return out
 
 

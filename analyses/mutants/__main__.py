@@ -96,21 +96,21 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="modules whose path holds this, or 'named'")
     parser.add_argument("--budget", type=float, default=30.0, help="seconds of tests for a mutant")
-    asked = parser.parse_args()
-    asked.output.mkdir(parents=True, exist_ok=True)
-    record = asked.output / "mutants.jsonl"
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    record = options.output / "mutants.jsonl"
     known, rows = rows_of(record), []
-    todo = [] if asked.only and asked.only != "named" else named()
-    for file in files(asked.only):
-        todo += mutants(file, asked.each, asked.seed)
+    todo = [] if options.only and options.only != "named" else named()
+    for file in files(options.only):
+        todo += mutants(file, options.each, options.seed)
     preload()
     with tempfile.TemporaryDirectory(prefix="mutants-") as scratch:
         tree = copy_of_the_checkout(Path(scratch))
         packages = sorted({package_of(mutant.file) for mutant in todo})
-        reach = measure(tree, asked.output / "reach.jsonl", packages)
+        reach = measure(tree, options.output / "reach.jsonl", packages)
         sound = set[str]()
         for mutant in todo:
-            tests = reach.tests(mutant, asked.budget)
+            tests = reach.tests(mutant, options.budget)
             of_files = _hash(tree, tests)
             row = known.get(mutant.key)
             if row is None or (row["outcome"] == "survived" and row["of_files"] != of_files):

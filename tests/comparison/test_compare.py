@@ -64,21 +64,21 @@ def test_differences_are_said_only_where_they_mean_something() -> None:
         ],
         BASE,
     )
-    said = {r["name"]: r["meaning"] for r in table["models"]}
-    assert "predicts better" in said["better"] and "+8.0 ± 0.8" in said["better"]
-    assert all("no meaningful difference" in said[name] for name in ("noisy", "hardly"))
-    assert "predicts worse" in said["worse"]
-    assert "did not converge" in said["doubtful"]
-    assert "not comparable" in said["other"]
-    assert "LinAlgError: no" in said["broken"]
+    meanings = {r["name"]: r["meaning"] for r in table["models"]}
+    assert "predicts better" in meanings["better"] and "+8.0 ± 0.8" in meanings["better"]
+    assert all("no meaningful difference" in meanings[name] for name in ("noisy", "hardly"))
+    assert "predicts worse" in meanings["worse"]
+    assert "did not converge" in meanings["doubtful"]
+    assert "not comparable" in meanings["other"]
+    assert "LinAlgError: no" in meanings["broken"]
     assert [r["name"] for r in table["models"]][-1] == "broken"
     assert sum(r["weight"] or 0.0 for r in table["models"]) == pytest.approx(1.0)
 
 
 def test_one_hold_alone_says_nothing_of_its_error() -> None:
     table = side_by_side([row(BASE, [10.0]), row("better", [30.0])], BASE)
-    (said,) = (r["meaning"] for r in table["models"] if r["name"] == "better")
-    assert said.startswith("elpd +20.0 against") and "one hold alone" in said
+    (meaning,) = (r["meaning"] for r in table["models"] if r["name"] == "better")
+    assert meaning.startswith("elpd +20.0 against") and "one hold alone" in meaning
 
 
 def test_rival_laws_are_what_they_say() -> None:
@@ -194,11 +194,11 @@ def test_command_finds_that_a_creeping_wire_is_no_spring(tmp_path: Path, monkeyp
 
 def test_command_refuses_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = str(FOLDER / "experiments.toml")
-    for words, said in (
+    for words, message in (
         (["--only", "springy", "--experiment", "kite-1.5m"], "--only springy"),
         (["--train-holds", "40"], "found 40 training holds"),
         (["--experiment", "kite"], "did you mean kite-1.5m"),
     ):
         assert cli.main(["compare", file, "--output", str(tmp_path / "no"), *words]) == 2
-        assert said in capsys.readouterr().err
+        assert message in capsys.readouterr().err
     assert not (tmp_path / "no").exists()

@@ -31,7 +31,7 @@ def twelve(gain: float, spread: float = 0.0) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("gain", "error", "said"),
+    ("gain", "error", "message"),
     [
         (4.1, 1.0, "predicts better"),
         (3.9, 0.5, "no meaningful difference"),  # below four it may be chance
@@ -42,13 +42,13 @@ def twelve(gain: float, spread: float = 0.0) -> list[float]:
     ],
 )
 def test_a_difference_means_something_from_four_and_from_two_standard_errors_on(
-    gain: float, error: float, said: str
+    gain: float, error: float, message: str
 ) -> None:
     table = side_by_side([row(BASE, twelve(0.0)), row("other", twelve(gain, error))], BASE)
     (other,) = (r for r in table["models"] if r["name"] == "other")
     assert other["difference"]["elpd"] == pytest.approx(gain)
     assert other["difference"]["se"] == pytest.approx(error)
-    assert said in other["meaning"] and f"{gain:+.1f} ± {error:.1f}" in other["meaning"]
+    assert message in other["meaning"] and f"{gain:+.1f} ± {error:.1f}" in other["meaning"]
 
 
 def held(free: list[float] | None, given: list[float]) -> dict[str, object]:
@@ -107,7 +107,7 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
     def fit(problem: object, seed: int, policy: object) -> object:
         holds = int(problem.samples[0].protocol.recorded.sum())  # type: ignore[attr-defined]
         made.append(holds)
-        chains = SimpleNamespace(converged=True, why="said")
+        chains = SimpleNamespace(converged=True, why="message")
         return SimpleNamespace(problem=problem, chains=chains, holds=holds)
 
     def leave(full: object, seed: int, policy: Policy) -> object:

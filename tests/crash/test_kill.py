@@ -30,8 +30,8 @@ def finished(command: str, folder: Path) -> float:
     """Run to the end; how long it took."""
     began = time.monotonic()
     process = start(command, folder)
-    said, _ = process.communicate()
-    assert process.returncode == 0, said
+    output, _ = process.communicate()
+    assert process.returncode == 0, output
     return time.monotonic() - began
 
 

@@ -66,7 +66,7 @@ def test_larger_effects_decide_and_a_p_on_the_level_gets_more_simulations(
     assert made == times * SIMULATIONS
 
 
-def test_the_level_asked_for_says_what_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_requested_level_decides_what_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
     assert examined(monkeypatch, linear=0.3, larger=0.2, alpha=0.2)[1] == MOST_TIMES * SIMULATIONS
     assert examined(monkeypatch, linear=0.3, larger=0.04, alpha=0.2)[1] == SIMULATIONS
 

@@ -30,7 +30,7 @@ def simulated(folder: Path, truth: dict[str, float] | None = None, effects: tupl
     return read_experiments(folder / "experiments.toml")[0]
 
 
-def test_a_p_near_the_level_is_told_from_one_that_is_not() -> None:
+def test_a_p_near_the_level_is_distinguished_from_one_that_is_not() -> None:
     """A test that exceeds the level by chance with a risk of more than .00135 is not yet decided."""
     for larger in range(100):
         risk = min(stats.binom.cdf(larger, 999, ALPHA), 1.0 - stats.binom.cdf(larger - 1, 999, ALPHA))
@@ -109,10 +109,11 @@ def test_fit_puts_a_failed_check_first(
     assert cli.main(command) == 0
     summary = json.loads((out / "simulated" / "summary.json").read_text())
     assert next(iter(summary)) == "model_check" and summary["model_check"]["passed"] is False
-    said = capsys.readouterr()
-    captured = said.err.strip()
+    shown = capsys.readouterr()
+    captured = shown.err.strip()
     assert captured == f"simulated: {summary['model_check']['sentence']}"
-    assert said.out.startswith("simulated: converged, MODEL CHECK FAILED\n") and "Next: wirebayes discover" in said.out
+    assert shown.out.startswith("simulated: converged, MODEL CHECK FAILED\n")
+    assert "Next: wirebayes discover" in shown.out
     page = (out / "report.html").read_text()
     assert page.index("does not describe the readings") < page.index("What was measured")
     assert "times the longest hold" in page
@@ -120,8 +121,8 @@ def test_fit_puts_a_failed_check_first(
         assert claim not in page
     # Also when there is nothing to do; as JSON, and not at all.
     assert cli.main([*command, "--json"]) == 0
-    said = capsys.readouterr()
-    assert said.err.strip() == captured and json.loads(said.out) == summary
+    shown = capsys.readouterr()
+    assert shown.err.strip() == captured and json.loads(shown.out) == summary
     assert cli.main([*command, "--quiet"]) == 0 and capsys.readouterr().out == ""
 
 

@@ -101,8 +101,8 @@ def decision(shares: dict[str, float], inclusion: float, remainder: float, gain:
 def test_verdicts_turn_at_their_thresholds(
     inclusion: float, remainder: float, gain: float, verdict: str, accepted: int
 ) -> None:
-    said, effects = verdict_of(decision({"a": 1.0}, inclusion, remainder, gain), 0)
-    assert said == verdict and len(effects) == accepted
+    decided, effects = verdict_of(decision({"a": 1.0}, inclusion, remainder, gain), 0)
+    assert decided == verdict and len(effects) == accepted
 
 
 def test_two_names_in_the_set_are_ambiguous_and_a_material_may_lack_nothing() -> None:

@@ -153,7 +153,7 @@ def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ratio", "pair", "said"),
+    ("ratio", "pair", "message"),
     [
         (1.05, True, "None of the tests considered"),
         (1.15, True, "would then differ 1.1 times as much as now"),
@@ -165,12 +165,12 @@ def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
     ],
 )
 def test_a_measurement_is_proposed_where_it_tells_more(
-    ratio: float, pair: bool, said: str, monkeypatch: pytest.MonkeyPatch
+    ratio: float, pair: bool, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(power, "_best_plan", lambda block, value: ("load it twice", ratio))
     one, other = probe("toe"), probe("memory")
     found = power.next_measurement(None, (one, other) if pair else None, None if pair else one)  # type: ignore[arg-type]
-    assert said in found
+    assert message in found
     assert ("load it twice" in found) == (ratio >= 1.1)
     assert ("toe from memory" in found) == pair
     remainder = power.next_for_remainder(None)  # type: ignore[arg-type]

@@ -37,7 +37,7 @@ def test_each_material_knows_what_a_fit_of_all_at_once_knows(tmp_path: Path, nam
         assert own_sd == pytest.approx(sd, rel=0.1)
 
 
-def test_what_is_hardly_known_of_a_one_sided_amplitude_is_not_told() -> None:
+def test_what_is_hardly_known_of_a_one_sided_amplitude_is_not_handed_on() -> None:
     assert _table(named("lost_motion"), 0.01, 0.01) is None
     known = _table(named("lost_motion"), 0.5, 0.125)
     assert known == {"distribution": "log-normal", "median": 0.5, "sd_log": 0.25}

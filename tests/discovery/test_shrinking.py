@@ -119,9 +119,9 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
         return [held(error[trained.block.name + smooth] + names.index(e.name)) for e in trained.experiments]
 
     def gained(fits: list[Any], named: int, n: int, remains: bool, rng: Any, parallel_map: Any) -> _Gain:
-        said = [f.name for f in fits]
+        chosen = [f.name for f in fits]
         base = (["plain", stages[-1]] if stages else ["plain"]) + ["~"] * (4 if remains and stages else 2)
-        assert said == base and named == bool(stages) and n == 2
+        assert chosen == base and named == bool(stages) and n == 2
         return _Gain(9.0, 1.0, 2.0)
 
     monkeypatch.setattr(shrinking, "_predicted", predicted)

@@ -186,8 +186,8 @@ def test_every_effect_says_what_it_is():
 
 
 def test_unknown_names_are_refused_with_what_there_is():
-    for key, said in (("slip", "no such effect"), ("grip_slip", "grip_slip@7"), ("toe@3", "takes no '@'")):
-        with pytest.raises(InputError, match=said):
+    for key, message in (("slip", "no such effect"), ("grip_slip", "grip_slip@7"), ("toe@3", "takes no '@'")):
+        with pytest.raises(InputError, match=message):
             named(key)
 
 

@@ -39,7 +39,7 @@ def by_definition(rig, dy):
 
 
 @pytest.mark.parametrize("protocol", ["paper", "unloading", "slack", "several_wires", "two_lengths"])
-def test_solved_amplitude_has_the_delta_asked_for(protocol):
+def test_solved_amplitude_has_the_requested_delta(protocol):
     rng = np.random.default_rng(11)
     rig = draw_rig(rng, protocol)
     geo = geometry(rig)

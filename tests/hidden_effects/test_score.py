@@ -37,7 +37,7 @@ def judged(group=("toe",)):
     }
 
 
-def said(best, members=(), final=2.0):
+def answer(best, members=(), final=2.0):
     verdict = "nothing-missing" if best is None else "unknown" if best == "unknown" else "named"
     spoken = {
         "verdict": verdict,
@@ -64,10 +64,10 @@ def test_bounds_are_clopper_pearson():
 def test_rates_of_named_missed_and_wrong():
     truths = {k: truth(k) for k in "abcd"}
     answers = {
-        "a": said("toe", ["toe", "memory"]),
-        "b": said("memory", ["memory"]),
-        "c": said(None),
-        "d": said("ageing", ["ageing", "toe"]),
+        "a": answer("toe", ["toe", "memory"]),
+        "b": answer("memory", ["memory"]),
+        "c": answer(None),
+        "d": answer("ageing", ["ageing", "toe"]),
     }
     result = score(truths, dict.fromkeys("abcd", judged(("toe", "ageing"))), answers)
     assert found(result, "detected at delta 10")["found"]["value"] == 0.75
@@ -82,7 +82,7 @@ def test_rates_of_named_missed_and_wrong():
 
 def test_runs_pooled_count_together_and_what_is_missed_is_bold(tmp_path, capsys, monkeypatch):
     for name, best in (("one", "toe"), ("other", None)):
-        part = score({name: truth(name)}, {name: judged()}, {name: said(best, ["toe"])})
+        part = score({name: truth(name)}, {name: judged()}, {name: answer(best, ["toe"])})
         (tmp_path / name).write_text(json.dumps({"api": part}), encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["pooled", str(tmp_path / "one"), str(tmp_path / "other")])
     program.main()
@@ -97,9 +97,9 @@ def test_runs_pooled_count_together_and_what_is_missed_is_bold(tmp_path, capsys,
 def test_false_alarms_need_numbers_to_pass():
     few = {f"c{i}": truth(f"c{i}", "clean") for i in range(50)}
     many = {f"c{i}": truth(f"c{i}", "clean") for i in range(700)}
-    quiet = said(None, final=3.0)
+    quiet = answer(None, final=3.0)
     for truths, loud, passed in ((few, 0, False), (many, 20, True), (many, 60, False)):
-        answers = {k: said("toe") if i < loud else quiet for i, k in enumerate(truths)}
+        answers = {k: answer("toe") if i < loud else quiet for i, k in enumerate(truths)}
         row = found(score(truths, dict.fromkeys(truths, judged()), answers), "false alarms")
         assert row["found"]["k"] == loud
         assert row["passed"] is passed
@@ -117,7 +117,7 @@ def test_gap_is_pooled_in_noise_floors():
 
 def test_unknown_counts_where_the_form_is_in_no_catalogue():
     truths = {k: truth(k, "foreign", "screw_thread") for k in "abc"}
-    answers = {"a": said("unknown"), "b": said("memory", ["memory"]), "c": said("toe", ["toe"])}
+    answers = {"a": answer("unknown"), "b": answer("memory", ["memory"]), "c": answer("toe", ["toe"])}
     result = score(truths, dict.fromkeys("abc", judged(("screw_thread", "toe"))), answers)
     assert found(result, "effect in no catalogue")["found"]["value"] == pytest.approx(2 / 3)
 
@@ -125,7 +125,7 @@ def test_unknown_counts_where_the_form_is_in_no_catalogue():
 def test_cases_the_refitted_plain_model_swallows_are_also_shown_apart():
     truths = {k: truth(k) for k in "ab"}
     swallowed = judged() | {"delta_after_refit": 2.0}
-    answers = {"a": said("toe", ["toe"]), "b": said(None)}
+    answers = {"a": answer("toe", ["toe"]), "b": answer(None)}
     result = score(truths, {"a": judged(), "b": swallowed}, answers)
     assert found(result, "detected at delta 10")["found"]["value"] == 0.5
     assert found(result, "detected at delta 10", "targets_visible")["found"]["value"] == 1.0

@@ -60,9 +60,9 @@ def test_bands_hold_a_new_specimen():
 
 def test_what_no_test_determines_stays_unknown():
     prior, rng = (np.zeros(2), np.diag([1.0, 0.49])), np.random.default_rng(3)
-    told = [
+    posteriors = [
         np.column_stack([0.3 + 0.02 * rng.standard_normal(1000), 0.7 * rng.standard_normal(1000)]) for _ in range(8)
     ]
-    found = between_specimens(told, prior, 2000, rng)
+    found = between_specimens(posteriors, prior, 2000, rng)
     assert found.mean[:, 0].std() < 0.05
     assert found.mean[:, 1].std() > 0.4  # eight posteriors that only repeat the prior are not eight tests

@@ -29,7 +29,7 @@ def read(folder, text, **choices):
 
 
 @pytest.mark.parametrize(
-    ("text", "said", "answers"),
+    ("text", "message", "answers"),
     [
         (HEADER.replace(" [N]", "") + BODY, r"line 1, column 3 \(Kraft\): found no unit", "--map Kraft=tension [kgf]"),
         (HEADER.replace(" [s]", "") + BODY, r"line 1, column 2 \(Zeit\): found no unit", "--map Zeit=time [min]"),
@@ -58,8 +58,8 @@ def read(folder, text, **choices):
     ],
     ids=["force unit", "time unit", "two forces", "comma", "point", "clock", "times run on", "machine position"],
 )
-def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, said, answers):
-    with pytest.raises(Undecided, match=f"raw.csv, {said}.*; expected --") as refused:
+def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, message, answers):
+    with pytest.raises(Undecided, match=f"raw.csv, {message}.*; expected --") as refused:
         read(tmp_path, text)
     assert answers in refused.value.answers
     before = len(refused.value.answers)
@@ -86,7 +86,7 @@ def test_each_answer_means_what_it_says(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (b"", "line 1: found an empty file"),
         (BODY, "line 1: found numbers without a header"),
@@ -109,13 +109,13 @@ def test_each_answer_means_what_it_says(tmp_path):
         ("hold," + HEADER + "1,1,0,2\n1,1,9,2\n1,7,20,2\n2,2,0,4\n2,2,9,3\n", r"line 4, column 2 .*7 mm in a hold"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, said):
-    with pytest.raises(wb.InputError, match=said):
+def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, message):
+    with pytest.raises(wb.InputError, match=message):
         read(tmp_path, text)
 
 
 @pytest.mark.parametrize(
-    ("mapping", "said"),
+    ("mapping", "message"),
     [
         ("Kraft [N]=tenson", r"--map: found 'Kraft \[N\]=tenson' \(did you mean tension\?\)"),
         ("Kraft [N]", "expected HEADER=COLUMN"),
@@ -124,8 +124,8 @@ def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, said):
         ("Weg [mm]=tension [N]", "found no column of displacement among"),
     ],
 )
-def test_a_wrong_mapping_is_refused(tmp_path, mapping, said):
-    with pytest.raises(wb.InputError, match=said):
+def test_a_wrong_mapping_is_refused(tmp_path, mapping, message):
+    with pytest.raises(wb.InputError, match=message):
         read(tmp_path, HEADER + BODY, mapping=(mapping,))
 
 
@@ -167,10 +167,10 @@ def test_what_is_harmless_is_done_and_said(tmp_path):
     text = "Stufe,Weg [mm],Zeit [s],Kraft [N]\n1,1,0,2.1\n,,30,2\n,,30,2\n,,60,1.9\n4,2,0,4\n,,30,3.9\nend of test\n"
     found = read(tmp_path, text)
     assert len(found.rows) == 5
-    said = " ".join(found.notes)
+    message = " ".join(found.notes)
     for note in ("filled with the value above", "repeat the row above left out: 1", "1 line under the readings",
                  "holds 2 and 3 have no readings"):  # fmt: skip
-        assert note in said
+        assert note in message
     assert found.recording is None
 
 

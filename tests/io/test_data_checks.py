@@ -21,12 +21,12 @@ def sound():
     return sample.protocol, sample.readings[..., 0]
 
 
-def said(protocol, tension, resolution=0.01):
+def warning(protocol, tension, resolution=0.01):
     return " | ".join(data_checks.warnings(protocol, tension, resolution))
 
 
 def test_a_sound_test_gets_no_warning(sound):
-    assert said(*sound) == ""
+    assert warning(*sound) == ""
     assert data_checks.of_experiments(paper.experiments()) == []
 
 
@@ -36,8 +36,8 @@ def test_times_of_the_whole_test_are_suspected_where_they_are_not_certain():
         np.array([4.0, 9.0]), np.array([1, 2]),
     )  # fmt: skip
     tension = np.array([[1.0] * 5, [2.0] * 5])
-    assert "time_s counts from the beginning of each hold" in said(protocol, tension)
-    assert said(replace(protocol, time_s=protocol.time_s % 5), tension) == ""
+    assert "time_s counts from the beginning of each hold" in warning(protocol, tension)
+    assert warning(replace(protocol, time_s=protocol.time_s % 5), tension) == ""
 
 
 def test_tensions_below_zero_by_more_than_an_offset(sound):
@@ -45,7 +45,7 @@ def test_tensions_below_zero_by_more_than_an_offset(sound):
     for depth, warned in ((0.04, False), (0.06, True)):
         slack = tension.copy()
         slack[0] = -depth * tension.max()
-        assert ("hold 1, while a wire only pulls" in said(protocol, slack)) == warned
+        assert ("hold 1, while a wire only pulls" in warning(protocol, slack)) == warned
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_tensions_below_zero_by_more_than_an_offset(sound):
 )
 def test_absurd_tensions_are_named(sound, change, words):
     protocol, tension = sound
-    assert words in said(protocol, change(tension, np.random.default_rng(0)))
+    assert words in warning(protocol, change(tension, np.random.default_rng(0)))
 
 
 def test_one_gross_outlier_is_named_with_its_place(sound):
@@ -70,10 +70,10 @@ def test_one_gross_outlier_is_named_with_its_place(sound):
     for share, warned in ((0.9, False), (1.3, True)):  # of the range of all others
         gross = tension.copy()
         gross[5, 2] += share * data_checks.GROSS * np.ptp(tension)
-        assert ("in hold 6 at 60 s is" in said(protocol, gross)) == warned
+        assert ("in hold 6 at 60 s is" in warning(protocol, gross)) == warned
     last = tension.copy()
     last[11, 4] *= 10
-    assert "in hold 12 at 120 s is" in said(protocol, last)
+    assert "in hold 12 at 120 s is" in warning(protocol, last)
 
 
 @pytest.mark.parametrize(("strain", "warned"), [(4e-5, True), (6e-5, False), (0.4, False), (0.6, True)])
@@ -81,7 +81,7 @@ def test_displacements_beside_the_length(sound, strain, warned):
     protocol, tension = sound
     length = np.ptp(protocol.displacement_mm) / strain
     assert (
-        "displacement_mm and length_mm are both in mm" in said(replace(protocol, length_mm=length), tension)
+        "displacement_mm and length_mm are both in mm" in warning(replace(protocol, length_mm=length), tension)
     ) == warned
 
 
@@ -89,13 +89,13 @@ def test_threads_and_ropes_get_no_warning(sound):
     """Ten grams and fifty tonnes, in N and mm, with sensors to match."""
     protocol, tension = sound
     for scale in (0.1 / tension.max(), 5e5 / tension.max()):
-        assert said(protocol, scale * tension, scale * 0.01) == ""
+        assert warning(protocol, scale * tension, scale * 0.01) == ""
 
 
 def test_the_same_place_throughout(sound):
     protocol, tension = sound
     still = replace(protocol, displacement_mm=np.ones_like(protocol.displacement_mm))
-    assert "all holds have the same displacement_mm" in said(still, tension)
+    assert "all holds have the same displacement_mm" in warning(still, tension)
 
 
 def test_clean_simulated_tests_get_no_warning():
@@ -119,7 +119,7 @@ def test_clean_simulated_tests_get_no_warning():
             for bench, part in zip(rig.benches, rig.bench_slices, strict=True):
                 tests.append((*_padded(bench, readings[part]), bench.resolution_N or 0.0))
     assert len(tests) == 199
-    assert [said(*test) for test in tests if said(*test)] == []
+    assert [warning(*test) for test in tests if warning(*test)] == []
 
 
 def _padded(bench, readings):

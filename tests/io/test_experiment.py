@@ -154,9 +154,9 @@ BAD_CSV = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "said"), BAD_CSV, ids=[said for *_, said in BAD_CSV])
-def test_bad_readings_are_named_to_the_column(experiment_file, tmp_path, old, new, said):
-    assert complaint(experiment_file(csv={old: new})).startswith(f"{tmp_path / 'a.csv'}, {said}")
+@pytest.mark.parametrize(("old", "new", "message"), BAD_CSV, ids=[message for *_, message in BAD_CSV])
+def test_bad_readings_are_named_to_the_column(experiment_file, tmp_path, old, new, message):
+    assert complaint(experiment_file(csv={old: new})).startswith(f"{tmp_path / 'a.csv'}, {message}")
 
 
 BAD_TOML = [
@@ -214,11 +214,11 @@ BAD_TOML = [
 
 @pytest.mark.parametrize("case", BAD_TOML, ids=[case[2] for case in BAD_TOML])
 def test_bad_experiments_are_named_to_the_key(experiment_file, case):
-    old, new, *said = case
+    old, new, *message = case
     path = experiment_file(toml={old: new})
     text = complaint(path)
     assert text.startswith(str(path))
-    for part in said:
+    for part in message:
         assert part in text
 
 
@@ -249,8 +249,8 @@ def test_files_that_cannot_be_read_are_named(experiment_file, tmp_path):
     empty = "line 1, column 1: found an empty file, expected a header of hold,displacement_mm,time_s,tension_N"
     assert complaint(path).startswith(f"{tmp_path / 'a.csv'}, {empty}")
     (tmp_path / "empty.toml").write_text(" \n")
-    said = complaint(tmp_path / "empty.toml")
-    assert said.endswith("line 1, column 1: found an empty file, expected TOML with at least one [[experiment]]")
+    message = complaint(tmp_path / "empty.toml")
+    assert message.endswith("line 1, column 1: found an empty file, expected TOML with at least one [[experiment]]")
     (tmp_path / "a.csv").write_text("hold,displacement_mm,time_s,tension_N\n\n")
     assert complaint(path).startswith(f"{tmp_path / 'a.csv'}, line 2: found no readings")
 
@@ -273,13 +273,13 @@ def test_fewer_than_two_holds_or_five_readings_are_refused(experiment_file, tmp_
     rows = (tmp_path / "a.csv").read_text().splitlines()
     (tmp_path / "a.csv").write_text("\n".join(rows[:6]))
     assert len(read_experiments(path)) == 1  # two holds, five readings
-    for kept, said in [
+    for kept, message in [
         ([*rows[:5]], "2 holds with 4 readings"),
         (rows[:2], "1 hold with 1 reading"),
         ([rows[0], *(f"1,1,{time},1.0" for time in range(9))], "1 hold with 9 readings"),
     ]:
         (tmp_path / "a.csv").write_text("\n".join(kept))
-        expected = f"found {said} in a.csv, expected at least 2 recorded holds and 5 readings in all"
+        expected = f"found {message} in a.csv, expected at least 2 recorded holds and 5 readings in all"
         assert complaint(path) == f"{path}, line 6, experiment wire-a, key readings: {expected}"
 
 

@@ -65,7 +65,7 @@ def test_an_experiment_file_is_no_plan(experiment_file):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("step_mm = 0.5", "step_mm = 0", "line 12, protocol steps, key step_mm: found 0, expected a step other than 0"),
         ("holds = 3", "holds = 2.5", "line 13, protocol steps, key holds: found 2.5, expected a whole number of holds"),
@@ -90,11 +90,11 @@ def test_an_experiment_file_is_no_plan(experiment_file):
         ('material = "line"', 'stuff = "line"', "key stuff: found an unknown key"),
     ],
 )
-def test_a_mistake_is_named_by_its_place(plan_file, old, new, said):
+def test_a_mistake_is_named_by_its_place(plan_file, old, new, message):
     path = plan_file([(old, new)])
     with pytest.raises(InputError) as caught:
         read_plan(path, EFFECTS)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
 

@@ -95,7 +95,7 @@ def test_checking_makes_nothing(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "found"),
     [
         ({"seed": 1}, "seed is 0 there, 1 here;"),
         ({"data": {"wire-a": "abd"}}, "data.wire-a is abc there, abd here;"),
@@ -103,12 +103,12 @@ def test_checking_makes_nothing(tmp_path):
         ({"history": "additive"}, "history is nothing there, additive here;"),
     ],
 )
-def test_another_configuration_is_refused_by_name(tmp_path, change, said):
+def test_another_configuration_is_refused_by_name(tmp_path, change, found):
     opened(tmp_path / "out", CONFIGURATION)
     before = (tmp_path / "out" / "configuration.json").read_bytes()
     with pytest.raises(InputError) as caught:
         opened(tmp_path / "out", CONFIGURATION | change)
-    assert str(caught.value).startswith(f"{tmp_path / 'out'}: made with another configuration: {said} expected a new")
+    assert str(caught.value).startswith(f"{tmp_path / 'out'}: made with another configuration: {found} expected a new")
     assert (tmp_path / "out" / "configuration.json").read_bytes() == before
 
 

@@ -54,7 +54,7 @@ def test_tables_become_distributions_and_fixed_values():
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "message"),
     [
         (3.0, "expected a table"),
         ({}, "prior.k1.distribution: found no such key, expected one of normal"),
@@ -69,9 +69,9 @@ def test_tables_become_distributions_and_fixed_values():
         ({"fixed": float("nan")}, "prior.k1.fixed"),
     ],
 )
-def test_a_malformed_table_is_named_with_what_was_expected(table, said):
+def test_a_malformed_table_is_named_with_what_was_expected(table, message):
     with pytest.raises(InputError) as complaint:
         from_table("prior.k1", table)
     assert "prior.k1" in str(complaint.value)
-    assert said in str(complaint.value)
+    assert message in str(complaint.value)
     assert len(str(complaint.value).splitlines()) == 1

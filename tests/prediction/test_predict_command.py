@@ -79,9 +79,9 @@ def test_later_holds_continue_the_tested_sample_unless_a_fresh_one_is_meant(
     fits: Path, protocol: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     after = predicted(fits, protocol([8, 12]))[5:]
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "hold 12 predicted as a continuation of the tested sample" in said
-    assert "hold 8 of the training predicted as replicates" in said and "holds 9 to 11 not in its history" in said
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and "hold 12 predicted as a continuation of the tested sample" in message
+    assert "hold 8 of the training predicted as replicates" in message and "holds 9 to 11 not in its history" in message
     alone = predicted(fits, protocol([12]))
     assert alone == after
     assert "hold 12 predicted as a continuation of the tested sample" in capsys.readouterr().err

@@ -114,7 +114,7 @@ def test_intervals_and_units_for_people():
     assert unit_text("1") == ""
 
 
-def test_a_page_is_well_formed_and_escapes_what_it_is_told(tmp_path):
+def test_a_page_is_well_formed_and_escapes_its_content(tmp_path):
     figure = Figure(figsize=(2, 2))
     figure.subplots().plot([0, 1], [0, 1])
     nasty = "<b>&\"'"
@@ -141,7 +141,7 @@ def test_a_picture_has_the_same_bytes_every_time():
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (None, "no configuration.json"),
         ("{", "no valid JSON"),
@@ -150,12 +150,12 @@ def test_a_picture_has_the_same_bytes_every_time():
         ('{"command": "pose"}', "pose.json: found no such file"),
     ],
 )
-def test_a_folder_that_is_not_ours_is_one_plain_line(content, said, tmp_path, capsys):
+def test_a_folder_that_is_not_ours_is_one_plain_line(content, message, tmp_path, capsys):
     if content is not None:
         (tmp_path / "configuration.json").write_text(content)
     assert main(["report", str(tmp_path)]) == 2
     error = capsys.readouterr().err
-    assert said in error
+    assert message in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "report.html").exists()
 
@@ -264,7 +264,7 @@ DISCOVERY = {
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({}, "strain stiffening; on this protocol hard to distinguish from sensor nonlinearity."),
         ({"group": ["strain_stiffening"]}, "What is missing: strain stiffening."),
@@ -276,10 +276,10 @@ DISCOVERY = {
         ({"verdict": "ambiguous", "set": ["toe", "memory"]}, "cannot distinguish between toe and memory"),
     ],
 )
-def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, said, tmp_path):
+def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, message, tmp_path):
     content = {"version": 2, "experiments": {"wire-a": DISCOVERY | changes, "wire-b": DISCOVERY}}
     page = read(write(folder_of(tmp_path / "out", "discover", discovery=content)))
-    assert said in page.words
+    assert message in page.words
     assert "Unload in steps of 2 mm." in page.words
     assert "On the unused holds 9 and 10 the rms error goes from 0.10 to 0.030 N" in page.words
     assert "90 %" in page.words

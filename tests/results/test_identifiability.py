@@ -14,12 +14,11 @@ from wirebayes.model.problem import build
 from wirebayes.results.identifiability import (
     SENSITIVE,
     Extrapolation,
-    Taught,
     _weighted_quantiles,
     extrapolation,
     identifiability,
+    in_words,
     sensitivity,
-    to_dict,
 )
 
 
@@ -39,24 +38,24 @@ def normal_model(noise: dict[str, float], draws: int = 4000, total: float | None
 
 
 def test_contraction_is_the_share_of_variance_taken_away() -> None:
-    taught = {t.name: t for t in identifiability(normal_model({"sharp": 0.1, "even": 1.0, "vague": 30.0}))}
+    found = identifiability(normal_model({"sharp": 0.1, "even": 1.0, "vague": 30.0}))
     for name, noise in (("sharp", 0.1), ("even", 1.0), ("vague", 30.0)):
         posterior = 1.0 / (1.0 + noise**-2)
-        assert taught[name].contraction == pytest.approx(1.0 - posterior, abs=0.05)
-        assert taught[name].posterior_range == pytest.approx(2 * 1.645 * np.sqrt(posterior), rel=0.06)
-    assert "the data determine it" in taught["sharp"].sentence
-    assert "data and prior both determine it" in taught["even"].sentence
-    assert "next to nothing" in taught["vague"].sentence
-    assert taught["sharp"].prior_sensitivity < 0.02 < SENSITIVE < taught["vague"].prior_sensitivity
-    assert taught["vague"].likelihood_sensitivity < 0.02 < SENSITIVE < taught["sharp"].likelihood_sensitivity
+        assert found[name]["contraction"] == pytest.approx(1.0 - posterior, abs=0.05)
+        assert found[name]["posterior_range_90"] == pytest.approx(2 * 1.645 * np.sqrt(posterior), rel=0.06)
+    assert "the data determine it" in found["sharp"]["sentence"]
+    assert "data and prior both determine it" in found["even"]["sentence"]
+    assert "next to nothing" in found["vague"]["sentence"]
+    assert found["sharp"]["prior_sensitivity"] < 0.02 < SENSITIVE < found["vague"]["prior_sensitivity"]
+    assert found["vague"]["likelihood_sensitivity"] < 0.02 < SENSITIVE < found["sharp"]["likelihood_sensitivity"]
 
 
 def test_a_sum_alone_is_a_ridge() -> None:
-    taught = identifiability(normal_model({"a": 1.0, "b": 1.0}, total=0.05))
+    found = identifiability(normal_model({"a": 1.0, "b": 1.0}, total=0.05))
     # the sum is known, the difference has the prior's variance: correlation (0.0025 - 2) / (0.0025 + 2) nearly
-    assert taught[0].ridges["b"] < -0.98
-    assert "correlated with b" in taught[0].sentence
-    assert set(to_dict(taught)) == {"a", "b"}
+    assert set(found) == {"a", "b"}
+    assert found["a"]["ridges"]["b"] < -0.98
+    assert "correlated with b" in found["a"]["sentence"]
 
 
 def test_sensitivity_is_zero_for_a_flat_component_and_grows_with_its_part() -> None:
@@ -83,8 +82,8 @@ def test_extrapolation_says_whose_work_the_band_is() -> None:
     rows[:, problem.names.index("k1")] = 700.0
     whole = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0).to_dict()  # type: ignore[arg-type]
     assert ": it depends on the prior" in whole["sentence"] and "24 h at 2 N" in whole["sentence"]
-    taught = rows * np.exp(0.02 * np.random.default_rng(4).normal(size=rows.shape)) / rows * rows[:1]
-    known = extrapolation(SimpleNamespace(problem=problem, flat=taught), 2.0).to_dict()  # type: ignore[arg-type]
+    likely = rows * np.exp(0.02 * np.random.default_rng(4).normal(size=rows.shape)) / rows * rows[:1]
+    known = extrapolation(SimpleNamespace(problem=problem, flat=likely), 2.0).to_dict()  # type: ignore[arg-type]
     assert "hardly depends on the prior" in known["sentence"] and known["prior_share"][-1] < 0.05
 
 
@@ -97,12 +96,15 @@ def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
     assert "do not creep at this tension" in band.to_dict()["sentence"]
 
 
-def about(contraction: float = 0.95, sensitivity: float = 0.0, ridges: dict[str, float] | None = None) -> Taught:
-    return Taught("k1", contraction, 100.0, 1.5, True, sensitivity, 1.0, ridges or {})
+def sentence(contraction: float, sensitivity: float) -> str:
+    return in_words("k1", {
+        "contraction": contraction, "prior_range_90": 100.0, "posterior_range_90": 1.5, "range_is_factor": True,
+        "prior_sensitivity": sensitivity, "likelihood_sensitivity": 1.0, "ridges": {},
+    })  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("contraction", "sensitivity", "said"),
+    ("contraction", "sensitivity", "part"),
     [
         (0.29, 0.0, "next to nothing"),
         (0.31, 0.0, "data and prior both"),
@@ -111,8 +113,8 @@ def about(contraction: float = 0.95, sensitivity: float = 0.0, ridges: dict[str,
         (0.91, 0.051, "data and prior both"),
     ],
 )
-def test_what_determines_a_parameter_turns_at_its_thresholds(contraction: float, sensitivity: float, said: str) -> None:
-    assert said in about(contraction, sensitivity).sentence
+def test_what_determines_a_parameter_turns_at_its_thresholds(contraction: float, sensitivity: float, part: str) -> None:
+    assert part in sentence(contraction, sensitivity)
 
 
 @pytest.mark.parametrize(("correlation", "ridge"), [(0.88, False), (0.92, True), (-0.92, True)])
@@ -121,8 +123,8 @@ def test_a_ridge_is_a_correlation_above_nine_tenths(correlation: float, ridge: b
     model = normal_model({"a": 1.0, "b": 1.0})
     z = stats.norm.ppf((np.arange(4000) + 0.5) / 4000)
     model.flat = np.column_stack([z, np.random.default_rng(0).permutation(z)]) @ root.T
-    one, other = identifiability(model)
-    assert (list(one.ridges), list(other.ridges)) == ((["b"], ["a"]) if ridge else ([], []))
+    one, other = identifiability(model).values()
+    assert (list(one["ridges"]), list(other["ridges"])) == ((["b"], ["a"]) if ridge else ([], []))
 
 
 def test_a_range_of_a_positive_parameter_is_a_factor() -> None:
@@ -131,11 +133,11 @@ def test_a_range_of_a_positive_parameter_is_a_factor() -> None:
     model.problem.prior = Prior({"k": stats.lognorm(0.5, scale=700.0)}, {}, frozenset({"k"}))
     model.flat = 800.0 * np.exp(0.1 * stats.norm.ppf((np.arange(4000) + 0.5) / 4000))[:, None]
     model.problem.log_likelihood = lambda rows: np.zeros(len(rows))
-    (found,) = identifiability(model)
-    assert found.is_factor and "×" in found.sentence
-    assert found.prior_range == pytest.approx(np.exp(2 * 1.645 * 0.5), rel=1e-3)
-    assert found.posterior_range == pytest.approx(np.exp(2 * 1.645 * 0.1), rel=1e-3)
-    assert found.contraction == pytest.approx(1.0 - 0.1**2 / 0.5**2, abs=0.002)
+    (found,) = identifiability(model).values()
+    assert found["range_is_factor"] and "×" in found["sentence"]
+    assert found["prior_range_90"] == pytest.approx(np.exp(2 * 1.645 * 0.5), rel=1e-3)
+    assert found["posterior_range_90"] == pytest.approx(np.exp(2 * 1.645 * 0.1), rel=1e-3)
+    assert found["contraction"] == pytest.approx(1.0 - 0.1**2 / 0.5**2, abs=0.002)
 
 
 def far_out(share: float = 0.0, k: float = 0.2, longest_s: float = 600.0) -> Extrapolation:
@@ -145,7 +147,7 @@ def far_out(share: float = 0.0, k: float = 0.2, longest_s: float = 600.0) -> Ext
 
 
 @pytest.mark.parametrize(
-    ("share", "k", "said"),
+    ("share", "k", "part"),
     [
         (0.09, 0.2, "hardly depends on the prior: with half the prior's weight the band is 9 % wider"),
         (0.11, 0.2, "it depends on the prior: with half the prior's weight the band is 11 % wider"),
@@ -153,10 +155,10 @@ def far_out(share: float = 0.0, k: float = 0.2, longest_s: float = 600.0) -> Ext
         (0.5, 0.71, "cannot show"),
     ],
 )
-def test_the_prior_s_part_in_an_extrapolation_turns_at_a_tenth(share: float, k: float, said: str) -> None:
+def test_the_prior_s_part_in_an_extrapolation_turns_at_a_tenth(share: float, k: float, part: str) -> None:
     found = far_out(share, k)
     assert found.prior_share == pytest.approx([share])
-    assert said in found.to_dict()["sentence"] and "after 1 h at 2 N" in found.to_dict()["sentence"]
+    assert part in found.to_dict()["sentence"] and "after 1 h at 2 N" in found.to_dict()["sentence"]
 
 
 def test_an_extrapolation_is_one_beyond_the_longest_hold() -> None:

@@ -29,7 +29,7 @@ def test_a_sound_test_gets_no_warning_and_a_gross_one_is_first_in_summary_and_pa
     mixed = problem.samples[0].readings[np.random.default_rng(0).permutation(12)]
     store.save(fit(with_readings(problem, [mixed]), 1, policy=HASTY), tmp_path, {})
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert any("setting_sd is at least" in said and "steps by 1 mm" in said for said in summary["warnings"])
+    assert any("setting_sd is at least" in warning and "steps by 1 mm" in warning for warning in summary["warnings"])
     first = _cautions(summary)[0]
     assert first.strong and "Check the readings" in first.text
 
@@ -68,8 +68,8 @@ def test_a_posterior_that_is_the_prior_is_named(simulated):
     problem = simulated.problem
     one, other = (problem.prior.rvs(4000, np.random.default_rng(seed)) for seed in (0, 1))
     own, prior = (problem.parameters(theta, problem.samples[0]) for theta in (one, other))
-    assert "say nothing of the wire" in posterior_checks.taught(own, prior)
-    assert posterior_checks.taught(own | {"k1": 700.0 + own["k1"] / 100.0}, prior) == ""
+    assert "say nothing of the wire" in posterior_checks.unchanged_prior(own, prior)
+    assert posterior_checks.unchanged_prior(own | {"k1": 700.0 + own["k1"] / 100.0}, prior) == ""
 
 
 def test_readings_without_noise_have_a_floor_and_say_so(simulated):
@@ -82,7 +82,7 @@ def test_readings_without_noise_have_a_floor_and_say_so(simulated):
     assert problem.samples[0].resolution_N == pytest.approx(FINEST * np.max(bare.problem.samples[0].readings))
     assert build([with_tensions(Bench().experiment(), sample.readings[..., 0])]).samples[0].resolution_N == 0.01
     quiet = fit(problem, 1, policy=HASTY)
-    assert any("carry no noise" in said for said in posterior_checks.warnings(quiet, problem.samples[0]))
+    assert any("carry no noise" in warning for warning in posterior_checks.warnings(quiet, problem.samples[0]))
 
 
 def with_tensions(experiment, tension):
@@ -122,5 +122,6 @@ def test_an_interval_that_shrank_by_less_than_a_tenth_taught_nothing(simulated, 
     even = np.linspace(0.0, 1.0, 1001)
     prior = {"k1": even, "B": even, "sensor_sd": even}
     own = {"k1": left * even, "B": even, "sensor_sd": 0.1 * even}
-    assert ("say nothing of the wire" in posterior_checks.taught(own, prior)) is named
-    assert posterior_checks.taught({"k1": even[:1] + 0 * even}, {"k1": np.ones(9)}) == ""  # nothing was to be learned
+    assert ("say nothing of the wire" in posterior_checks.unchanged_prior(own, prior)) is named
+    constant = {"k1": np.ones(9)}
+    assert posterior_checks.unchanged_prior({"k1": even[:1] + 0 * even}, constant) == ""  # nothing was to be learned

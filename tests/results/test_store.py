@@ -45,7 +45,7 @@ def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire
     joint = fitted.problem
     here = joint.samples[1]
     summary = store.save(fitted, tmp_path, {}, sample=here)
-    said, load = summary["derived"], summary["derived"]["tension_N"]
+    derived, load = summary["derived"], summary["derived"]["tension_N"]
 
     def creep(own, t):
         mode = own["second_relaxation.A"] * load * (1 - np.exp(-t / own["second_relaxation.T2"]))
@@ -55,11 +55,11 @@ def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire
     draws = joint.parameters(fitted.flat, here)
     for key, time in store.CREEP_TIMES_S.items():
         values = creep(draws, time)
-        assert [said[key][q] for q in ("q05", "q50", "q95")] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]))
-        assert said[key]["mean"] == pytest.approx(values.mean(), rel=1e-12)
-    assert said["final_creep_mm"] is None and said["median_creep_time_s"] is None  # steady creep never ends
+        assert [derived[key][q] for q in ("q05", "q50", "q95")] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]))
+        assert derived[key]["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert derived["final_creep_mm"] is None and derived["median_creep_time_s"] is None  # steady creep never ends
     stiffness = draws["k1"] * (1700.0 / here.model.length_ref_mm) ** draws["length_dependence.p"]
-    assert said["stiffness_N"]["q50"] == pytest.approx(np.median(stiffness), rel=1e-12)
+    assert derived["stiffness_N"]["q50"] == pytest.approx(np.median(stiffness), rel=1e-12)
     ahead = summary["extrapolation"]
     rows = fitted.flat[np.linspace(0, len(fitted.flat) - 1, min(4000, len(fitted.flat))).round().astype(int)]
     expected = [np.median(creep(joint.parameters(rows, here), t)) for t in ahead["time_s"]]
@@ -82,12 +82,12 @@ def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(
     experiments = tuple(read_experiments(tmp_path / "experiments.toml"))
     job = Job("short/final", experiments, apart=("short/final", "long/final"))
     jobs.run([job], tmp_path, 0, policy=HASTY)
-    said = [(tmp_path / folder / "summary.json").read_text() for folder in job.folders]
-    short, long = (json.loads(text)["parameters"] for text in said)
+    texts = [(tmp_path / folder / "summary.json").read_text() for folder in job.folders]
+    short, long = (json.loads(text)["parameters"] for text in texts)
     assert short["k1"] == long["k1"] and short["preload"] != long["preload"]
     (tmp_path / "long/final/summary.json").unlink()
     jobs.run([job], tmp_path, 0, policy=HASTY)
-    assert [(tmp_path / folder / "summary.json").read_text() for folder in job.folders] == said
+    assert [(tmp_path / folder / "summary.json").read_text() for folder in job.folders] == texts
 
 
 def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):

@@ -93,12 +93,12 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
     from wirebayes.effects.unknown import Discrepancy
 
     line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
-    said = draws.warnings(schema.read("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
-    assert len(said) == 1
-    assert "could not name" in said[0]
+    message = draws.warnings(schema.read("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
+    assert len(message) == 1
+    assert "could not name" in message[0]
 
 
-def test_tilt_is_told_against_the_commanded_normal_and_against_the_vertical():
+def test_tilt_is_measured_against_the_commanded_normal_and_against_the_vertical():
     from wirebayes.robot.mechanics.rotation import matrix
 
     robot = schema.read("cogiro-desk")

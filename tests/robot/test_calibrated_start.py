@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401 - fixtures
-from tests.robot.test_history import _line, _simulated, _theta, _told
+from tests.robot.test_history import _joint_values_for, _line, _simulated, _theta
 from wirebayes.cli import main
 from wirebayes.io.run_folder import plain
 from wirebayes.robot.history import commanded, corrections
@@ -43,7 +43,7 @@ def case():
     times = np.concatenate([np.stack([begins, begins + HOLD_S], 1).ravel(), begins[-1] + HOLD_S + [SOON_S, 300.0]])
     holds = np.repeat(np.arange(len(places) + 1), 2)
     last = robot.home_m + 0.1 * robot.span_m * np.array([1.0, -0.5, 0.3])
-    whole = _told(robot, times, np.concatenate([np.repeat(places, 2, 0), [last, last]]), holds)
+    whole = _joint_values_for(robot, times, np.concatenate([np.repeat(places, 2, 0), [last, last]]), holds)
     true = unknowns(robot, line, ERRORS, rng)
     wires, error = true.columns(true.draws[:1])
     x, _, tau = _simulated(robot, _theta(wires, 0), whole, error[0])

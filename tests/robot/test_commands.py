@@ -46,30 +46,30 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     assert "60" not in capsys.readouterr().err  # within the tested time: no warning about it
     first, second = ((folder / "pose.json").read_bytes() for folder in out)
     assert first == second
-    said = json.loads(first)
-    assert said["feasible"]
-    assert said["forward"]["solved"] == 1.0
-    assert said["forward"]["largest_round_trip_error_m"] < 1e-9
-    assert [d["specimen_spread"] for d in said["drift"]] == [0.0, 0.05]
-    for entry in said["drift"]:
+    pose = json.loads(first)
+    assert pose["feasible"]
+    assert pose["forward"]["solved"] == 1.0
+    assert pose["forward"]["largest_round_trip_error_m"] < 1e-9
+    assert [d["specimen_spread"] for d in pose["drift"]] == [0.0, 0.05]
+    for entry in pose["drift"]:
         low, mid, high = (entry["distance_mm"][q][-1] for q in ("q05", "q50", "q95"))
         assert 0 < low < mid < high
-    assert sum(said["variance_shares"]["shared_draw"].values()) == pytest.approx(1.0)
+    assert sum(pose["variance_shares"]["shared_draw"].values()) == pytest.approx(1.0)
     hooke, aware = (
-        next(e for e in said["pose_error"] if e["controller"] == c and e["specimen_spread"] == 0)["distance_mm"]["q50"]
+        next(e for e in pose["pose_error"] if e["controller"] == c and e["specimen_spread"] == 0)["distance_mm"]["q50"]
         for c in ("hooke_only", "creep_aware")
     )
     assert aware[-1] < 0.6 * hooke[-1]
-    assert {(r["loaded_before_s"], r["controller"]) for r in said["between_calibrations"]} == {
+    assert {(r["loaded_before_s"], r["controller"]) for r in pose["between_calibrations"]} == {
         (loaded, controller) for loaded in (0.0, 3600.0) for controller in ("held_still", "creep_aware")
     }
-    assert 0 < said["workspace"]["q05_drift_mm"] < said["workspace"]["q95_drift_mm"]
+    assert 0 < pose["workspace"]["q05_drift_mm"] < pose["workspace"]["q95_drift_mm"]
     assert {path.stem for path in out[0].glob("*.svg")} == {
         "robot", "drift", "rotation", "pose-error", "error-budget", "workspace-drift", "workspace-tilt"
     }  # fmt: skip
-    if said["certificate"]["proved"] is not None:
-        band = said["certificate"]["band"]
-        drifted = said["drift"][0]["displacement_mm"]["q50"][-1]
+    if pose["certificate"]["proved"] is not None:
+        band = pose["certificate"]["band"]
+        drifted = pose["drift"][0]["displacement_mm"]["q50"][-1]
         assert 0 < band["share"] <= 1
         assert all(a < b < c for a, b, c in zip(band["low_mm"], drifted, band["high_mm"], strict=True))
     assert main(["report", str(out[0])]) == 0
@@ -88,13 +88,13 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
     out = tmp_path / "far"
     arguments = ["pose", "linear-6", "--wires", str(fitted), "--output", str(out), "--position", "5,0,0.6"]
     assert main(arguments) == 0
-    said = json.loads((out / "pose.json").read_text())
-    assert not said["feasible"]
-    assert said["sentence"] in capsys.readouterr().err
+    pose = json.loads((out / "pose.json").read_text())
+    assert not pose["feasible"]
+    assert pose["sentence"] in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["no-such-robot"], "no-such-robot"),
         (["linear-6", "--position", "1,2"], "--position"),
@@ -106,11 +106,11 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
         (["linear-6", "--specimen-spread", "0"], "--specimen-spread"),
     ],
 )
-def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys, arguments, said):
+def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys, arguments, message):
     out = tmp_path / "out"
     assert main(["pose", *arguments, "--wires", str(fitted), "--output", str(out)]) == 2
     line = capsys.readouterr().err.strip()
-    assert said in line
+    assert message in line
     assert "\n" not in line
     assert not out.exists()
 
@@ -171,10 +171,10 @@ def test_a_robot_in_a_vertical_plane_is_a_robot(fitted, tmp_path, legs):
     file, out = tmp_path / "plotter.toml", tmp_path / "out"
     file.write_text(text)
     assert main(["pose", str(file), "--wires", str(fitted), "--output", str(out), "--times", "0,60"]) == 0
-    said = json.loads((out / "pose.json").read_text())
-    assert said["forward"]["solved"] == 1.0
-    assert [p["commanded"] for p in said["equilibria"]["poses"]] == [True]
-    assert said["workspace"]["feasible"] == 1.0
+    content = json.loads((out / "pose.json").read_text())
+    assert content["forward"]["solved"] == 1.0
+    assert [p["commanded"] for p in content["equilibria"]["poses"]] == [True]
+    assert content["workspace"]["feasible"] == 1.0
     assert (out / "workspace-drift.svg").is_file()
     assert not (out / "rotation.svg").exists()  # parallel lines: nothing turns
     assert main(["report", str(out)]) == 0
@@ -215,15 +215,15 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
     file, truth = session_csv
     out = tmp_path / "out"
     assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 0
-    said = json.loads((out / "calibrate.json").read_text())
-    found = said["with_creep_model"]
+    content = json.loads((out / "calibrate.json").read_text())
+    found = content["with_creep_model"]
     assert found["converged"]
     assert found["misfit"] < 1
     low, high = np.array(found["length_m"]["q05"]), np.array(found["length_m"]["q95"])
     assert np.mean((low <= truth) & (truth <= high)) > 0.8
     assert np.abs(np.array(found["length_m"]["mean"]) - truth).mean() < 1.5e-3
-    assert said["observability"]["of"] == 7
-    assert len(said["next_positions_m"]) == 5
+    assert content["observability"]["of"] == 7
+    assert len(content["next_positions_m"]) == 5
     assert main(["report", str(out)]) == 0
     page = (out / "report.html").read_text()
     assert f"{1e3 * found['length_m']['mean'][2]:.2f}" in page
@@ -243,9 +243,9 @@ def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(
         assert main(arguments) == 0
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("not converged with the creep model")
-    said = json.loads((out / "calibrate.json").read_text())
-    assert not said["with_creep_model"]["converged"]
-    assert said["joint_values_for_home_m"] is None and said["pose_now"] is None
+    content = json.loads((out / "calibrate.json").read_text())
+    assert not content["with_creep_model"]["converged"]
+    assert content["joint_values_for_home_m"] is None and content["pose_now"] is None
     assert main(["report", str(out)]) == 0
     page = (out / "report.html").read_text()
     assert "Not converged" in page and "Joint values that bring" not in page
@@ -261,7 +261,7 @@ def test_the_documented_session_is_one():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("hold,", "holds,", "line 1"),
         (",30.0,", ",-30.0,", "line 2, column duration_s"),
@@ -271,7 +271,7 @@ def test_the_documented_session_is_one():
         ("\n1,", "\n\nx,", "line 3, column hold"),  # an empty line counts
     ],
 )
-def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, said):
+def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, message):
     file, _ = session_csv
     text = file.read_text()
     assert old in text
@@ -280,12 +280,12 @@ def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, ca
     assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 2
     line = capsys.readouterr().err.strip()
     assert "session.csv" in line
-    assert said in line
+    assert message in line
     assert "\n" not in line
     assert not out.exists()
 
 
-def test_a_bias_is_estimated_when_asked_for_and_its_sign_may_follow_the_motion(fitted, session_csv, tmp_path, capsys):
+def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitted, session_csv, tmp_path, capsys):
     file, _ = session_csv
     lines = [line.split(",") for line in file.read_text().splitlines()]
     legs = 7
@@ -302,9 +302,9 @@ def test_a_bias_is_estimated_when_asked_for_and_its_sign_may_follow_the_motion(f
     assert main([*arguments, "--tension-bias", "-1", "--output", str(tmp_path / "o")]) == 2
     out = tmp_path / "out"
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(out)]) == 0
-    said = json.loads((out / "calibrate.json").read_text())
-    assert said["prior"]["tension_bias_sd_N"] == 0.2 and said["prior"]["tension_bias_sign"] == "motion"
-    bias = said["with_creep_model"]["tension_bias_N"]
+    content = json.loads((out / "calibrate.json").read_text())
+    assert content["prior"]["tension_bias_sd_N"] == 0.2 and content["prior"]["tension_bias_sign"] == "motion"
+    bias = content["with_creep_model"]["tension_bias_N"]
     assert abs(bias["mean"][0] - 0.3) < 2 * bias["sd"][0] < 0.4
     assert main(["report", str(out)]) == 0
     assert "By how much each tension sensor reads too high." in (out / "report.html").read_text()
@@ -365,7 +365,7 @@ def test_the_exported_model_settles_at_home_in_mujoco(fitted, tmp_path):
     assert np.abs(data.qacc).max() < 1e-6
 
 
-def test_the_command_maps_the_slices_asked_for(fitted, tmp_path):
+def test_the_command_maps_the_requested_slices(fitted, tmp_path):
     import csv
 
     import wirebayes as wb

@@ -104,7 +104,7 @@ def test_drift_agrees_with_a_stiff_integrator_at_every_time(kind):
 
 
 @pytest.mark.parametrize(("kind", "seed"), TOP_HEAVY[:1])
-def test_falls_are_found_at_their_time_and_told(kind, seed):
+def test_falls_are_found_at_their_time_and_reported(kind, seed):
     d = _top_heavy(kind, seed)
     off, spun, ours, theirs = _drift(d)
     assert ours == pytest.approx(theirs, rel=0.02)
@@ -116,8 +116,8 @@ def test_falls_are_found_at_their_time_and_told(kind, seed):
     report = stability.summary(course)
     assert report["fall_probability"] == 1.0
     assert report["fall_time_s"]["first"] == ours
-    said = stability.warnings(course, 0.0)
-    assert "falls in 100 % of the draws" in said[0]
+    warnings = stability.warnings(course, 0.0)
+    assert "falls in 100 % of the draws" in warnings[0]
 
 
 def test_early_times_do_not_depend_on_later_ones():

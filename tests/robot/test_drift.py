@@ -187,8 +187,8 @@ def test_bench_quantities_never_enter():
     assert wires.effects == ()
 
 
-def test_uses_outside_the_tested_range_are_told():
+def test_uses_outside_the_tested_range_cause_warnings():
     line = replace(_line(), tension_range_N=(1.0, 5.0), time_range_s=(0.0, 120.0))
-    said = draws.warnings(schema.read("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
-    assert len(said) == 3
+    message = draws.warnings(schema.read("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
+    assert len(message) == 3
     assert draws.warnings(schema.read("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []

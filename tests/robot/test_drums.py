@@ -85,8 +85,8 @@ def test_motor_angles_lead_to_the_pose_and_back():
     content = answer(short, line, PoseRequest(x[0], R[0], np.array([0.0, 60.0]))).content
     np.testing.assert_allclose(content["inverse"]["motor_angle_rad"]["mean"][1:], angle.mean(0)[1:])
     np.testing.assert_allclose(content["inverse"]["wire_per_motor_angle_m_rad"]["mean"][1:], paid.mean(0)[1:])
-    said = [warning for warning in content["warnings"] if "wire_length_m" in warning]
-    assert said == ["wire 1 is longer here than its drum's wire_length_m, 1 m"]
+    message = [warning for warning in content["warnings"] if "wire_length_m" in warning]
+    assert message == ["wire 1 is longer here than its drum's wire_length_m, 1 m"]
     big = claim.scaled(robot, 2.0, robot.mass_kg)
     np.testing.assert_allclose(drums.motor_angle(big.drums, 2 * commands.joint_m), angle)
 
@@ -110,7 +110,7 @@ def test_a_session_may_give_motor_angles(tmp_path):
         session_file.read(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
 
 
-def test_the_firmware_is_told_of_the_drums():
+def test_the_firmware_files_describe_the_drums():
     robot, line = _with_drums("hangprinter-4"), _line(20)
     text = files.reprapfirmware(robot, line)
     shown = next(row for row in text.splitlines() if row.startswith("M666 R"))

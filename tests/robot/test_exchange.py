@@ -158,8 +158,8 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
     assert "WireX writes 0.1 m where none was set" in got.source
     bare = schema.read(import_robot(file, tmp_path / "bare.toml", pulleys=False, **beside))
     assert bare.pulleys is None
-    for missing, said in (("tension", "--tension LOWEST,HIGHEST"), ("position", "--position X,Y,Z")):
-        with pytest.raises(InputError, match=said):
+    for missing, message in (("tension", "--tension LOWEST,HIGHEST"), ("position", "--position X,Y,Z")):
+        with pytest.raises(InputError, match=message):
             import_robot(file, tmp_path / "no.toml", **{k: v for k, v in beside.items() if k != missing})
     with pytest.raises(InputError, match="expected 0 <= LOWEST < HIGHEST"):
         import_robot(file, tmp_path / "no.toml", tension="5,1", position="0,0,0")
@@ -167,7 +167,7 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("file", "old", "new", "said"),
+    ("file", "old", "new", "message"),
     [
         ("bodies", "<mass>", "<mass>x", "line 8: <mass>: found 'x"),
         ("bodies", "</mass>", "", "mismatched tag"),
@@ -188,7 +188,7 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
         ("cables", "<attachment><link>0", "<screw_base_rotating_pulley/><attachment><link>0", "found 3 attachments"),
     ],
 )  # fmt: skip
-def test_mistakes_name_file_and_line(file, old, new, said, tmp_path, capsys):
+def test_mistakes_name_file_and_line(file, old, new, message, tmp_path, capsys):
     bodies = _caspr(tmp_path, schema.read("cogiro"))
     broken = tmp_path / f"toy_{file}.xml"
     text = broken.read_text()
@@ -200,7 +200,7 @@ def test_mistakes_name_file_and_line(file, old, new, said, tmp_path, capsys):
     broken.write_text(text[:at] + replaced)
     assert main(["import-robot", str(bodies), "--output", str(tmp_path / "out.toml")]) == 2
     line = capsys.readouterr().err.strip()
-    assert f"toy_{file}.xml" in line and said in line and "\n" not in line
+    assert f"toy_{file}.xml" in line and message in line and "\n" not in line
     assert not (tmp_path / "out.toml").exists()
 
 
@@ -211,7 +211,7 @@ def test_files_that_do_not_belong_together_are_refused(tmp_path):
     (tmp_path / "old.xml").write_text("<models><wireRobot/></models>")
     (tmp_path / "deep.xml").write_text("<a>" * 500 + "</a>" * 500)
     (tmp_path / "alone_cables.xml").write_text((tmp_path / "toy_cables.xml").read_text())
-    for files, said in (
+    for files, message in (
         ([bodies, bodies], "a second file of this kind"),
         ([bodies, wirex], "the file of WireX alone"),
         ([tmp_path / "old.xml"], "the format before 0.32"),
@@ -219,7 +219,7 @@ def test_files_that_do_not_belong_together_are_refused(tmp_path):
         ([tmp_path / "alone_cables.xml"], "expected a file with the bodies too"),
         ([tmp_path / "absent.xml"], "found no such file"),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=message):
             import_robot(files, out)
     assert not out.exists()
 
@@ -228,10 +228,10 @@ def test_the_command_says_what_it_took_and_what_is_ours(tmp_path, capsys):
     bodies = _caspr(tmp_path, schema.read("cogiro"))
     out = tmp_path / "cogiro.toml"
     assert main(["import-robot", str(bodies), "--output", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert f"Written: {out}: 8 wires, 91.058 kg" in said
-    assert "Ours: the choice of tensions, the workspace, beyond_exit_m." in said
-    assert f"Next: wirebayes pose {out}" in said
+    message = capsys.readouterr().out
+    assert f"Written: {out}: 8 wires, 91.058 kg" in message
+    assert "Ours: the choice of tensions, the workspace, beyond_exit_m." in message
+    assert f"Next: wirebayes pose {out}" in message
 
 
 def test_a_pose_that_nothing_holds_is_said(tmp_path, capsys):

@@ -50,20 +50,20 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
     arguments = ["pose", "cogiro-desk", "--wires", str(fitted[effect]), "--other-fit", str(fitted["plain"])]
     arguments += ["--output", str(out), "--times", "0,60", "--draws", "50"]
     assert main([*arguments, *(["--own-effects", str(own)] if own else [])]) == 0
-    said = json.loads((out / "pose.json").read_text())
-    assert said["wires"]["effects"] == [effect]
+    message = json.loads((out / "pose.json").read_text())
+    assert message["wires"]["effects"] == [effect]
     robot = schema.read("cogiro-desk")
     points = robot.platform_m @ rotation.matrix(robot.home_rotation_rad).T
     stretched = np.linalg.norm(robot.home_m + points - robot.exit_m, axis=1) + robot.beyond_m
     sample = store.load(fitted[effect], own_effects=own).draws
     pick = np.linspace(0, len(sample["k1"]) - 1, 50).round().astype(int)
     k1, amplitude = sample["k1"][pick, None], sample[f"{effect}.{column}"][pick, None]
-    zero = stretched / (1 + strain(np.array(said["inverse"]["tension_N"]) / k1, amplitude))
-    np.testing.assert_allclose(said["inverse"]["zero_tension_length_m"]["mean"], zero.mean(0), rtol=1e-12)
-    assert said["forward"]["solved"] == 1.0
-    named = {row["controller"] for row in said["pose_error"]}
+    zero = stretched / (1 + strain(np.array(message["inverse"]["tension_N"]) / k1, amplitude))
+    np.testing.assert_allclose(message["inverse"]["zero_tension_length_m"]["mean"], zero.mean(0), rtol=1e-12)
+    assert message["forward"]["solved"] == 1.0
+    named = {row["controller"] for row in message["pose_error"]}
     assert named == {"hooke_only", "creep_aware", "creep_aware_other_fit"}
-    assert f"{effect}.{column}" in said["variance_shares"]["shared_draw"]
+    assert f"{effect}.{column}" in message["variance_shares"]["shared_draw"]
 
 
 @pytest.mark.parametrize("command", [["pose", "linear-6"], ["export", "hangprinter-4"]])

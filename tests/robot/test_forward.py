@@ -122,7 +122,7 @@ def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
     assert found.residual_N[0] < 1e-6
 
 
-def test_several_equilibria_are_found_told_apart_and_ordered():
+def test_several_equilibria_are_found_distinguished_and_ordered():
     robot = schema.read("cogiro-desk")
     c = cases.commanded(robot, "hooke", 1, np.random.default_rng(8))
     every = forward.equilibria(robot, c.wires, c.zero_m[0], c.offset_m[0], np.random.default_rng(0))

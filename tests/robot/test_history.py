@@ -30,7 +30,7 @@ def _line(n, sd=0.05, seed=0):
     return draws.WireDraws({k: v * np.exp(sd * rng.standard_normal(n)) for k, v in CORE.items()}, 1000.0)
 
 
-def _told(robot, times, position, holds=None, payload=None):
+def _joint_values_for(robot, times, position, holds=None, payload=None):
     """Joint values of a controller that knows the mean wire and no creep, moving evenly between the times."""
     mean = {k: np.array([[v]]) for k, v in CORE.items()}
     wires = uncreeping(draws.for_robot(robot, draws.WireDraws({k: v[0] for k, v in mean.items()}, 1000.0)))
@@ -106,7 +106,7 @@ def _places(robot):
 def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
     robot = schema.read(name)
     payload = 0.1 * robot.mass_kg * np.array([0, 0, 0, 1, 1, 0.0])
-    history = _told(robot, TIMES, _places(robot), HOLDS, payload)
+    history = _joint_values_for(robot, TIMES, _places(robot), HOLDS, payload)
     known = unknowns(robot, _line(2), Uncertain(2e-3, 0.05), np.random.default_rng(1))
     wires, error = known.columns(known.draws)
     starts = clock_starts(history, np.ones((6, robot.legs)))
@@ -122,7 +122,7 @@ def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
 
 def test_bands_cover_the_truth_and_readings_narrow_them():
     robot = schema.read("cogiro-desk")
-    history = _told(robot, TIMES, _places(robot), HOLDS)
+    history = _joint_values_for(robot, TIMES, _places(robot), HOLDS)
     errors, start = Uncertain(1e-3, 0.05, 0.02, 5e-4), (robot.home_m, np.eye(3))
     line = _line(80)
     blind = estimate(robot, line, history, start, errors, np.random.default_rng(2))
@@ -150,7 +150,7 @@ def test_bands_cover_the_truth_and_readings_narrow_them():
 
 def test_corrected_joint_values_bring_the_platform_back():
     robot = schema.read("linear-7")
-    history = _told(robot, TIMES, _places(robot))
+    history = _joint_values_for(robot, TIMES, _places(robot))
     found = estimate(robot, _line(40), history, (robot.home_m, np.eye(3)), Uncertain(1e-3), np.random.default_rng(0))
     to = corrections.target(robot, history, found)
     np.testing.assert_allclose(to.position_m, _places(robot), atol=2e-4)  # nothing creeps there: about what was told
@@ -168,7 +168,7 @@ def test_clocks_start_with_a_change_of_load_and_not_with_small_corrections():
     up = robot.home_m + np.array([0, 0, 1e-4])
     lift = robot.home_m + np.array([0.3, 0.2, 0.0])
     places = [robot.home_m, up, robot.home_m, lift, lift, lift]
-    history = _told(robot, TIMES, places, payload=[0, 0, 0, 0, 0, 1.0])
+    history = _joint_values_for(robot, TIMES, places, payload=[0, 0, 0, 0, 0, 1.0])
     plain = uncreeping(draws.for_robot(robot, _line(1)))
     track = follow(robot, plain, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
     starts = clock_starts(history, track.tension_N[0])
@@ -181,7 +181,7 @@ def test_clocks_start_with_a_change_of_load_and_not_with_small_corrections():
 
 
 def test_when_clocks_start_does_not_depend_on_the_sampling():
-    few = replace(_told(schema.read("hangprinter-4"), [0, 100], np.tile([0, 0, 1.0], (2, 1))))
+    few = replace(_joint_values_for(schema.read("hangprinter-4"), [0, 100], np.tile([0, 0, 1.0], (2, 1))))
     tension = np.array([[2.0, 3.0, 1.0], [4.0, 2.5, 1.5]])
     starts = clock_starts(few, tension)
     times = np.linspace(0, 100, 7)
@@ -200,7 +200,7 @@ def test_commanded_poses_need_no_rows_between():
     tables = {n: [np.interp(t, ends[:, 0], c) for c in ends.T] for n, t in (("few", ends[:, 0]), ("many", times))}
     drifts = {}
     for name, columns in tables.items():
-        history = _told(robot, columns[0], np.stack(columns[1:], 1))
+        history = _joint_values_for(robot, columns[0], np.stack(columns[1:], 1))
         history = replace(history, joint_m=None, position_m=np.stack(columns[1:], 1),
                           rotation=np.tile(np.eye(3), (len(columns[0]), 1, 1)))  # fmt: skip
         found, joint = commanded.drift(robot, _line(3), history, Uncertain(), np.random.default_rng(0))
@@ -282,22 +282,22 @@ def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, lea
 
 def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsys):  # noqa: F811
     robot = schema.read("hangprinter-4")
-    history = _told(robot, TIMES[:2], _places(robot)[:2])
+    history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     rows = [[t, *j, *tau] for t, j, tau in zip(TIMES, history.joint_m, [[1.14, 1.07, 1.1, 5.28]] * 2, strict=False)]
     head = [f"{kind}_{i}_{unit}" for kind, unit in (("joint", "m"), ("tension", "N")) for i in range(1, 5)]
     table_of = [["time_s", *head], *rows]
     (tmp_path / "log.csv").write_text("\n".join(",".join(map(str, row)) for row in table_of) + "\n")
     arguments = ["pose", "hangprinter-4", "--wires", str(fitted), "--joints", str(tmp_path / "log.csv")]
     assert main([*arguments, "--draws", "20", "--output", str(tmp_path / "out")]) == 0
-    said = json.loads((tmp_path / "out" / "pose.json").read_text())
-    assert 0 < said["readings"]["effective_draws"] <= 20
-    assert any("of 20 draws agree with the readings" in warning for warning in said["warnings"])
+    content = json.loads((tmp_path / "out" / "pose.json").read_text())
+    assert 0 < content["readings"]["effective_draws"] <= 20
+    assert any("of 20 draws agree with the readings" in warning for warning in content["warnings"])
     assert "independent ones" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
     robot = schema.read("hangprinter-4")
-    history = _told(robot, TIMES[:2], _places(robot)[:2])
+    history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     read = replace(history, tension_N=np.array([[1.14, 1.07, 1.1, 5.28]] * 2))
     arguments = ((robot.home_m, np.eye(3)), Uncertain(1e-3))
     blind = estimate(robot, _line(12), history, *arguments, np.random.default_rng(0))
@@ -330,7 +330,7 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("", "line 1: found nothing; expected the header time_s,joint_1_m"),
         (HEAD.replace("joint_4", "joint_5") + "\n", "line 1: found the column 'joint_5_m'"),
@@ -346,17 +346,17 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
         (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5'; expected a whole number"),
     ],
 )
-def test_a_mistake_in_a_history_is_named_by_line_and_column(text, said):
+def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
     robot = schema.read("hangprinter-4")
     with pytest.raises(InputError) as caught:
         table.parse("log.csv", text, robot, table.measured)
-    assert str(caught.value).startswith(f"log.csv: {said}")
+    assert str(caught.value).startswith(f"log.csv: {message}")
     assert "\n" not in str(caught.value)
 
 
 def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  # noqa: F811
     robot = schema.read("hangprinter-4")
-    history = _told(robot, TIMES, _places(robot))
+    history = _joint_values_for(robot, TIMES, _places(robot))
     with open(tmp_path / "log.csv", "w") as file:
         writer = csv.writer(file)
         legs = range(1, 5)
@@ -373,11 +373,11 @@ def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  
         assert "after" in shown.out
         for name in ("pose.json", "poses.csv", "corrections.csv", "motion.svg"):
             assert (outs[0] / name).read_bytes() == (outs[1] / name).read_bytes()
-        said = json.loads((outs[0] / "pose.json").read_text())
+        content = json.loads((outs[0] / "pose.json").read_text())
         rows = list(csv.DictReader((outs[0] / "poses.csv").read_text().splitlines()))
-        assert len(rows) == said["history"]["rows"]
+        assert len(rows) == content["history"]["rows"]
         assert float(rows[-1]["distance_q05_mm"]) < float(rows[-1]["distance_q95_mm"])
-        assert said["drift"][0]["distance_mm"]["q50"][-1] == pytest.approx(float(rows[-1]["distance_q50_mm"]))
+        assert content["drift"][0]["distance_mm"]["q50"][-1] == pytest.approx(float(rows[-1]["distance_q50_mm"]))
         page = (outs[0] / "report.html").read_text()
         assert "data:image/svg+xml" in page
         assert "<td>" in page
@@ -388,10 +388,10 @@ def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  
         (["--joints", str(tmp_path / "log.csv"), "--times", "0,9"], "--times"),
         (["--payload", "-1"], "--payload: found -1; expected kilograms, 0 or more"),
     ]
-    for options, said in refused:
+    for options, message in refused:
         assert main([*both, *options, "--output", str(tmp_path / "no")]) == 2
         line = capsys.readouterr().err.strip()
-        assert said in line
+        assert message in line
         assert "\n" not in line
         assert not (tmp_path / "no").exists()
 
@@ -406,7 +406,7 @@ def test_a_trajectory_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys)
 
 def test_readings_are_predicted_in_the_order_of_the_sensors():
     robot = schema.read("linear-7")
-    history = _told(robot, TIMES[:2], _places(robot)[:2])
+    history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     wires = draws.for_robot(robot, _line(2))
     track = follow(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
     h = predicted(track)

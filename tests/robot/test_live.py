@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.robot.test_history import _line, _places, _told
+from tests.robot.test_history import _joint_values_for, _line, _places
 from wirebayes.robot.history.estimate import estimate
 from wirebayes.robot.history.follow import clock_starts, follow
 from wirebayes.robot.history.history import History
@@ -20,7 +20,7 @@ TIMES = np.array([0, 60, 70, 400, 420, 900, 930, 2000, 2030, 3600.0])
 
 def _history(robot):
     a, _, b, _, c, _ = _places(robot)
-    return _told(robot, TIMES, [a, a, b, b, c, c, b, b, a, a])
+    return _joint_values_for(robot, TIMES, [a, a, b, b, c, c, b, b, a, a])
 
 
 def _run(live, history, **more):
@@ -77,7 +77,7 @@ def test_joint_values_that_are_sent_back_bring_the_platform_back():
     robot = schema.read("linear-7")
     line = _line(24)
     live = LiveEstimator(robot, line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    nominal = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     joint = nominal
     for time in np.arange(0, 600.0, 5.0):
         now = live.step(time, joint, nominal_m=nominal)
@@ -94,7 +94,7 @@ def test_joint_values_that_are_sent_back_bring_the_platform_back():
 def test_a_long_step_is_as_good_as_short_ones():
     robot = schema.read("cogiro-desk")
     ends = []
-    joint = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     for times in ([0.0, 600.0], np.arange(0, 601.0, 2.0)):
         live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
         for time in times:
@@ -104,10 +104,10 @@ def test_a_long_step_is_as_good_as_short_ones():
     assert np.linalg.norm(ends[0] - ends[1]) < 0.005 * drift
 
 
-def test_a_payload_that_is_told_starts_the_clocks_and_lowers_the_platform():
+def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
     robot = schema.read("cogiro-desk")
     live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    joint = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     before = live.step(0.0, joint)
     live.load(0.5 * robot.mass_kg)
     after = live.step(1.0, joint)
@@ -122,7 +122,7 @@ def test_a_payload_that_is_told_starts_the_clocks_and_lowers_the_platform():
 def test_time_goes_on_and_readings_are_asked_for():
     robot = schema.read("cogiro-desk")
     live = LiveEstimator(robot, _line(2), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    joint = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     live.step(1.0, joint)
     with pytest.raises(ValueError, match="found 1 after 1, expected a later time"):
         live.step(1.0, joint)
@@ -137,7 +137,7 @@ def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
     spec.loader.exec_module(sample)
     robot = schema.read("hangprinter-4")
     live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    nominal = _told(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     now, sent = [0.0], []
     made = sample.correct(
         live, lambda: nominal, sent.append, 0.1, lambda: now[0], lambda s: now.__setitem__(0, now[0] + s)

@@ -69,7 +69,7 @@ def holding(tension: float, stiffness: float) -> Course:
 
 
 @pytest.mark.parametrize(
-    ("tension", "stiffness", "said"),
+    ("tension", "stiffness", "words"),
     [
         (0.21, 0.31, []),
         (0.2, 0.3, []),
@@ -79,10 +79,10 @@ def holding(tension: float, stiffness: float) -> Course:
     ],
 )
 def test_a_platform_that_holds_is_warned_of_when_it_comes_near_to_a_fall(
-    tension: float, stiffness: float, said: list[str]
+    tension: float, stiffness: float, words: list[str]
 ) -> None:
     """Below a fifth of a wire's tension, or three tenths of the stiffness."""
-    assert stability.warnings(holding(tension, stiffness), 0.0) == said
+    assert stability.warnings(holding(tension, stiffness), 0.0) == words
     found = stability.summary(holding(tension, stiffness))
     assert found["caught_probability"] is None and found["fall_time_s"] is None and found["fall_probability"] == 0.0
 
@@ -95,10 +95,12 @@ def test_where_no_draw_begins_there_is_nothing_more_to_say() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "said"), [(1.0, "100 %"), (0.996, "nearly all"), (0.99, "99 %"), (0.995, "nearly all"), (0.123, "12.3 %")]
+    ("share", "words"),
+    [(1.0, "100 %"), (0.996, "nearly all"), (0.99, "99 %"), (0.995, "nearly all"), (0.123, "12.3 %")],
+    [(1.0, "100 %"), (0.996, "nearly all"), (0.99, "99 %"), (0.995, "nearly all"), (0.123, "12.3 %")],
 )
-def test_nearly_all_is_not_all(share: float, said: str) -> None:
-    assert stability._percent(share) == said
+def test_nearly_all_is_not_all(share: float, words: str) -> None:
+    assert stability._percent(share) == words
 
 
 def test_a_time_within_tolerance_is_the_last_one_where_it_holds_the_probability() -> None:
@@ -219,8 +221,8 @@ def test_a_controller_without_creep_is_off_by_the_drift_of_its_command(hung: Any
 
 def test_draws_too_weak_for_the_pose_are_a_warning() -> None:
     commands: Any = SimpleNamespace(feasible=np.array([True, True, True, False]))
-    (said,) = answer._weak(commands)
-    assert said == "25 % of the draws cannot pull as hard as the pose requires, however far stretched"
+    (words,) = answer._weak(commands)
+    assert words == "25 % of the draws cannot pull as hard as the pose requires, however far stretched"
     assert answer._weak(SimpleNamespace(feasible=np.ones(4, bool))) == []  # type: ignore[arg-type]
 
 

@@ -103,10 +103,10 @@ def test_every_mistake_names_file_and_key_in_one_line(tmp_path, old, new, key):
     assert old in GOOD
     with pytest.raises(InputError) as caught:
         _read(tmp_path, GOOD.replace(old, new, 1))
-    said = str(caught.value)
-    assert "\n" not in said
-    assert "robot.toml" in said
-    assert f" {key}" in said
+    message = str(caught.value)
+    assert "\n" not in message
+    assert "robot.toml" in message
+    assert f" {key}" in message
 
 
 def test_a_pulley_is_read_and_its_axis_has_unit_length(tmp_path):

@@ -88,8 +88,8 @@ def test_the_tested_ranges_are_each_lines_own():
     robot = _mixed(schema.read("linear-6"), (1, 4))
     stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
     line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
-    said = draws.warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
-    assert said == ["wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N"]
+    message = draws.warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
+    assert message == ["wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N"]
 
 
 DECLARED = "[wires.thick]\nfitted = true\nmass_kg_m = 0.02\n[wires.default]\nmass_kg_m = 0.0001\n"
@@ -115,9 +115,9 @@ def test_commands_take_a_posterior_for_each_name(fitted, tmp_path, capsys):  # n
     assert "\n" not in line
     assert not out.exists()
     assert main([*arguments, "--wires", f"default={fitted}", "--wires", f"thick={fitted}"]) == 0
-    said = json.loads((out / "pose.json").read_text())
-    assert said["wires"]["lines"] == ["default", "thick"]
-    assert any("wire 1 weighs" in warning for warning in said["warnings"])
+    message = json.loads((out / "pose.json").read_text())
+    assert message["wires"]["lines"] == ["default", "thick"]
+    assert any("wire 1 weighs" in warning for warning in message["warnings"])
     assert main([*arguments, *(f"--wires={name}={fitted}" for name in ("default", "thick", "thin"))]) == 2
     assert "--wires: found thin, expected one of the legs' wires: default, thick" in capsys.readouterr().err
     assert main([*arguments, "--wires", f"thick={fitted}", "--wires", str(fitted)]) == 2
@@ -175,9 +175,9 @@ def test_commands_take_several_tests_of_one_line(fitted, tmp_path, capsys, monke
     way.write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,0,0,.6\n")
     arguments = ["pose", "linear-6", "--trajectory", str(way), "--draws", "10", "--output", str(tmp_path / "out")]
     assert main([*arguments, "--wires", f"{fitted},{fitted}"]) == 0
-    said = json.loads((tmp_path / "out" / "pose.json").read_text())["wires"]["specimens"]["default"]
-    assert said["tests"] == 2
-    assert 0 < said["spread"]["B"]["q05"] < said["spread"]["B"]["q95"]
+    message = json.loads((tmp_path / "out" / "pose.json").read_text())["wires"]["specimens"]["default"]
+    assert message["tests"] == 2
+    assert 0 < message["spread"]["B"]["q05"] < message["spread"]["B"]["q95"]
     assert "Specimens of default differ as estimated from 2 tests: k1 by" in capsys.readouterr().err
     assert "differ as estimated from 2 tests" in (tmp_path / "out" / "report.html").read_text()
     assert main([*arguments[:-1], str(tmp_path / "no"), "--wires", f"{fitted},"]) == 2

@@ -90,7 +90,7 @@ def test_same_seed_same_bytes_and_another_seed_other_readings(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--parameter", "k=3"], "no such parameter (did you mean k"),
         (["--parameter", "k1"], "expected a finite number"),
@@ -106,9 +106,9 @@ def test_same_seed_same_bytes_and_another_seed_other_readings(tmp_path):
         (["--lengths", "1000,1000"], "expected different lengths"),
     ],
 )
-def test_wrong_options_are_said_and_nothing_is_written(options, said, tmp_path, capsys):
+def test_wrong_options_are_said_and_nothing_is_written(options, message, tmp_path, capsys):
     assert main(["simulate", "--output", str(tmp_path / "out"), *options]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

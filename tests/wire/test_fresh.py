@@ -256,6 +256,6 @@ def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
 
     given = WireDraws({name: np.array([PLAIN[name]]) for name in ("k1", "B", "U", "k2", "N")}, 1000.0,
                       effects=(Settling(), named("thermal_expansion")))  # fmt: skip
-    said = warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
-    assert any("settling has no place in the robot" in text for text in said)
-    assert any("knows no temperature: the effect thermal_expansion" in text for text in said)
+    lines = warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
+    assert any("settling has no place in the robot" in text for text in lines)
+    assert any("knows no temperature: the effect thermal_expansion" in text for text in lines)

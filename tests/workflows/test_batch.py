@@ -186,10 +186,10 @@ def test_files_are_read_before_any_work(experiment_file, tmp_path, capsys):
     bad = tmp_path / "bad.toml"
     bad.write_text(good.read_text().replace("1000.0", "-1"))
     assert main(["batch", str(good), str(bad), str(tmp_path / "none.toml"), "--output", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert f"{bad}, line 4, experiment wire-a, key length_mm: found -1" in said
-    assert "none.toml: " in said
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert f"{bad}, line 4, experiment wire-a, key length_mm: found -1" in message
+    assert "none.toml: " in message
+    assert message.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -328,7 +328,7 @@ def test_a_scheduler_that_is_not_there_is_a_mistake(experiment_file, tmp_path, c
     monkeypatch.setattr("wirebayes.workers._PATIENCE_S", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         assert main(["batch", str(experiment_file()), "--scheduler", address, "--output", str(tmp_path / "out")]) == 2
-        said = capsys.readouterr().err
-        assert said.startswith(f"--scheduler {address}: found no Dask scheduler there")
-        assert said.count("\n") == 1
+        message = capsys.readouterr().err
+        assert message.startswith(f"--scheduler {address}: found no Dask scheduler there")
+        assert message.count("\n") == 1
     assert not (tmp_path / "out").exists()

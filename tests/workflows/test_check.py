@@ -45,7 +45,7 @@ def test_check_says_what_was_understood(start, tmp_path, capsys):
     assert main(["check", str(start), "--output", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""
-    for said in (
+    for message in (
         "8 holds, 40 readings in 16 min",
         "0.5 mm",
         "1.08 to 0.78 N",
@@ -54,7 +54,7 @@ def test_check_says_what_was_understood(start, tmp_path, capsys):
         "nothing suspicious",
         "Next: wirebayes fit",
     ):
-        assert said in shown.out
+        assert message in shown.out
     assert max(map(len, shown.out.splitlines())) <= 120
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert names == ["check.json", "complete.json", "configuration.json", "my-wire.svg"]

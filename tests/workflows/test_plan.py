@@ -140,7 +140,7 @@ def test_findings_that_could_not_decide_say_what_to_tell_apart(fitted, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         ({"aim": "fame"}, "--aim: found fame; expected parameters, creep, or two effects"),
         ({"budget_min": 0.0}, "--budget-min"),
@@ -148,8 +148,8 @@ def test_findings_that_could_not_decide_say_what_to_tell_apart(fitted, tmp_path)
         ({"robot": "nobody"}, "nobody"),
     ],
 )
-def test_a_wrong_option_is_named_and_nothing_written(plan_file, tmp_path, options, said):
-    with pytest.raises(wb.InputError, match=said):
+def test_a_wrong_option_is_named_and_nothing_written(plan_file, tmp_path, options, message):
+    with pytest.raises(wb.InputError, match=message):
         wb.plan(plan_file, **options, output=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -150,10 +150,10 @@ def _effects(summary: SummaryJson) -> list[str]:
 
 def _finding(name: str, report: ExperimentFindings) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
-    said = _NAMED.get(verdict, f"{verdict}: {effects}")
+    finding = _NAMED.get(verdict, f"{verdict}: {effects}")
     if verdict == "partial":
-        said = f"{effects} is missing, and something that is not in the catalogue"
-    lines = [f"{name}: {said} (p = {report['p_global']:.2g})"]
+        finding = f"{effects} is missing, and something that is not in the catalogue"
+    lines = [f"{name}: {finding} (p = {report['p_global']:.2g})"]
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
         unit = "" if size["unit"] == "-" else f" {size['unit']}"
@@ -219,11 +219,11 @@ def _checked(name: str, test: CheckedExperiment) -> list[str]:
         begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
         number = "-" if hold["number"] is None else hold["number"]
         lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
-    for teller in ("data", "data and prior", "prior"):
+    for source in ("data", "data and prior", "prior"):
         ranges = [
-            f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == teller
+            f"{p} {_band(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == source
         ]
-        lines += _wrapped(f"parameters from the {teller}", ranges)
+        lines += _wrapped(f"parameters from the {source}", ranges)
     for shows, words in _SHOWS.items():
         effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
         lines += _wrapped(words, [_size(e, found) for e, found in effects])

@@ -16,7 +16,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.check import EffectSize, ParameterRange
 from wirebayes.results.contraction import contraction, source
-from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, taught
+from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, unchanged_prior
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
@@ -60,9 +60,9 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     before = problem.prior.rvs(4000, rng)
     sample = problem.samples[0]
     own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
-    said = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), taught(own, prior)]
+    found = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), unchanged_prior(own, prior)]
     parameters = {name: _range(theta[:, i], before[:, i]) for i, name in enumerate(problem.names)}
-    return Preview(parameters, _effects(block, kinds, rng), [sentence for sentence in said if sentence])
+    return Preview(parameters, _effects(block, kinds, rng), [sentence for sentence in found if sentence])
 
 
 def _range(draws: Array, before: Array) -> ParameterRange:

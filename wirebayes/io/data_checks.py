@@ -87,8 +87,8 @@ def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list
         Sentences: what, where, what to change; empty for readings as a bench gives them.
     """
     readings = Readings(protocol, tension_N, resolution_N)
-    said = (check(readings) for check in CHECKS)
-    return [sentence for sentence in said if sentence]
+    found = (check(readings) for check in CHECKS)
+    return [sentence for sentence in found if sentence]
 
 
 def of_experiments(experiments: list[Experiment]) -> list[str]:

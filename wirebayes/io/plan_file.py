@@ -173,15 +173,15 @@ def _displacements(keys: Keys, length: float) -> list[float]:
         for other in ("step_mm", "holds"):
             if other in keys.table:
                 raise keys.complain(other, f"{other} beside displacements_mm", "one way to say it")
-        path, said = _numbers(keys, "displacements_mm", expected), "displacements_mm"
+        path, key = _numbers(keys, "displacements_mm", expected), "displacements_mm"
     else:
         step = keys.number("step_mm", "a step other than 0 mm, or displacements_mm")
         if step == 0:
             raise keys.complain("step_mm", "0", "a step other than 0 mm")
         count = _whole(keys, "holds", "a whole number of holds, 2 or more", LEAST_HOLDS, MOST_READINGS)
-        path, said = [step * (i + 1) for i in range(count)], "step_mm"
+        path, key = [step * (i + 1) for i in range(count)], "step_mm"
     if not path or min(path) <= -length or max(path) > STRETCH * length:
-        raise keys.complain(said, shown(keys.table[said]), expected)
+        raise keys.complain(key, shown(keys.table[key]), expected)
     return path
 
 

@@ -163,12 +163,12 @@ def read_toml(source: Path, text: str) -> dict[str, Any]:
         depth = [line.count("[") + line.count("{") for line in text.split("\n")]
         place, found = f"line {int(np.argmax(depth)) + 1}", "values nested too deeply"
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        said = re.fullmatch(r"(.*?) \((?:at line (\d+), column (\d+)|at end of document)\)", str(error), re.DOTALL)
-        if said and said[2]:
-            place, found = f"line {said[2]}, column {said[3]}", f"a TOML error ({_lower(said[1])})"
-        elif said:
+        at = re.fullmatch(r"(.*?) \((?:at line (\d+), column (\d+)|at end of document)\)", str(error), re.DOTALL)
+        if at and at[2]:
+            place, found = f"line {at[2]}, column {at[3]}", f"a TOML error ({_lower(at[1])})"
+        elif at:
             lines = text.rstrip().split("\n")
-            place, found = f"line {len(lines)}, column {len(lines[-1]) + 1}", f"the end of the file ({_lower(said[1])})"
+            place, found = f"line {len(lines)}, column {len(lines[-1]) + 1}", f"the end of the file ({_lower(at[1])})"
         else:
             longest = max(re.finditer(r"\d+", text), key=lambda run: len(run[0]))
             before = text[: longest.start()].split("\n")

@@ -26,8 +26,14 @@ class Derived(TypedDict):
     stiffness_N: Statistics | None
 
 
-class Identifiability(TypedDict):
-    """What the data taught about one parameter; `results.identifiability.Taught` says what each value is."""
+class IdentifiabilityFigures(TypedDict):
+    """How far the data determine one parameter.
+
+    `contraction` is 1 - posterior variance / prior variance (of the logarithm, for a positive parameter). The ranges
+    are widths of the central 90 %: a factor for a positive parameter, else a difference. The sensitivities are those of
+    its posterior to its own prior and to the likelihood. `ridges` has the parameters that it is correlated with, and
+    the correlation.
+    """
 
     contraction: float
     prior_range_90: float
@@ -36,6 +42,11 @@ class Identifiability(TypedDict):
     prior_sensitivity: float
     likelihood_sensitivity: float
     ridges: dict[str, float]
+
+
+class Identifiability(IdentifiabilityFigures):
+    """The same with a sentence."""
+
     sentence: str
 
 

@@ -78,8 +78,8 @@ def from_tables(
         found = from_table(f"{source}, line {lines[name]}: guess.{name}", table)
         fixed = isinstance(found, float)
         out[name] = np.full(n, found) if fixed else np.asarray(found.rvs(n, random_state=rng))
-    said = ", ".join(tables) if tables else "nothing"
-    return GuessedWire(out, length_mm, f"the plan's guess ({said} given, the rest as wide as the model's prior)")
+    given = ", ".join(tables) if tables else "nothing"
+    return GuessedWire(out, length_mm, f"the plan's guess ({given} given, the rest as wide as the model's prior)")
 
 
 def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n: int) -> GuessedWire:

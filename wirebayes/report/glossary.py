@@ -82,12 +82,12 @@ def meaning(
     """
     blocks: list[Block] = []
     if model:
-        symbols = [(f"{n}{_unit(UNITS[n])}", f"{said}.") for n, said in SYMBOLS.items()]
+        symbols = [(f"{n}{_unit(UNITS[n])}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
         blocks += [Text(_IN_WORDS), Definitions("Symbols", symbols, _LAWS)]
     names = list(dict.fromkeys(effect.split("@")[0].split(".")[0] for effect in effects))
     known = {**CATALOGUE, Discrepancy.name: Discrepancy, **{n: type(e) for n, e in (own or {}).items()}}
-    said = [(spoken(name), _effect(known[name])) for name in names if name in known]
-    blocks += [Definitions("Effects named here", said)] if said else []
+    named = [(spoken(name), _effect(known[name])) for name in names if name in known]
+    blocks += [Definitions("Effects named here", named)] if named else []
     defined = [(term, TERMS[term]) for term in terms]
     blocks += [Definitions("Other words", defined)] if defined else []
     return Section("What the words and symbols mean", blocks)

@@ -13,7 +13,7 @@ from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored
 from wirebayes.report.blocks import Page, View
 
 # who can show a command's results; each module has ``page(folder, configuration)``
-_TELLERS = {
+_PAGES = {
     "reproduce": "wirebayes.report.pages.reproduce",
     "import": "wirebayes.report.pages.check",
     "check": "wirebayes.report.pages.check",
@@ -39,23 +39,23 @@ def write(folder: Path) -> Path:
     """
     path = folder / "report.html"
     with stored_results(folder):
-        content = render(tell(folder))
+        content = render(page_of_folder(folder))
     check_file(path)
     write_text(path, content)
     return path
 
 
-def tell(folder: Path) -> Page:
+def page_of_folder(folder: Path) -> Page:
     """The page of a folder, by the command that wrote it."""
     absent = f"{folder}: found no {CONFIGURATION}, expected a folder of results"
     configuration = read_json(folder / CONFIGURATION, absent)
     command = configuration.get("command") if isinstance(configuration, dict) else None
-    if not isinstance(command, str) or command not in _TELLERS:
-        known = ", ".join(_TELLERS)
+    if not isinstance(command, str) or command not in _PAGES:
+        known = ", ".join(_PAGES)
         raise InputError(f"{folder / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
-    teller: Callable[[Path, dict[str, Any]], Page] = import_module(_TELLERS[command]).page
+    page_of: Callable[[Path, dict[str, Any]], Page] = import_module(_PAGES[command]).page
     with stored_results(folder):
-        return teller(folder, configuration)
+        return page_of(folder, configuration)
 
 
 def render(page: Page) -> str:

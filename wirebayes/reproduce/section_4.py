@@ -88,8 +88,8 @@ def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
         caption = f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace."
         for quantity, figure in maps.items():
             alt = f"Median {quantity} of {MAPPED} on new {wire} within a minute, over its workspace at three heights."
-            said = caption if quantity == "drift" else f"The tilt of {MAPPED} on {wire}, same places."
-            gallery.add("robot-map", f"{quantity}-{wire}", figure, alt, said)
+            under = caption if quantity == "drift" else f"The tilt of {MAPPED} on {wire}, same places."
+            gallery.add("robot-map", f"{quantity}-{wire}", figure, alt, under)
 
 
 def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) -> None:

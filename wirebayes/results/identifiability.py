@@ -14,7 +14,7 @@ import numpy as np
 from arviz_stats.base import array_stats
 
 from wirebayes.inference.fit import Fit
-from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability
+from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
 from wirebayes.model.prior import fast_logpdf
 from wirebayes.results.contraction import contraction, source
 from wirebayes.typing import Array
@@ -27,53 +27,8 @@ _DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 _statistics: Any = array_stats
 
 
-@dataclass(frozen=True)
-class Taught:
-    """What the data taught about one parameter.
-
-    Attributes
-    ----------
-    name : str
-    contraction : float
-        1 - posterior variance / prior variance (of the logarithm, for a positive parameter): 1 all, 0 nothing.
-    prior_range, posterior_range : float
-        Width of the central 90 %: a factor for a positive parameter, else a difference.
-    is_factor : bool
-    prior_sensitivity : float
-        Of its posterior to its own prior.
-    likelihood_sensitivity : float
-    ridges : dict of str to float
-        Parameters it moves together with, and the correlation.
-    """
-
-    name: str
-    contraction: float
-    prior_range: float
-    posterior_range: float
-    is_factor: bool
-    prior_sensitivity: float
-    likelihood_sensitivity: float
-    ridges: dict[str, float]
-
-    @property
-    def sentence(self) -> str:
-        """The same in words."""
-        sign = "×" if self.is_factor else ""
-        ranges = f"its 90 % range is {sign}{self.posterior_range:.3g}, the prior's {sign}{self.prior_range:.3g}"
-        determined_by = source(self.contraction)
-        if determined_by == "prior":
-            verdict = "the data say next to nothing about it, the interval is the prior's"
-        elif self.prior_sensitivity > SENSITIVE or determined_by != "data":
-            verdict = f"data and prior both determine it (sensitivity to the prior {self.prior_sensitivity:.2f})"
-        else:
-            verdict = "the data determine it"
-        with_whom = " and ".join(f"{other} (r = {r:+.2f})" for other, r in self.ridges.items())
-        along = f"; it is correlated with {with_whom}, and their combination is known better" if with_whom else ""
-        return f"{self.name}: {verdict}; {ranges}{along}."
-
-
-def identifiability(fitted: Fit) -> list[Taught]:
-    """What the data taught, parameter by parameter.
+def identifiability(fitted: Fit) -> dict[str, Identifiability]:
+    """How far the data determine each parameter.
 
     Parameters
     ----------
@@ -81,7 +36,7 @@ def identifiability(fitted: Fit) -> list[Taught]:
 
     Returns
     -------
-    list of Taught
+    dict of name to Identifiability
         In the order of the problem's parameters.
     """
     problem = fitted.problem
@@ -93,38 +48,41 @@ def identifiability(fitted: Fit) -> list[Taught]:
     own_prior = log_priors(fitted, theta)
     likelihood = problem.log_likelihood(theta)
     correlation = np.atleast_2d(np.corrcoef(z.T))
-    out = []
+    out: dict[str, Identifiability] = {}
     for i, name in enumerate(names):
         distribution = prior.distributions[name]
         before = distribution.ppf([0.05, 0.95])
         sample = distribution.rvs(size=20000, random_state=np.random.default_rng(0))
         after = np.quantile(theta[:, i], [0.05, 0.95])
         along = [j for j in range(len(names)) if j != i and abs(correlation[i, j]) > RIDGE]
-        out.append(
-            Taught(
-                name=name,
-                contraction=contraction(theta[:, i], sample),
-                prior_range=float(before[1] / before[0] if positive[i] else before[1] - before[0]),
-                posterior_range=float(after[1] / after[0] if positive[i] else after[1] - after[0]),
-                is_factor=bool(positive[i]),
-                prior_sensitivity=sensitivity(z[:, i], own_prior[:, i]),
-                likelihood_sensitivity=sensitivity(z[:, i], likelihood),
-                ridges={names[j]: float(correlation[i, j]) for j in along},
-            )
-        )
+        figures: IdentifiabilityFigures = {
+            "contraction": contraction(theta[:, i], sample),
+            "prior_range_90": float(before[1] / before[0] if positive[i] else before[1] - before[0]),
+            "posterior_range_90": float(after[1] / after[0] if positive[i] else after[1] - after[0]),
+            "range_is_factor": bool(positive[i]),
+            "prior_sensitivity": sensitivity(z[:, i], own_prior[:, i]),
+            "likelihood_sensitivity": sensitivity(z[:, i], likelihood),
+            "ridges": {names[j]: float(correlation[i, j]) for j in along},
+        }
+        out[name] = {**figures, "sentence": in_words(name, figures)}
     return out
 
 
-def to_dict(taught: Sequence[Taught]) -> dict[str, Identifiability]:
-    """The same as plain values, for JSON."""
-    return {
-        t.name: {
-            "contraction": t.contraction, "prior_range_90": t.prior_range, "posterior_range_90": t.posterior_range,
-            "range_is_factor": t.is_factor, "prior_sensitivity": t.prior_sensitivity,
-            "likelihood_sensitivity": t.likelihood_sensitivity, "ridges": t.ridges, "sentence": t.sentence,
-        }
-        for t in taught
-    }  # fmt: skip
+def in_words(name: str, figures: IdentifiabilityFigures) -> str:
+    """A sentence about one parameter."""
+    sign = "×" if figures["range_is_factor"] else ""
+    after, before = figures["posterior_range_90"], figures["prior_range_90"]
+    ranges = f"its 90 % range is {sign}{after:.3g}, the prior's {sign}{before:.3g}"
+    determined_by = source(figures["contraction"])
+    if determined_by == "prior":
+        verdict = "the data say next to nothing about it, the interval is the prior's"
+    elif figures["prior_sensitivity"] > SENSITIVE or determined_by != "data":
+        verdict = f"data and prior both determine it (sensitivity to the prior {figures['prior_sensitivity']:.2f})"
+    else:
+        verdict = "the data determine it"
+    with_whom = " and ".join(f"{other} (r = {r:+.2f})" for other, r in figures["ridges"].items())
+    along = f"; it is correlated with {with_whom}, and their combination is known better" if with_whom else ""
+    return f"{name}: {verdict}; {ranges}{along}."
 
 
 def sensitivity(values: Array, log_component: Array) -> float:

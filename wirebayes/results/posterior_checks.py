@@ -16,7 +16,7 @@ LOOSE_STEPS = 0.5  # setting error over the typical step: the displacements hard
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
 QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer than a load cell resolves
 FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
-TAUGHT = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
+LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
 def warnings(fit: Fit, sample: Sample) -> list[str]:
@@ -36,10 +36,10 @@ def warnings(fit: Fit, sample: Sample) -> list[str]:
     theta = fit.flat
     own = fit.problem.parameters(theta, sample)
     prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
-    said = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), taught(own, prior)]
+    found = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), unchanged_prior(own, prior)]
     readings = sample.readings[..., 0]
     stated = sample.resolution_N
-    return data_checks.warnings(sample.protocol, readings, stated) + [sentence for sentence in said if sentence]
+    return data_checks.warnings(sample.protocol, readings, stated) + [sentence for sentence in found if sentence]
 
 
 def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
@@ -87,14 +87,14 @@ def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     )
 
 
-def taught(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
-    """Readings that taught nothing."""
+def unchanged_prior(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
+    """Readings that leave every interval as the prior has it."""
 
     def width(values: Floats) -> float:
         return float(np.subtract(*np.quantile(values, [0.95, 0.05])))
 
     wire = [name for name in own if name != "sensor_sd" and width(prior[name]) > 0]
     moved = [1.0 - width(own[name]) / width(prior[name]) for name in wire]
-    if not moved or max(moved) > TAUGHT:
+    if not moved or max(moved) > LEAST_SHRINKAGE:
         return ""
     return "the posterior is the prior: these readings say nothing of the wire; was it slack, or held at one place?"

@@ -25,7 +25,7 @@ from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.results import posterior_checks
-from wirebayes.results.identifiability import extrapolation, identifiability, to_dict
+from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.stored_check import check
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
@@ -506,7 +506,7 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
     """What is suspicious about the readings, with the experiment's name where there are several."""
     if sample is not None:
         return posterior_checks.warnings(fit, sample)
-    return [f"{s.name}: {said}" for s in fit.problem.samples for said in posterior_checks.warnings(fit, s)]
+    return [f"{s.name}: {warning}" for s in fit.problem.samples for warning in posterior_checks.warnings(fit, s)]
 
 
 def _summary(fit: Fit, sample: Sample | None, tree: Any) -> SummaryJson:
@@ -532,7 +532,7 @@ def _summary(fit: Fit, sample: Sample | None, tree: Any) -> SummaryJson:
         "warnings": _warnings(fit, sample),
         "parameters": parameters,
         "derived": derived(wire, tension),
-        "identifiability": to_dict(identifiability(fit)),
+        "identifiability": identifiability(fit),
         "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,

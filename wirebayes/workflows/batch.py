@@ -145,7 +145,7 @@ def batch(
         _compute(read, task, place.path, configuration, scheduler, progress or silent)
     with open_run(place.path, configuration) as run:
         rows: list[Row] = [read_json(place.path / e.name / _ROW) for e, _ in read]
-        rows += [_empty(file, said) for file, said in unreadable.items()]
+        rows += [_empty(file, error) for file, error in unreadable.items()]
         _tabulate(rows, outliers(rows), place.path)
         run.finish()
     return Batch(place, own)
@@ -263,12 +263,12 @@ def _store(done: Done, folder: Path) -> None:
     write_json(folder / _ROW, done.row)
 
 
-def _empty(file: str, said: str) -> Row:
+def _empty(file: str, error: str) -> Row:
     """The row of a file that could not be read."""
     return {
         "name": Path(file).stem, "material": None, "file": file, "length_mm": None, "holds": None, "readings": None,
         "converged": None, "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None,
-        "check": None, "warnings": [], "error": said,
+        "check": None, "warnings": [], "error": error,
     }  # fmt: skip
 
 
@@ -276,13 +276,13 @@ def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> N
     """``batch.json``, ``summary.csv`` and, where pyarrow is installed, ``summary.parquet``."""
     names = [n for n in (*MATERIAL, *SAMPLE) if any(n in row["parameters"] for row in rows)]
     header = [*_FIRST, *(f"{n}_{q}" for n in names for q in QUANTITIES), *_LAST]
-    lying: dict[str, list[str]] = {}
+    outlying: dict[str, list[str]] = {}
     for outlier in far:
-        lying.setdefault(outlier["experiment"], []).append(outlier["parameter"])
+        outlying.setdefault(outlier["experiment"], []).append(outlier["parameter"])
     table = []
     for row in rows:
         own: dict[str, Any] = dict(row["parameters"])
-        listed = {"effects": row["effects"], "outlier": lying.get(row["name"], []), "warnings": row["warnings"]}
+        listed = {"effects": row["effects"], "outlier": outlying.get(row["name"], []), "warnings": row["warnings"]}
         cells = {**row, **{key: "; ".join(value) or None for key, value in listed.items()}}
         values = [own.get(n, {}).get(q) for n in names for q in QUANTITIES]
         table.append([*(cells[c] for c in _FIRST), *values, *(cells[c] for c in _LAST)])

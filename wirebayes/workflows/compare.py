@@ -121,7 +121,7 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is suspicious about the readings, worth knowing before the work begins."""
-        return tuple(f"warning: {said}" for said in of_experiments(self.experiments))
+        return tuple(f"warning: {warning}" for warning in of_experiments(self.experiments))
 
 
 def plan(

@@ -110,8 +110,8 @@ def do(work: bytes) -> Done:
             except OSError:  # a full disk is not the specimen's fault
                 raise
             except Exception as error:  # no specimen may lose the others
-                said = f"{type(error).__name__}: {error}".replace(f"{folder}/", "")
-                return Done(row | {"error": said}, {})
+                message = f"{type(error).__name__}: {error}".replace(f"{folder}/", "")
+                return Done(row | {"error": message}, {})
             return Done(row, _files(folder, experiment.name, task.posteriors))
 
 
@@ -157,12 +157,12 @@ def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitC
         n: {"mean": v["mean"], "sd": v["sd"], "q05": v["q05"], "q50": v["q50"], "q95": v["q95"]}
         for n, v in summary["parameters"].items()
     }
-    said = [s for s in cautions(summary) if s.startswith("warning: ")]
+    warnings = [s for s in cautions(summary) if s.startswith("warning: ")]
     check = None if passed is None else "passed" if passed else "failed"
     return {
         "converged": summary["converged"],
         "parameters": parameters,
-        "warnings": said,
+        "warnings": warnings,
         "p_global": p,
         "check": check,
     }

@@ -251,8 +251,8 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
     which, place = find_posterior(folder, name, "plain" if discovered else None)
     stored = store.load(place, which, own)
     if stored.likelihood == "hold":
-        said = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
-        raise InputError(f"{folder}: {said}")
+        message = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
+        raise InputError(f"{folder}: {message}")
     sample = stored.sample
     source = f"the posterior of {sample.name} in {folder.name}"
     guess = from_posterior(stored.draws, sample.protocol.length_mm, source, n)

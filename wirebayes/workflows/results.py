@@ -122,13 +122,13 @@ class Result(Generic[Content]):
         return target
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(self._shortly())})"
+        return f"{type(self).__name__}({', '.join(self._short_form())})"
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [str(self.folder)]
 
     def _repr_html_(self) -> str:
-        return f"<p>{escape(repr(self))}</p>" + "".join(f"<p>{escape(said)}</p>" for said in self.messages)
+        return f"<p>{escape(repr(self))}</p>" + "".join(f"<p>{escape(message)}</p>" for message in self.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -225,9 +225,9 @@ class Posterior(Result[SummaryJson]):
         path, name = self.folder / SUMMARY, self.within if self.within != "." else self.name
         with stored_results(path):
             summary = read_json(path)
-            return tuple(f"{name}: {said}" for said in cautions(summary))
+            return tuple(f"{name}: {message}" for message in cautions(summary))
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         s = self.summary()
         model = [s["likelihood"], s["elastic_law"], s["history"], *s["effects"]]
         sure = "converged" if s["converged"] else "NOT CONVERGED"
@@ -282,9 +282,9 @@ class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
     @property
     def messages(self) -> tuple[str, ...]:
         """Of all of them."""
-        return tuple(said for posterior in self.members.values() for said in posterior.messages)
+        return tuple(message for posterior in self.members.values() for message in posterior.messages)
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [repr(posterior) for posterior in self.members.values()]
 
     def _repr_html_(self) -> str:
@@ -328,10 +328,13 @@ class Findings(Result[DiscoveryJson]):
     @property
     def messages(self) -> tuple[str, ...]:
         """What is suspicious about the readings, and which posteriors should not be believed."""
-        plain = [said for p in self.plain.values() for said in p.messages]
+        plain = [message for p in self.plain.values() for message in p.messages]
         # the readings are the same, so they are warned of once
         odd = tuple(f"{p.within}: warning: " for p in self.final.values())
-        return (*plain, *(said for p in self.final.values() for said in p.messages if not said.startswith(odd)))
+        return (
+            *plain,
+            *(message for p in self.final.values() for message in p.messages if not message.startswith(odd)),
+        )
 
     def _posteriors(self, model: str) -> dict[str, Posterior]:
         return {
@@ -339,7 +342,7 @@ class Findings(Result[DiscoveryJson]):
             for name in self.report["experiments"]
         }
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [
             " ".join([f"{name}: {found['verdict']}", ", ".join(found["effects"])]).strip()
             for name, found in self.report["experiments"].items()
@@ -397,9 +400,9 @@ class Batch(Result[BatchJson]):
     @property
     def messages(self) -> tuple[str, ...]:
         """Experiments that failed or did not converge, the first of them where there are many."""
-        said = [f"{row['name']}: {row['error'] or 'not converged'}" for row in self.rows if not row["converged"]]
-        more = f"and {len(said) - _MESSAGES} more: see summary.csv, columns converged and error"
-        return (*said[:_MESSAGES], *([more] if len(said) > _MESSAGES else []))
+        lines = [f"{row['name']}: {row['error'] or 'not converged'}" for row in self.rows if not row["converged"]]
+        more = f"and {len(lines) - _MESSAGES} more: see summary.csv, columns converged and error"
+        return (*lines[:_MESSAGES], *([more] if len(lines) > _MESSAGES else []))
 
     def _posteriors(self, model: str) -> dict[str, Posterior]:
         within = {row["name"]: (Path(row["name"]) / model).as_posix() for row in self.rows if row["parameters"]}
@@ -409,11 +412,11 @@ class Batch(Result[BatchJson]):
             if (self.folder / folder / POSTERIOR).is_file()
         }
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         failed = sum(row["error"] is not None for row in self.rows)
         converged = sum(bool(row["converged"]) for row in self.rows)
-        lying = len({outlier["experiment"] for outlier in self.outliers})
-        return [f"{len(self.rows)} experiments", f"{converged} converged", f"{lying} outliers", f"{failed} failed"]
+        outlying = len({outlier["experiment"] for outlier in self.outliers})
+        return [f"{len(self.rows)} experiments", f"{converged} converged", f"{outlying} outliers", f"{failed} failed"]
 
     def _repr_html_(self) -> str:
         rows = [
@@ -453,7 +456,7 @@ class Plan(Result[PlanJson]):
             return ()
         return (f"no test is done within {found['budget_min']:g} min",)
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [f"{len(self.protocols)} protocols", f"best {self.best['name']}"]
 
     def _repr_html_(self) -> str:
@@ -498,7 +501,7 @@ class Comparison(Result[ComparisonJson]):
             if row["failed"] is not None or not row["converged"]
         )
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [
             f"{name}: {len(table['models'])} models, best {table['models'][0]['name']}"
             for name, table in self.summary()["experiments"].items()
@@ -532,7 +535,7 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
         spread = specimens_in_words(found["wires"])
         return (*unheld, *spread, *(f"warning: {warning}" for warning in found.get("warnings", [])))
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         found = self.summary()
         if not found["feasible"]:
             return [found["robot"], found["sentence"]]
@@ -575,7 +578,7 @@ class Calibration(Result[CalibrateJson]):
         advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
         return (f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}",) if astray else ()
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         found = self.summary()
         sure = "converged" if found["with_creep_model"]["converged"] else "NOT CONVERGED"
         return [found["robot"], f"{found['holds']} holds", sure]
@@ -623,7 +626,7 @@ class Export(Result[dict[str, Any]]):
             out.append("no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose")
         return tuple(out)
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return list(self.files)
 
     def _repr_html_(self) -> str:
@@ -648,7 +651,7 @@ class SimulatedTests(Result[TruthJson]):
         """The tests as `read_experiments` reads them."""
         return read_experiments(self.folder / "experiments.toml")
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [e.name for e in self.experiments]
 
     def _repr_html_(self) -> str:
@@ -679,10 +682,10 @@ class ImportedTests(Result[ImportJson]):
     def messages(self) -> tuple[str, ...]:
         """What is suspicious about the readings."""
         return tuple(
-            f"warning: {said}" for found in self.summary()["experiments"].values() for said in found["warnings"]
+            f"warning: {warning}" for found in self.summary()["experiments"].values() for warning in found["warnings"]
         )
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
         return [f"{name}: {each['holds']} holds, {each['readings']} readings" for name, each in found.items()]
 
@@ -707,9 +710,9 @@ class Check(Result[CheckJson]):
     def messages(self) -> tuple[str, ...]:
         """What is suspicious."""
         found = self.summary()["experiments"]
-        return tuple(f"warning: {name}: {said}" for name, test in found.items() for said in test["warnings"])
+        return tuple(f"warning: {name}: {warning}" for name, test in found.items() for warning in test["warnings"])
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
         return [f"{name}: {test['recorded_holds']} holds, {test['readings']} readings" for name, test in found.items()]
 
@@ -762,13 +765,13 @@ class Reproduction(Result[dict[str, Any]]):
         """Fits that did not converge."""
         return self.not_converged
 
-    def _shortly(self) -> list[str]:
+    def _short_form(self) -> list[str]:
         return [str(self.folder / "report.html"), f"{len(self.posteriors)} fits"]
 
 
 def cautions(summary: SummaryJson) -> list[str]:
     """What the ``summary.json`` of a fit says against it."""
-    out = [f"warning: {said}" for said in summary["warnings"]]
+    out = [f"warning: {warning}" for warning in summary["warnings"]]
     if not summary["converged"]:
         out.append(summary["convergence"])
     check = summary.get("model_check")

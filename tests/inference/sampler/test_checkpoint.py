@@ -160,17 +160,17 @@ def test_another_format_is_refused_before_anything_else_is_read(
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"seed": 2}, "seed is 1 there, 2 here"),
         ({"policy": {"ess": 5.0}}, "policy.ess is 1.0 there, 5.0 here"),
         ({"parameters": ["a"]}, 'parameters is ["a", "b"] there, ["a"] here'),
     ],
 )
-def test_the_file_of_another_fit_is_refused(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
+def test_the_file_of_another_fit_is_refused(changed: dict[str, Any], message: str, tmp_path: Path) -> None:
     path = tmp_path / ".checkpoint"
     checkpoint.write(path, OF_FIT, {}, {"x": np.zeros(2)})
-    with pytest.raises(InputError, match=re.escape(f"belongs to another fit: {said}; {checkpoint.INSTEAD}")):
+    with pytest.raises(InputError, match=re.escape(f"belongs to another fit: {message}; {checkpoint.INSTEAD}")):
         checkpoint.read(path, OF_FIT | changed)
 
 

@@ -84,10 +84,10 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
         A mapping names no column, a needed column is missing or in a unit of another quantity; `Undecided` where two
         columns could be it, or its unit is not said.
     """
-    said = _said(table, mapping)
-    taken = {index for index, _, _ in said}
+    mapped = _mapped(table, mapping)
+    taken = {index for index, _, _ in mapped}
     roles: dict[Role, Column] = {}
-    for index, role, unit in said:
+    for index, role, unit in mapped:
         if role == IGNORE:
             continue
         known: Role = role  # type: ignore[assignment]
@@ -128,7 +128,7 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     return header, None
 
 
-def _said(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]:
+def _mapped(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]:
     """Column, role and unit of each thing the user says; what is said later of a column stands."""
     out: dict[int, tuple[int, str, str]] = {}
     for text in mapping:

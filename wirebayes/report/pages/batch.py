@@ -34,7 +34,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found: BatchJson = read_json(folder / "batch.json")
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
-    first: list[Block] = [Columns([_done(rows), _known(fitted), _unknown(rows, configuration)])]
+    first: list[Block] = [Columns([_done(rows), _known(fitted), _reliability(rows, configuration)])]
     sections = [Section("Summary", first), Section("Outlying specimens", _outliers(fitted, far))]
     if fitted:
         alt = "Parameters of all specimens by material."
@@ -62,36 +62,36 @@ _FILES = (
 def _done(rows: list[Row]) -> Points:
     materials = Counter(row["material"] for row in rows if row["material"])
     failed = [row for row in rows if row["error"]]
-    said = [f"{len(rows)} experiments on {len(materials)} materials."]
-    said += [f"{len(failed)} failed: {_some([row['name'] for row in failed])}."] if failed else []
-    return Points("What was done", said)
+    points = [f"{len(rows)} experiments on {len(materials)} materials."]
+    points += [f"{len(failed)} failed: {_some([row['name'] for row in failed])}."] if failed else []
+    return Points("What was done", points)
 
 
 def _known(fitted: list[Row]) -> Points:
     verdicts = Counter(row["verdict"] for row in fitted if row["verdict"])
     effects = Counter(effect for row in fitted for effect in row["effects"])
-    said = [f"{count} × {verdict.replace('-', ' ')}" for verdict, count in verdicts.most_common()]
-    said += [
+    points = [f"{count} × {verdict.replace('-', ' ')}" for verdict, count in verdicts.most_common()]
+    points += [
         f"{effect.replace('_', ' ')}: in {count} experiment{'s' * (count > 1)}"
         for effect, count in effects.most_common()
     ]
     checks = Counter(row["check"] for row in fitted if row["check"])
-    said += [f"Model check: {checks['passed']} passed, {checks['failed']} failed."] if checks else []
-    return Points("What is known", said or ["The parameters; missing effects were not searched for."])
+    points += [f"Model check: {checks['passed']} passed, {checks['failed']} failed."] if checks else []
+    return Points("What is known", points or ["The parameters; missing effects were not searched for."])
 
 
-def _unknown(rows: list[Row], configuration: dict[str, Any]) -> Points:
+def _reliability(rows: list[Row], configuration: dict[str, Any]) -> Points:
     stopped = [row["name"] for row in rows if row["converged"] is False]
-    said = [f"Not converged: {_some(stopped)}."] if stopped else []
+    points = [f"Not converged: {_some(stopped)}."] if stopped else []
     checked = sum(row["p_global"] is not None for row in rows)
     if checked:
-        said.append(
+        points.append(
             f"If nothing were missing anywhere, about {number(ALPHA * checked, 2)} of {checked} checks would fail by "
             f"chance, each at its level of {ALPHA:g}."
         )
     odd = [row["name"] for row in rows if row["warnings"]]
-    said += [f"Suspicious readings or fits: {_some(odd)}; the column warnings says how."] if odd else []
-    return Points("How far it can be trusted", said or ["All fits converged."])
+    points += [f"Suspicious readings or fits: {_some(odd)}; the column warnings says how."] if odd else []
+    return Points("How far it can be trusted", points or ["All fits converged."])
 
 
 def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
@@ -102,15 +102,15 @@ def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
         f"scatter of the others and its own uncertainty explain. If all specimens are "
         f"alike, {100 * FALSE_ALARMS:g} % of materials have an outlier by chance."
     )
-    said = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
+    rest = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
     if not far:
-        return [Text("No specimen is an outlier of its material.", strong=True), Text(rule + said)]
+        return [Text("No specimen is an outlier of its material.", strong=True), Text(rule + rest)]
     lines = [
         [o["experiment"], o["material"], o["parameter"], number(o["value"]), number(o["median"]), number(o["z"], 2)]
         for o in far[:_MOST_ROWS]
     ]
     header = ["experiment", "material", "parameter", "its median", "median of the material", "robust z"]
-    return [Table(header, lines, "B is per metre of length."), Text(rule + said)]
+    return [Table(header, lines, "B is per metre of length."), Text(rule + rest)]
 
 
 def _table(rows: list[Row]) -> list[Block]:

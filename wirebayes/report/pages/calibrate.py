@@ -63,18 +63,18 @@ def _known(found: CalibrateJson) -> Points:
 
 
 def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
-    said = []
+    points = []
     for name, result in (("the creep model", creep), ("Hooke's law alone", hooke)):
         if not result["converged"]:
-            said.append(f"With {name} the search did not converge: do not use its lengths.")
+            points.append(f"With {name} the search did not converge: do not use its lengths.")
         if result["misfit"] is None:
             continue
         fits = "explains" if result["misfit"] < 1.5 else "cannot explain"
-        said.append(
+        points.append(
             f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
             f"{fits} the readings."
         )
-    return Points("How far it can be trusted", said)
+    return Points("How far it can be trusted", points)
 
 
 def _lengths(creep: EstimatedLengths, hooke: EstimatedLengths) -> Table:

@@ -35,7 +35,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     overview = Table(
         ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
         [
-            [name, _spoken(v), listed([spoken(e) for e in v["effects"]]), number(v["p_global"], 2), _share(v)]
+            [name, _spoken(v), listed([spoken(e) for e in v["effects"]]), number(v["p_global"], 2), _gap_closed(v)]
             for name, v in found.items()
         ],
     )
@@ -68,12 +68,12 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     }
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
-    gap = [_gap(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
+    known = [_held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     loose = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
     if v.get("next_measurement"):
         loose.append(f"Measure next: {v['next_measurement']}")
-    columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in gap if p])]
+    columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in known if p])]
     blocks.append(Columns([*columns, Points("What is not known", loose or ["Nothing to report."])]))
     file = picture_file(folder, name)
     if file is not None:
@@ -83,11 +83,11 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         blocks.append(Pictures(others))
     if len(v.get("steps", [])) > 1 and v["steps"][0]["rmse_N"] is not None:
         figure = waterfall(v)
-        said = (
+        caption = (
             "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
             "what is left above the noise."
         )
-        blocks.append(Pictures([Picture(drawn(figure), said, said)]))
+        blocks.append(Pictures([Picture(drawn(figure), caption, caption)]))
         names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
         scores = [[number(s[k]) for k in ("rmse_N", "elpd", "coverage_90")] for s in v["steps"]]
         lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
@@ -146,12 +146,12 @@ def _alike(v: ExperimentFindings) -> str:
     return f"; on this protocol hard to distinguish from {listed(like)}" if like else ""
 
 
-def _share(v: ExperimentFindings) -> str:
+def _gap_closed(v: ExperimentFindings) -> str:
     closed = (v.get("held_out") or {}).get("gap_closed")
     return "–" if closed is None else f"{100 * closed:.0f} %"
 
 
-def _gap(v: ExperimentFindings) -> str:
+def _held_out(v: ExperimentFindings) -> str:
     held = v.get("held_out") or {}
     if not held.get("plain") or not held.get("final"):
         return ""

@@ -105,13 +105,13 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     if pairs is not None:
         alt = f"Posterior of {sample.name}, every pair of parameters."
         blocks.append(Pictures([Picture(drawn(pairs), alt, _PAIRS, wide=True)]))
-    taught = [t["sentence"] for t in summary["identifiability"].values()]
+    sentences = [t["sentence"] for t in summary["identifiability"].values()]
     blocks.append(
         Columns(
             [
                 Points(
                     "What the data determine" if trusted else "What the data would determine if the model were right",
-                    taught,
+                    sentences,
                 )
             ]
         )
@@ -152,7 +152,7 @@ def _cautions(summary: SummaryJson) -> list[Block]:
         out = [Text("The model was not checked against the readings: the check was left out.", strong=True)]
     if not summary["converged"]:
         out.insert(0, Text("Not converged: do not trust these intervals.", strong=True))
-    return [Text(f"Check the readings: {said}.", strong=True) for said in summary["warnings"]] + out
+    return [Text(f"Check the readings: {warning}.", strong=True) for warning in summary["warnings"]] + out
 
 
 def _sampled(summary: SummaryJson) -> str:

@@ -34,7 +34,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``plan.json``."""
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
-    first: list[Block] = [Columns([_requested(found), _answered(found), _trusted(rows)]), _ranking(found)]
+    first: list[Block] = [Columns([_requested(found), _recommended(found), _reliability(rows)]), _ranking(found)]
     picture = picture_file(folder, "plan")
     if picture is not None:
         alt = "Expected widths and detectable effects of each test."
@@ -61,26 +61,26 @@ _FILES = (
 def _requested(found: PlanJson) -> Points:
     aim = found["aim"]
     by = _AIMS[aim[0]] if len(aim) == 1 else f"how well {_words(aim[0])} and {_words(aim[1])} would be distinguished"
-    said = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
+    points = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
     if found["budget_min"] is not None:
-        said.append(f"Available time: {number(found['budget_min'])} min.")
-    return Points("What was requested", said)
+        points.append(f"Available time: {number(found['budget_min'])} min.")
+    return Points("What was requested", points)
 
 
-def _answered(found: PlanJson) -> Points:
+def _recommended(found: PlanJson) -> Points:
     best = found["protocols"][0]
-    said = [f"Do {best['name']}" + (f": {best['words']}." if best["words"] else ".")]
+    points = [f"Do {best['name']}" + (f": {best['words']}." if best["words"] else ".")]
     creep = best["creep"]["creep_1h_mm"]
-    said.append(
+    points.append(
         f"The creep after an hour at {number(best['creep']['tension_N'])} N would be known to "
         f"{number(creep['sd_median'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
     )
     if not best["within_budget"]:
-        said.insert(0, "No test fits into the available time.")
-    return Points("What to do", said)
+        points.insert(0, "No test fits into the available time.")
+    return Points("What to do", points)
 
 
-def _trusted(rows: list[JudgedProtocol]) -> Points:
+def _reliability(rows: list[JudgedProtocol]) -> Points:
     least = min(row["simulated_tests"] for row in rows)
     return Points("How far it can be trusted", [
         f"Each test was simulated and fitted {least} times or more, with the priors of the later fit. Half of the "

@@ -50,8 +50,8 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     pose: PoseJson = content
     blocks: list[Block] = [Columns([_requested(pose), *_answers(pose)])]
     if not pose.get("feasible", True):
-        said = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
-        blocks.insert(0, Text(said, strong=True))
+        sentence = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
+        blocks.insert(0, Text(sentence, strong=True))
     blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
     view = robot_view(folder)
     turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
@@ -62,7 +62,10 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections += [Section("Pictures", [Pictures(pictures)] if pictures else [])]
     sections += [Section("Slices of the workspace", _slices(pose))]
     sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
-    sections += [Section("Between calibrations", _between(pose)), Section("Sources of uncertainty", _doubts(pose))]
+    sections += [
+        Section("Between calibrations", _between(pose)),
+        Section("Sources of uncertainty", _variance_shares(pose)),
+    ]
     sections += [Section("How many equilibria", _equilibria(pose))]
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     effects = pose.get("wires", {}).get("effects", [])
@@ -126,8 +129,8 @@ def _answers(pose: PoseJson) -> list[Points]:
         moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
         chance = number(space["probability"], 2)
         known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
-    said = [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
-    loose += [sentence for sentence in said if sentence not in _losses(pose)]
+    sentences = [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
+    loose += [sentence for sentence in sentences if sentence not in _losses(pose)]
     loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
     return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
 
@@ -205,7 +208,7 @@ def _lasts(entry: TimeWithin) -> str:
     return f"more than {longest}" if entry["still_within_at_the_end"] else longest
 
 
-def _doubts(pose: PoseJson) -> list[Block]:
+def _variance_shares(pose: PoseJson) -> list[Block]:
     shares = pose.get("variance_shares", {}).get("shared_draw")
     if not shares:
         return []

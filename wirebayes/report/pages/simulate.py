@@ -50,7 +50,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 def _section(e: Experiment, truth: TrueWire) -> Section:
     effects = truth.get("effects", [])
-    said = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
+    beyond = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
     picture = Picture(
         drawn(figures.measured(e.protocol(), e.tension(), e.name)),
         f"Tension of {e.name} against displacement.",
@@ -62,7 +62,7 @@ def _section(e: Experiment, truth: TrueWire) -> Section:
         for name, value in truth["parameters"].items()
     ]
     blocks: list[Block] = [
-        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {said}."),
+        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
         Pictures([picture]),
         Table(["parameter", "true value", "unit", "what it is"], lines, "What an analysis should find."),
     ]

@@ -42,8 +42,8 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
         size = (4.0, 0.8 + len(slices) * (min(max(height, 1.0), 3.6) + 0.35))
         figure = Figure(figsize=size, layout="constrained")
         panels: Any = figure.subplots(len(slices), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        said = f"median {name} within {TIME_S:g} s"
-        figure.suptitle(f"{title}: {said}" if title else said.capitalize(), fontsize=10.5, x=0.02, ha="left", color=INK)
+        what = f"median {name} within {TIME_S:g} s"
+        figure.suptitle(f"{title}: {what}" if title else what.capitalize(), fontsize=10.5, x=0.02, ha="left", color=INK)
         image: Any = None
         low, high = (f(value[np.isfinite(value)], initial=np.inf * s) for f, s in ((np.min, 1), (np.max, -1)))
         for axes, level in zip(panels, slices[::-1], strict=True):

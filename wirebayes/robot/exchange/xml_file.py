@@ -118,8 +118,8 @@ def read(path: Path) -> Element:
     try:
         parser.Parse(raw, True)
     except expat.ExpatError as error:
-        said = expat.errors.messages[error.code]
-        raise InputError(f"{name}, line {error.lineno}: found no well-formed XML ({said}); expected XML") from None
+        message = expat.errors.messages[error.code]
+        raise InputError(f"{name}, line {error.lineno}: found no well-formed XML ({message}); expected XML") from None
     except (ValueError, LookupError) as error:  # an encoding that is not known
         raise InputError(f"{name}: found no readable XML ({error}); expected XML") from None
     return root[0]

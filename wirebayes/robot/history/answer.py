@@ -99,15 +99,15 @@ def answer(
         try:
             found, joint = commanded.drift(robot, line, history, errors, rng, progress)
         except commanded.Unheld as unheld:
-            said = f"No{str(unheld)[2:]}."
-            return HistoryAnswer(content | {"feasible": False, "sentence": said}, {}, rows)
+            sentence = f"No{str(unheld)[2:]}."
+            return HistoryAnswer(content | {"feasible": False, "sentence": sentence}, {}, rows)
 
         def again(few: WireDraws, restart: float) -> Track:
             return commanded.drift(robot, few, history, alike, rng, restart=restart)[0].track
 
     if not found.track.held[:, 0].any():
-        said = "No draw of the wires holds the platform at the first row; see --position for where it starts."
-        return HistoryAnswer(content | {"feasible": False, "sentence": said}, {}, rows)
+        sentence = "No draw of the wires holds the platform at the first row; see --position for where it starts."
+        return HistoryAnswer(content | {"feasible": False, "sentence": sentence}, {}, rows)
     to = corrections.target(robot, history, found)
     change = corrections.wanted(robot, found, to) - joint
     best = _mean(joint + change) if joint.ndim == 2 else joint + _mean(change)

@@ -317,7 +317,7 @@ def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, ze
     for name, one in line.each.items():
         own = np.array([leg is one for leg in of_leg])
         if own.any():
-            out += [f"wire {name}: {said}" for said in _of_one(one, tension_N[..., own], time_s, zero_m[..., own])]
+            out += [f"wire {name}: {text}" for text in _of_one(one, tension_N[..., own], time_s, zero_m[..., own])]
     return out
 
 

@@ -97,9 +97,9 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(line, courses, x, R)
     falls = [
-        said
+        warning
         for spread, course in courses.items()
-        for said in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
+        for warning in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
     ]
     content["warnings"] = [*_weak(commands), *falls, *_untested(robot, line, request, commands, tau)]
     spaces = map_slices(robot, line, request.slices)
@@ -135,17 +135,17 @@ def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> Inv
 
 def _weak(commands: inverse.Commands) -> list[str]:
     weak = 100 * (1 - float(commands.feasible.mean()))
-    said = f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched"
-    return [said] if weak > 0 else []
+    warning = f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched"
+    return [warning] if weak > 0 else []
 
 
 def _untested(
     robot: Robot, line: WireDraws, request: PoseRequest, commands: inverse.Commands, tension_N: Floats
 ) -> list[str]:
     """A sentence for each way in which the pose leaves what was tested or what the model knows."""
-    said = draws.warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
-    said += sag.warnings(robot, request.position_m, request.rotation, tension_N[0])
-    return said if robot.drums is None else said + _emptied(robot.drums, commands.joint_m[commands.feasible])
+    out = draws.warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
+    out += sag.warnings(robot, request.position_m, request.rotation, tension_N[0])
+    return out if robot.drums is None else out + _emptied(robot.drums, commands.joint_m[commands.feasible])
 
 
 def _emptied(known: Drums, joint_m: Floats) -> list[str]:

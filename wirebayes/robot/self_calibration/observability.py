@@ -122,8 +122,8 @@ def observe(
         own = (sign**2).sum(0) / tension_sd_N**2 + 1.0 / bias_sd_N**2
         information = information - mixed.T @ (mixed / own[:, None])
     if not np.isfinite(information).all():
-        said = "What the readings show cannot be computed at these poses: nothing holds the platform there."
-        return Observability(0, np.full(w, prior_sd_m), np.full(w, np.nan), np.inf, said)
+        sentence = "What the readings show cannot be computed at these poses: nothing holds the platform there."
+        return Observability(0, np.full(w, prior_sd_m), np.full(w, np.nan), np.inf, sentence)
     values, vectors = np.linalg.eigh(information)
     alone = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     rank = int((alone < 0.1 * prior_sd_m).sum())
@@ -131,8 +131,8 @@ def observe(
     weakest = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
     parts = [f"{weakest[i]:+.2f} of wire {i + 1}" for i in np.argsort(-np.abs(weakest)) if abs(weakest[i]) > 0.2]
     seen = f"The readings show {rank} of {w} combinations of lengths to a tenth of their prior uncertainty"
-    said = f"{seen}; least of all {', '.join(parts)}, known to {1e3 * min(alone[0], prior_sd_m):.2g} mm."
-    return Observability(rank, sd, weakest, float(alone[0]), said)
+    sentence = f"{seen}; least of all {', '.join(parts)}, known to {1e3 * min(alone[0], prior_sd_m):.2g} mm."
+    return Observability(rank, sd, weakest, float(alone[0]), sentence)
 
 
 def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: float) -> list[int]:
