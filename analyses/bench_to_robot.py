@@ -16,11 +16,8 @@ Coverage is averaged within a test first, so its interval is that of independent
 
 import argparse
 import json
-import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -28,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from analyses.hidden_effects.truth import draw_wire
+from analyses.resumable import records
 from wirebayes.discovery.search import final_models, investigate
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import CATALOGUE
@@ -274,18 +272,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--output", type=Path, default=Path("out/bench-to-robot"))
     options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
-    path = options.output / "tests.jsonl"
-    records = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done = {r["index"] for r in records}
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool, path.open("a") as file:
-        for record in pool.map(case, [i for i in range(options.tests) if i not in done]):
-            records.append(record)
-            file.write(json.dumps(record) + "\n")
-            file.flush()
-    print(table(records))
+    cases = [(index,) for index in range(options.tests)]
+    print(table(records(options.output / "tests.jsonl", case, cases, workers=options.workers)))
 
 
 if __name__ == "__main__":

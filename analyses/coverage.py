@@ -8,13 +8,14 @@ third of the holds predicted from the rest.
 import argparse
 import json
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from analyses.resumable import records
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.run_folder import write_json
@@ -125,15 +126,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"rows-seed{options.seed}.jsonl"
-    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    missing = range(len(rows), options.wires)
-    with path.open("a", encoding="utf-8") as file, ProcessPoolExecutor(options.workers) as pool:
-        for future in [pool.submit(one, options.seed, index) for index in missing]:
-            rows.append(future.result())
-            file.write(json.dumps(rows[-1]) + "\n")
-            file.flush()
+    cases = [(index,) for index in range(options.wires)]
+    rows = records(path, partial(one, options.seed), cases, workers=options.workers)
     result = summary(rows[: options.wires])
     write_json(options.output / "coverage.json", result)
     print(json.dumps(result, indent=2))

@@ -9,11 +9,8 @@ test of uniformity.
 """
 
 import argparse
-import json
-import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,6 +20,7 @@ from scipy import stats
 
 from analyses.hidden_effects.rig import Rig
 from analyses.hidden_effects.truth import draw_rig
+from analyses.resumable import records
 from wirebayes.discovery.model_check import check_model
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.fit import seed_of
@@ -30,6 +28,7 @@ from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.laws import History
 
 KINDS = ("chain", "additive", "together", "effect")
 ALONE = ("paper", "unloading", "uneven", "dense", "temperature", "slack")
@@ -84,7 +83,7 @@ def case(kind: str, index: int, simulations: int) -> dict[str, Any]:
         rig = draw_rig(rng, protocol)
         made = benches(rig, rng)
         effects = (hidden(made, rng),) if kind == "effect" else ()
-        history = "additive" if kind == "additive" else "saturating"
+        history: History = "additive" if kind == "additive" else "saturating"
         with TemporaryDirectory() as folder:
             write(Path(folder), made, Truth(parameters(rig), effects, history=history), int(rng.integers(2**31)))
             experiments = tuple(read_experiments(Path(folder) / "experiments.toml"))
@@ -125,20 +124,10 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--output", type=Path, default=Path("out/model-check"))
     options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"checks-{options.simulations}.jsonl"
-    records = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done = {(r["kind"], r["index"]) for r in records}
-    todo = [(k, i) for i in range(options.cases) for k in options.kinds if (k, i) not in done]
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool, path.open("a") as file:
-        futures = [pool.submit(case, kind, index, options.simulations) for kind, index in todo]
-        for future in futures:
-            records.append(future.result())
-            file.write(json.dumps(records[-1]) + "\n")
-            file.flush()
-    print(table(records))
+    cases = [(kind, index) for index in range(options.cases) for kind in options.kinds]
+    one = partial(case, simulations=options.simulations)
+    print(table(records(path, one, cases, ("kind", "index"), options.workers)))
 
 
 if __name__ == "__main__":

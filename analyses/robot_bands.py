@@ -11,7 +11,6 @@ A line a wire is written, so that a run goes on where it ended; coverage is aver
 
 import argparse
 import json
-import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ from analyses.hidden_effects.files import logged_temperature, write_experiments
 from analyses.hidden_effects.noise import measure
 from analyses.hidden_effects.rig import Rig
 from analyses.hidden_effects.truth import draw_rig
+from analyses.resumable import records
 from tests.robot import independent
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
@@ -137,18 +137,7 @@ def main() -> None:
     parser.add_argument("--wires", type=int, default=200)
     parser.add_argument("--output", type=Path, default=Path("out/robot-bands"))
     options = parser.parse_args()
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    options.output.mkdir(parents=True, exist_ok=True)
-    path = options.output / "wires.jsonl"
-    records = [json.loads(text) for text in path.read_text().splitlines()] if path.exists() else []
-    done = {r["index"] for r in records}
-    with path.open("a") as file:
-        for index in range(options.wires):
-            if index not in done:
-                records.append(case(index))
-                file.write(json.dumps(records[-1]) + "\n")
-                file.flush()
-    print(table(records))
+    print(table(records(options.output / "wires.jsonl", case, [(index,) for index in range(options.wires)])))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ is written, so that a run goes on where it ended; intervals are of independent t
 """
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analyses.resumable import records
 from wirebayes.inference.fit import seed_of
 from wirebayes.robot.history.estimate import estimate
 from wirebayes.robot.history.follow import clock_starts, follow
@@ -70,6 +70,7 @@ def case(name: str, index: int, draws: int) -> dict[str, Any]:
     known = line(draws, rng)
     truths = unknowns(robot, line(2, rng), ERRORS, rng)
     wires, error = truths.columns(truths.draws)
+    assert moves.joint_m is not None
     starts = clock_starts(moves, np.ones((len(TIMES_S), robot.legs)))
     true = follow(robot, wires, moves, moves.joint_m, start, starts, error)
     place, turn, tau = true.position_m[0], roll_and_pitch(true.rotation[0]), true.tension_N[0]
@@ -124,17 +125,8 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=200)
     parser.add_argument("--output", type=Path, default=Path("out/history-coverage"))
     options = parser.parse_args()
-    options.output.mkdir(parents=True, exist_ok=True)
-    path = options.output / "truths.jsonl"
-    records = [json.loads(text) for text in path.read_text().splitlines()] if path.exists() else []
-    done = {r["index"] for r in records}
-    with path.open("a") as file:
-        for index in range(options.truths):
-            if index not in done:
-                records.append(case(ROBOTS[index % len(ROBOTS)], index, options.draws))
-                file.write(json.dumps(records[-1]) + "\n")
-                file.flush()
-    print(table(records))
+    cases = [(ROBOTS[index % len(ROBOTS)], index, options.draws) for index in range(options.truths)]
+    print(table(records(options.output / "truths.jsonl", case, cases, ("robot", "index", "draws"))))
 
 
 if __name__ == "__main__":

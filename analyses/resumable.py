@@ -1,0 +1,51 @@
+"""Studies of many cases that write a line of JSON for each, so that an interrupted run goes on where it ended."""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+Record = dict[str, Any]
+Case = tuple[Any, ...]
+
+
+def records(
+    path: Path, run: Callable[..., Record], cases: Iterable[Case], keys: Sequence[str] = ("index",), workers: int = 1
+) -> list[Record]:
+    """The records of all cases: those that the file holds, then the others as they are computed.
+
+    Parameters
+    ----------
+    path : Path
+        A line for each record; its folder is made where there is none.
+    run : function
+        Takes a case's values and returns its record; with several workers one that can be pickled.
+    cases : iterable of tuples
+    keys : sequence of str
+        Where a record holds the values of its case.
+    workers : int
+        Processes; 1 computes in this one.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    found: list[Record] = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    done = {tuple(record[key] for key in keys) for record in found}
+    with path.open("a") as file:
+        for record in _computed(run, [case for case in cases if case not in done], workers):
+            found.append(record)
+            file.write(json.dumps(record) + "\n")
+            file.flush()
+    return found
+
+
+def _computed(run: Callable[..., Record], cases: Sequence[Case], workers: int) -> Iterator[Record]:
+    if workers == 1:
+        yield from (run(*case) for case in cases)
+        return
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        for future in [pool.submit(run, *case) for case in cases]:
+            yield future.result()
