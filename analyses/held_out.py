@@ -15,7 +15,7 @@ from wirebayes.comparison.compare import scores_dict
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.held_out import held_out, train_counts
+from wirebayes.prediction.held_out import Scores, held_out, train_counts
 from wirebayes.report.blocks import save
 from wirebayes.report.pictures import compare as pictures
 
@@ -35,7 +35,8 @@ def main() -> None:
                 fitted = fit(build([experiment.train(trained)], likelihood=likelihood), seed_of(SEED, *words))
                 rng = np.random.default_rng(seed_of(SEED, *words, "predict"))
                 result = held_out(fitted, experiment, rng)
-                for way, scores in (("free", result.free), ("given_first", result.given)):
+                ways: dict[pictures.Way, Scores | None] = {"free": result.free, "given_first": result.given}
+                for way, scores in ways.items():
                     if scores is None:
                         continue
                     coverage = "  ".join(f"{100 * share:3.0f}" for share in scores.coverage().values())

@@ -62,10 +62,9 @@ def compare(robot, make, law, count, rng):
         back = distance(robot, blind.position_m, blind.rotation, c.position_m, c.rotation)[blind.found]
         there = max(there, back.max())
     slack = (found.tension_N == 0).any(1).sum()
-    errors = np.array(errors)
     answered = found.found | (found.status == forward.NOT_HELD)  # a plate on two points in line is free, and said to be
     free = int((found.status == forward.NOT_HELD).sum())
-    return len(found.status), answered.mean(), blind.found.mean(), slack, np.mean(rested), errors, there, free
+    return len(found.status), answered.mean(), blind.found.mean(), slack, np.mean(rested), np.array(errors), there, free
 
 
 def main():

@@ -74,7 +74,7 @@ def enclosures(folder):
             f"proved {box.proved}, {box.proofs} proofs, {spent:.1f} s"
         )
         own = proofs.enclosed(robot, wires, course, x, R)["band"]
-        if own["share"]:
+        if own["low_mm"] is not None and own["high_mm"] is not None:
             print(f"  {'':14s} each on its own: {np.array([own['low_mm'][2], own['high_mm'][2]]).round(3)}, "
                   f"share {own['share']:g}")  # fmt: skip
 

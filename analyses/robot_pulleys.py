@@ -50,7 +50,7 @@ def ignored(robot, wires, radius_m):
     change = length[0] - length[1] - (length[0] - length[1])[:, :1]
     there = forward.solve(real, wires, *inverse.lengths(real, zeroed), x, R)
     off = 1e3 * np.linalg.norm(there.position_m - x, axis=1)[1:]
-    slack = (there.tension_N <= 0).any(1)[1:].mean()
+    slack = (there.tension_N[1:] <= 0).any(1).mean()
     return raw[:, 1:], np.abs(change[:, 1:]), (np.abs(change) / length[0])[:, 1:], off, slack
 
 

@@ -22,9 +22,10 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment, Hold
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.problem import build
+from wirebayes.model.problem import Likelihood, build
 
 BATCH, REPEATS, SEEDS = 256, 7, 20
+LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
 
 
 def staircase(holds, readings, name="made"):
@@ -123,13 +124,13 @@ def main():
         print(f"  {key:28s} {ratio:6.2f}")
     print("\nshare of a fit")
     out["share"] = {}
-    for likelihood in ("chain", "hold"):
+    for likelihood in LIKELIHOODS:
         out["share"][likelihood] = share = share_in_likelihood(build([wire], likelihood=likelihood), 0)
         print(f"  {wire.name}, {likelihood}: " + ", ".join(f"{k} {v:.2f}" for k, v in share.items()), flush=True)
     print("\neffective draws per evaluation: after burn-in, and all counted (least, median, largest of the seeds)")
     out["draws"] = {}
     for experiment in experiments():
-        for likelihood in ("chain", "hold"):
+        for likelihood in LIKELIHOODS:
             found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(build([experiment], likelihood=likelihood))
             cells = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
             print(f"  {experiment.name + ', ' + likelihood:24s} {cells[0]}    {cells[1]}", flush=True)

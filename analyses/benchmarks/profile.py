@@ -13,6 +13,7 @@ import tempfile
 from collections import defaultdict
 from concurrent import futures
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import wirebayes
@@ -34,8 +35,8 @@ class Here(futures.Executor):
     def __init__(self, *args, **kwargs):
         pass
 
-    def submit(self, fn, *args, **kwargs):
-        future = futures.Future()
+    def submit(self, fn, /, *args, **kwargs):
+        future: futures.Future[Any] = futures.Future()
         future.set_result(fn(*args, **kwargs))
         return future
 
@@ -54,8 +55,9 @@ WORK = {
 
 def shares(profile):
     """Share of the time by module of the package, libraries counted for the module that calls them."""
-    stats = pstats.Stats(profile).stats
-    known = {}
+    profiled: Any = pstats.Stats(profile)
+    stats = profiled.stats
+    known: dict[Any, dict[str, float]] = {}
 
     def owners(function):
         """Modules of the package that a function works for, with their shares."""
@@ -64,7 +66,7 @@ def shares(profile):
         if function not in known:
             known[function] = {}  # a function that calls itself by way of others adds nothing on the way back
             over = {caller: row[3] for caller, row in stats[function][4].items() if row[3]}
-            total = defaultdict(float)
+            total: dict[str, float] = defaultdict(float)
             for caller, seconds in over.items():
                 for module, share in owners(caller).items():
                     total[module] += share * seconds
@@ -72,7 +74,7 @@ def shares(profile):
             known[function] = {k: v / whole for k, v in total.items()} if whole else {"(not the package)": 1.0}
         return known[function]
 
-    spent = defaultdict(float)
+    spent: dict[str, float] = defaultdict(float)
     for function, row in stats.items():
         for module, share in owners(function).items():
             spent[module] += share * row[2]

@@ -8,7 +8,7 @@ import numpy as np
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.simulation_based_calibration import one
-from wirebayes.model.problem import Problem, build, with_readings
+from wirebayes.model.problem import Likelihood, Problem, build, with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.simulation.synthetic import PAPER_TIMES_S, Bench
 
@@ -28,7 +28,7 @@ class Study:
     """One protocol, one likelihood; `broken` drops the setting error from the fit, not from the simulation."""
 
     protocol: str
-    likelihood: str
+    likelihood: Likelihood
     broken: bool = False
     policy: Policy = POLICY
 

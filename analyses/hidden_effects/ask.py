@@ -51,7 +51,7 @@ def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...], simulati
         materials = {e.material: [x for x in experiments if x.material == e.material] for e in experiments}
         groups = [experiments] if how == "api" else list(materials.values())
         answers = [discover(members, without=without, seed=seed, **options) for members in groups]
-        return answers[0] | {"experiments": {k: v for a in answers for k, v in a["experiments"].items()}}
+        return {**answers[0], "experiments": {k: v for a in answers for k, v in a["experiments"].items()}}
     if how == "cli":
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-m", "wirebayes", "discover", str(file), "--output", f"{folder}/out"]
