@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from tests.robot import cases
-from wirebayes.robot.mechanics import rotation, schema
+from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward
+from wirebayes.robot.proof import reach as module
+from wirebayes.robot.proof.ball_arithmetic import Balance
 from wirebayes.robot.proof.reach import apart, reach
 
 
@@ -105,3 +107,29 @@ def test_what_is_left_beside_the_line_is_bounded(name, law):
     bent = np.abs(poses(corners) - (x + corners @ line)).max(0)
     assert (bent <= got.beside_m[:3]).all()
     assert (got.beside_m < got.radius_m - got.beside_m).all()  # the line is still the better part of the answer
+
+
+@pytest.mark.parametrize("name", ["hangprinter-4", "robocrane", "linear-7"])
+def test_strains_along_the_linear_answer_are_enclosed_and_what_cancels_does(name):
+    """All lengths grow together: pose and length each change the strain, and on a robot of six wires almost cancel."""
+    from flint import arb_mat
+
+    robot, k1, zero, offset, x, R = _case(name, "hooke")
+    w, longer = robot.legs, 1e-4 * zero
+    generators = np.zeros((w, 1)), longer[:, None]
+    middle = Balance(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
+    wide = Balance(robot, "hooke", (k1, k1), (zero - longer, zero + longer), offset, x, R)
+    line = module._linear_answer(middle, np.linalg.inv(middle.middle_slope()), generators)
+    balls = module._balls(middle, np.abs(line[:, 0]) * (1 + 1e-12)), module._balls(middle, 0 * line[:, 0])
+    box = module._Box(*balls, arb_mat(line.tolist()))
+
+    p = np.linspace(-1, 1, 101)
+    moved = line * p
+    turn = moved[3:].T / robot.size_m if robot.degrees == 6 else np.zeros((len(p), 3))
+    turn *= 1 - (turn**2).sum(1, keepdims=True) / 12  # Cayley's numbers to a rotation vector
+    shape = statics.geometry(robot, x[:, None] + moved[:3], np.moveaxis(rotation.matrix(turn) @ R, 0, -1))
+    strain = statics.stretched(robot, shape, offset[:, None]) / (zero[:, None] + longer[:, None] * p) - 1
+    for i in range(w):
+        ball = module._strain(middle, wide, i, wide.strand(i, box.whole), box, generators[1][i])
+        assert float(ball.lower()) <= strain[i].min() and strain[i].max() <= float(ball.upper())
+        assert float(ball.upper() - ball.lower()) < 1.2 * np.ptp(strain[i])
