@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # A process a core; the tests of a file share fits and stay together. More than four would wait for the longest file.
 SIDE_BY_SIDE := -n logical --maxprocesses 4 --dist loadfile
 
-.PHONY: mutants run test test-full coverage lint calibration discover-benchmark benchmark docs dist clean
+.PHONY: mutants run test test-full lowest coverage lint calibration discover-benchmark benchmark docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
@@ -21,6 +21,12 @@ test: lint
 
 test-full: lint
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
+
+# The tests of make test with the lowest versions that pyproject.toml allows, in an environment of their own.
+lowest:
+	test -x .venv-nox/bin/python || $(PYTHON) -m venv .venv-nox
+	.venv-nox/bin/python -m pip install --quiet --disable-pip-version-check "nox[uv]"
+	.venv-nox/bin/nox --session lowest
 
 # Not part of make test: counting lines doubles its time.
 coverage: .venv/test.stamp

@@ -28,7 +28,7 @@ def preload() -> None:
 def copy_of_the_checkout(scratch: Path) -> Path:
     """A tree that mutants may change."""
     tree = scratch / "tree"
-    left_out = shutil.ignore_patterns(".git", ".venv*", "out", "build", "_build", "__pycache__", "*.egg-info")
+    left_out = shutil.ignore_patterns(".git", ".venv*", ".nox", "out", "build", "_build", "__pycache__", "*.egg-info")
     shutil.copytree(ROOT, tree, ignore=left_out, symlinks=True)
     # compiled once; by the source's hash, for two mutants may have one size and one second
     compileall.compile_dir(tree / "wirebayes", quiet=1, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
