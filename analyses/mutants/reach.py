@@ -1,4 +1,4 @@
-"""Which fast tests run a line: measured once a test file, and again when the file or its helpers change."""
+"""Which fast tests run a line: measured once a test file, and again when it or a module that it runs has changed."""
 
 import hashlib
 import json
@@ -71,14 +71,24 @@ def measure(tree: Path, record: Path, packages: Iterable[str]) -> Reach:
     known = {row["key"]: row for row in map(json.loads, record.read_text().splitlines())} if record.exists() else {}
     rows = []
     for file in test_files(tree, packages):
-        key = f"{file} {hashlib.sha256((tree / file).read_bytes()).hexdigest()[:16]}"
-        if key not in known:
+        key = f"{file} {_hash(tree / file)}"
+        if key not in known or not _as_measured(tree, known[key]["modules"]):
             print(f"reach of {file}", flush=True)
-            known[key] = {"key": key} | reach_of(tree, file, tree.parent / "reach.json", _PATIENCE_CPU_S)
+            found = reach_of(tree, file, tree.parent / "reach.json", _PATIENCE_CPU_S)
+            modules = sorted({name for files in found["lines"].values() for name in files})
+            known[key] = {"key": key, "modules": {name: _hash(tree / name) for name in modules}} | found
             with record.open("a") as out:
                 out.write(json.dumps(known[key]) + "\n")
         rows.append(known[key])
     return Reach(rows)
+
+
+def _as_measured(tree: Path, modules: dict[str, str]) -> bool:
+    return all(_hash(tree / name) == was for name, was in modules.items())
+
+
+def _hash(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
 
 
 def package_of(file: str) -> str:

@@ -55,6 +55,8 @@ def test_importance_weights_are_truncated(monkeypatch: pytest.MonkeyPatch) -> No
     density = stats.lognorm(0.7).rvs((4, 1500), random_state=rng)
     density[1, 3] = 1e-9  # a draw under which hold 2 could hardly have happened
     density[2, :40] = 1e-5
+    impossible = density.copy()
+    impossible[0, 7] = 0.0
     recorded = np.array([True, True, True, False])
     problem = SimpleNamespace(
         leave_one_hold_out=lambda theta: [np.log(density)],
@@ -69,3 +71,7 @@ def test_importance_weights_are_truncated(monkeypatch: pytest.MonkeyPatch) -> No
     assert found == pytest.approx(expected, rel=1e-9)
     whole = np.log(stats.hmean(density[:3], axis=1))  # what weights without a ceiling give
     assert found[0] == pytest.approx(whole[0]) and found[1] > whole[1] + 3.0
+    with np.errstate(divide="ignore"):  # a hold that cannot happen under one draw is not predicted by the others at all
+        problem.leave_one_hold_out = lambda theta: [np.log(impossible)]
+        found = held_out.truncated_leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
+    assert found[0] < -1e5 and found[1:] == pytest.approx(expected[1:], rel=1e-9)
