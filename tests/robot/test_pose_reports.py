@@ -97,7 +97,6 @@ def test_where_no_draw_begins_there_is_nothing_more_to_say() -> None:
 @pytest.mark.parametrize(
     ("share", "words"),
     [(1.0, "100 %"), (0.996, "nearly all"), (0.99, "99 %"), (0.995, "nearly all"), (0.123, "12.3 %")],
-    [(1.0, "100 %"), (0.996, "nearly all"), (0.99, "99 %"), (0.995, "nearly all"), (0.123, "12.3 %")],
 )
 def test_nearly_all_is_not_all(share: float, words: str) -> None:
     assert stability._percent(share) == words
