@@ -153,7 +153,9 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     log.write_text("\n".join(",".join(map(str, line)) for line in lines) + "\n")
     begin, joint = ["pose", "linear-7", *wires], ["--joints", str(log), "--draws", "4"]
     assert main([*begin, *joint, "--calibration", str(done), "--output", str(out)]) == 0
-    known = json.loads((out / "pose.json").read_text())["history"]["calibration"]
+    content = json.loads((out / "pose.json").read_text())
+    assert content["clock"]["largest_mm"] == 0  # one hold: nothing restarts
+    known = content["history"]["calibration"]
     assert known["holds"] == 5
     assert known["duration_s"] == 150
     said = json.loads((done / "calibrate.json").read_text())["with_creep_model"]["reference_error_mm"]

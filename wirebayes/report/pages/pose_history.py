@@ -132,6 +132,8 @@ def _answers(pose: PoseHistoryJson) -> list[Points]:
     time = number(float(drift["times_s"][-1]))
     meant = "from the commanded pose" if pose["history"].get("target") != "without creep" else "from where it would be"
     meant += "" if "commanded" in meant else " without creep"
+    if "calibration" in pose["history"] and "commanded" not in meant:
+        meant += ", the wires as long as the joint values say"
     known = [f"After {time} s the platform is {_last(drift['distance_mm'])} mm {meant}."]
     if pose.get("rotation_vector_rad"):
         known.append(f"It has turned by {_last(drift['rotation_deg'])} degrees.")

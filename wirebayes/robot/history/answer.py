@@ -91,7 +91,7 @@ def answer(
         joint = history.joint_m
 
         def again(few: WireDraws, restart: float) -> Track:
-            known = unknowns(robot, few, alike, rng)
+            known = unknowns(robot, few, alike, np.random.default_rng(seed))  # the same draws both times
             starts = clock_starts(history, found.plain.tension_N[0], restart)
             wires, error = known.columns(known.draws)
             return follow(robot, wires, history, joint, start, starts, error, carried=known.carried(known.draws))
@@ -103,7 +103,8 @@ def answer(
             return HistoryAnswer(content | {"feasible": False, "sentence": sentence}, {}, rows)
 
         def again(few: WireDraws, restart: float) -> Track:
-            return commanded.drift(robot, few, history, alike, rng, restart=restart)[0].track
+            drawn = np.random.default_rng(seed)  # the same draws both times
+            return commanded.drift(robot, few, history, alike, drawn, restart=restart)[0].track
 
     if not found.track.held[:, 0].any():
         sentence = "No draw of the wires holds the platform at the first row; see --position for where it starts."
