@@ -14,6 +14,7 @@ from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import schema
+from wirebayes.robot.motion import path
 
 TIMES = np.array([0, 60, 70, 400, 420, 900, 930, 2000, 2030, 3600.0])
 
@@ -148,3 +149,17 @@ def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
                           - live._x[-1]) < 2e-4  # fmt: skip
     assert sample.klipper([1, 2, 3, -4]).splitlines()[3] == "FORCE_MOVE STEPPER=stepper_d DISTANCE=-4.0000 VELOCITY=2"
     assert sample.reprapfirmware([1, 2, 3, -4]) == "M120 G91 G1 H2 X1.0000 Y2.0000 Z3.0000 U-4.0000 F120 M121"
+
+
+def test_a_step_at_a_controllers_rate_takes_one_newton_step(monkeypatch):
+    robot = schema.read("cogiro-desk")
+    times = np.arange(20) / 500.0
+    way = robot.home_m + 0.05 * robot.span_m * np.stack([np.sin(times), np.cos(times) - 1.0, 0.3 * times], 1)
+    live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    joints = _joint_values_for(robot, times, way).joint_m
+    live.step(-1.0, joints[0])
+    made, step = [], path.newton_step
+    monkeypatch.setattr(path, "newton_step", lambda *given: made.append(1) or step(*given))
+    for time, joint in zip(times, joints, strict=True):
+        live.step(time, joint)
+    assert len(made) == len(times)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.mechanics import cholesky, rotation, schema, statics
 from wirebayes.robot.mechanics.wires import tension
 
 from . import cases
@@ -57,3 +57,21 @@ def test_rotation_vector_round_trip_keeps_tiny_and_large_angles():
 def test_tilt_is_the_angle_of_the_normal():
     R = rotation.matrix(np.array([[0.0, 0.02, 0.0], [0.0, 0.0, 1.0], [1e-6, 0.0, 0.0]]))
     np.testing.assert_allclose(rotation.tilt(R), [0.02, 0.0, 1e-6], atol=1e-16)
+
+
+@pytest.mark.parametrize("d", [3, 6])
+def test_many_small_systems_are_solved_at_once(d):
+    rng = np.random.default_rng(d)
+    root = rng.standard_normal((7, d, d))
+    matrices, right = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(d), rng.standard_normal((7, d))
+    matrices[2] -= 5.0 * np.eye(d)  # not positive definite
+    upper = np.moveaxis(np.triu(matrices), 0, -1)
+    before = upper.copy(), right.T.copy()
+    x, positive = cholesky.solve(upper, right.T)
+    np.testing.assert_array_equal(upper, before[0])
+    np.testing.assert_array_equal(right.T, before[1])
+    assert positive.tolist() == [k != 2 for k in range(7)]
+    good = np.flatnonzero(positive)
+    np.testing.assert_allclose(x.T[good], np.linalg.solve(matrices[good], right[good][..., None])[..., 0], rtol=1e-9)
+    flat = np.moveaxis(np.broadcast_to(np.outer(right[0], right[0]), (1, d, d)), 0, -1)  # rank one: lost to rounding
+    assert not cholesky.solve(flat, right[:1].T)[1][0]

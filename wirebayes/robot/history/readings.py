@@ -110,9 +110,10 @@ class Information:
         there = np.isfinite(residual).any(0) & np.isfinite(slope).all(0)
         if not there.any():
             return
-        H = np.concatenate([slope, np.diag(of.offset)])[:, there]
-        scaled = H * (counts / of.noise[there] ** 2)
-        left = residual[:, there]
+        H, noise, left = np.concatenate([slope, np.diag(of.offset)]), of.noise, residual
+        if not there.all():
+            H, noise, left = H[:, there], noise[there], left[:, there]
+        scaled = H * (counts / noise**2)
         if not np.isfinite(left).all():
             left = np.where(np.isfinite(left), left, np.nanmean(left, 0))  # a fallen draw has no say
         self.matrix += scaled @ H.T

@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 from wirebayes.typing import Floats
 
 
-def solve(H: list[list[Floats]], right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Solve ``H x = right`` for symmetric matrices given entry by entry.
+def solve(H: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Solve ``H x = right`` for symmetric matrices.
 
     Parameters
     ----------
-    H : nested list of (n,) arrays
+    H : (d, d, n) array
         Only the upper triangle is read.
     right : (d, n) array
 
@@ -23,32 +23,21 @@ def solve(H: list[list[Floats]], right: Floats) -> tuple[Floats, NDArray[np.bool
         True where every pivot is positive, that is, where the equilibrium would be stable.
     """
     d, n = right.shape
-    L: list[list[Floats]] = [[np.empty(0)] * d for _ in range(d)]
+    # A row and what it has on the right; of the rows below, what is left once the rows above are taken out.
+    left = np.concatenate([H, right[:, None]], 1)
+    floor = 1e-12 * np.abs(H[range(d), range(d)])  # a pivot lost to rounding counts as zero: free to move that way
     positive = np.ones(n, bool)
-    y = np.empty_like(right)
-    inverse = []
+    inverse = np.empty((d, n))
     for j in range(d):
-        pivot = H[j][j]
-        for k in range(j):
-            pivot = pivot - L[j][k] * L[j][k]
-        # A pivot lost to rounding counts as zero: the platform is free to move that way.
-        good = pivot > 1e-12 * np.abs(H[j][j])
+        pivot = left[j, j]
+        good = pivot > floor[j]
         positive &= good
-        inv = 1.0 / np.sqrt(np.where(good, pivot, 1.0))
-        inverse.append(inv)
-        for i in range(j + 1, d):
-            value = H[j][i]
-            for k in range(j):
-                value = value - L[i][k] * L[j][k]
-            L[i][j] = value * inv
-        total = right[j]
-        for k in range(j):
-            total = total - L[j][k] * y[k]
-        y[j] = total * inv
-    x = np.empty_like(right)
+        inverse[j] = 1.0 / np.sqrt(np.where(good, pivot, 1.0))
+        row = left[j, j + 1 :]
+        row *= inverse[j]
+        left[j + 1 :, j + 1 :] -= row[:-1, None] * row
+    x = left[:, d]
     for j in reversed(range(d)):
-        total = y[j]
-        for k in range(j + 1, d):
-            total = total - L[k][j] * x[k]
-        x[j] = total * inverse[j]
+        x[j] *= inverse[j]
+        x[:j] -= left[:j, j] * x[j]
     return x, positive

@@ -25,10 +25,11 @@ def vector(rotation: Floats) -> Floats:
 
 def cross_matrix(v: Floats) -> Floats:
     """``(..., 3, 3)`` matrices K with ``K x = v × x``."""
-    z = np.zeros(np.shape(v)[:-1])
-    x, y, w = v[..., 0], v[..., 1], v[..., 2]
-    rows = [np.stack(r, -1) for r in ([z, -w, y], [w, z, -x], [-y, x, z])]
-    return np.stack(rows, -2)
+    out = np.zeros((*np.shape(v)[:-1], 3, 3))
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out
 
 
 def tilt(rotation: Floats, commanded: Floats | None = None) -> Floats:

@@ -86,8 +86,10 @@ def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
     """Vectors ``(3, w, n)`` at platform points with their moments about the reference point, as far as they count."""
     if robot.degrees == 3:
         return u
-    moment = [r[1] * u[2] - r[2] * u[1], r[2] * u[0] - r[0] * u[2], r[0] * u[1] - r[1] * u[0]]
-    return np.concatenate([u, np.stack(moment)])
+    out = np.empty((6, *u.shape[1:]), u.dtype)
+    out[:3] = u
+    out[3], out[4], out[5] = r[1] * u[2] - r[2] * u[1], r[2] * u[0] - r[0] * u[2], r[0] * u[1] - r[1] * u[0]
+    return out
 
 
 def weight(robot: Robot, rotation: Floats) -> Floats:
@@ -141,7 +143,7 @@ def stretched(robot: Robot, shape: Geometry, offset_m: Floats) -> Floats:
 
 def unbalance_and_stiffness(
     robot: Robot, shape: Geometry, rotation: Floats, tension_N: Floats, slope_N_m: Floats
-) -> tuple[Floats, list[list[Floats]]]:
+) -> tuple[Floats, Floats]:
     """Gradient and Hessian of the potential energy by a small motion.
 
     Parameters
@@ -156,9 +158,8 @@ def unbalance_and_stiffness(
     -------
     gradient : (6 or 3, n) array
         Minus the net wrench.
-    hessian : nested list of (n,) arrays
-        Stiffness matrix, its rotational block symmetrised (which it is by itself at an equilibrium); upper triangle
-        filled in both halves.
+    hessian : (6, 6, n) or (3, 3, n) array
+        Stiffness matrix, its rotational block symmetrised (which it is by itself at an equilibrium).
     """
     J = jacobian(robot, shape)
     m = robot.lines[:, None]
@@ -166,49 +167,53 @@ def unbalance_and_stiffness(
     beta = pull / shape.straight_m
     alpha = slope_N_m * (m * m) - beta
     degrees = robot.degrees
-    gradient = (J * pull).sum(1) - weight(robot, rotation)
+    gradient = (J * pull).sum(1)
+    force = robot.mass_kg * GRAVITY
+    gradient[2] += force
     scaled = J * alpha
-    H: list[list[Floats]] = [[np.empty(0)] * degrees for _ in range(degrees)]
-    for i in range(degrees):
-        for j in range(i, degrees):
-            H[i][j] = (scaled[i] * J[j]).sum(0)
+    H = np.empty((degrees, degrees, scaled.shape[-1]))
+    for i in range(degrees):  # the upper triangle, a row at once
+        H[i, i:] = (scaled[i] * J[i:]).sum(1)
     if shape.over is not None:
         side = _with_moments(robot, shape.over.across, shape.arm_m)
         swivel = side * (pull * shape.over.swing_1_m)
         for i in range(degrees):
-            for j in range(i, degrees):
-                H[i][j] = H[i][j] + (swivel[i] * side[j]).sum(0)
+            H[i, i:] += (swivel[i] * side[i:]).sum(1)
     total = beta.sum(0)
     for i in range(3):
-        H[i][i] = H[i][i] + total
+        H[i, i] += total
     if degrees == 6:
-        _add_rotation(robot, shape, rotation, pull, beta, H)
+        moment = force * turned(robot.centre_of_mass_m[None], rotation)[:, 0]
+        gradient[3] += moment[1]
+        gradient[4] -= moment[0]
+        _add_rotation(shape, moment, pull, beta, H)
     for i in range(degrees):
-        for j in range(i):
-            H[i][j] = H[j][i]
+        H[i + 1 :, i] = H[i, i + 1 :]
     return gradient, H
 
 
-def _add_rotation(
-    robot: Robot, shape: Geometry, rotation: Floats, pull: Floats, beta: Floats, H: list[list[Floats]]
-) -> None:
-    """Second-order terms of a rotation: swinging wires, turning lever arms, the turning weight."""
+def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H: Floats) -> None:
+    """Second-order terms of a rotation in the upper triangle: swinging wires, turning lever arms, turning weight.
+
+    `moment` is the weight times the centre of mass's arm, ``(3, n)``.
+    """
     r, u = shape.arm_m, shape.direction
-    s = [(beta * r[k]).sum(0) for k in range(3)]
+    swung = beta * r
+    s = swung.sum(1)
     # -Σβ[r]×, the coupling of displacement and rotation
-    H[0][4], H[0][5] = H[0][4] + s[2], H[0][5] - s[1]
-    H[1][3], H[1][5] = H[1][3] - s[2], H[1][5] + s[0]
-    H[2][3], H[2][4] = H[2][3] + s[1], H[2][4] - s[0]
-    force = robot.mass_kg * GRAVITY
-    c = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
-    f = (0.0, 0.0, -force)
-    q = pull * u - beta * r  # Σ τ u rᵀ - β r rᵀ in one outer product
-    trace = sum((q[k] * r[k]).sum(0) for k in range(3)) - c[2] * f[2]
+    H[0, 4] += s[2]
+    H[0, 5] -= s[1]
+    H[1, 3] -= s[2]
+    H[1, 5] += s[0]
+    H[2, 3] += s[1]
+    H[2, 4] -= s[0]
+    q = pull * u - swung  # Σ τ u rᵀ - β r rᵀ in one outer product
+    outer = np.stack([(q[i] * r).sum(1) for i in range(3)])
+    outer[2] += moment  # the weight, an arm of its own
+    trace = outer[0, 0] + outer[1, 1] + outer[2, 2]
+    H[3:, 3:] += 0.5 * (outer + outer.swapaxes(0, 1))
     for i in range(3):
-        for j in range(i, 3):
-            swing = 0.5 * (q[i] * r[j] + q[j] * r[i]).sum(0)
-            gravity = 0.5 * (f[i] * c[j] + f[j] * c[i])
-            H[3 + i][3 + j] = H[3 + i][3 + j] + swing - gravity - (trace if i == j else 0.0)
+        H[3 + i, 3 + i] -= trace
 
 
 def stiffness(
@@ -235,7 +240,7 @@ def stiffness(
     shape = geometry(robot, position_m, rotation)
     tau, slope = tension(wires, stretched(robot, shape, offset_m), zero_m)
     _, H = unbalance_and_stiffness(robot, shape, rotation, tau, slope)
-    return np.stack([np.stack(row, -1) for row in H], -2)
+    return np.moveaxis(H, -1, 0)
 
 
 def potential(

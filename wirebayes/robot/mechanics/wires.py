@@ -170,7 +170,7 @@ def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) ->
     """
     goal = tension_N / wires.theta["k1"]
     effective = goal + np.zeros(np.broadcast_shapes(goal.shape, stretched_m.shape))
-    strain = strain_of(wires.placed, effective, hold_context(wires))
+    strain = strain_of(wires.placed, effective, hold_context(wires)) if wires.at("strain") else effective
     with np.errstate(invalid="ignore"):
         length = stretched_m / (1.0 + strain) if wires.law == "hooke" else stretched_m * (1.0 - strain)
         return np.where(length > 0, length, np.nan)

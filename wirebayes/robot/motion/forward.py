@@ -256,9 +256,9 @@ def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArra
     """A damped Newton step of every case, taken where it leads down, and how it ended (`_GOING_ON` if it did not)."""
     at, damping, level, size = cases.at, cases.damping, cases.level, robot.size_m
     reach = 10.0 * cases.span
-    damped = [row[:] for row in at.H]
+    damped = at.H.copy()
     for i in range(robot.degrees):
-        damped[i][i] = at.H[i][i] + damping * level
+        damped[i, i] += damping * level
     step, positive = cholesky.solve(damped, -at.gradient)
     np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
     length = np.sqrt((step * step).sum(0))
@@ -293,45 +293,43 @@ class _Point:
 
     energy: Floats
     gradient: Floats
-    H: list[list[Floats]]
+    H: Floats
     tau: Floats
     size: Floats
 
     def where(self, accept: NDArray[np.bool_], other: "_Point") -> "_Point":
         if accept.all():
             return other
-        H = [[np.where(accept, b, a) for a, b in zip(r, s, strict=True)] for r, s in zip(self.H, other.H, strict=True)]
-        pick = [np.where(accept, b, a) for a, b in
-                ((self.energy, other.energy), (self.gradient, other.gradient), (self.tau, other.tau),
-                 (self.size, other.size))]  # fmt: skip
-        return _Point(pick[0], pick[1], H, pick[2], pick[3])
+        return _Point(*(np.where(accept, getattr(other, f.name), getattr(self, f.name)) for f in fields(_Point)))
 
     def part(self, keep: NDArray[np.intp]) -> "_Point":
-        H = [[a[keep] for a in row] for row in self.H]
-        return _Point(self.energy[keep], self.gradient[:, keep], H, self.tau[:, keep], self.size[keep])
+        return _Point(*(getattr(self, f.name)[..., keep] for f in fields(_Point)))
 
 
 def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Point:
     shape = statics.geometry(robot, x, R)
     S = statics.stretched(robot, shape, offset)
     tau, slope = tension(wires, S, zero)
-    gradient, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
+    gradient, H = _scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
     height = x[2]
     if robot.degrees == 6:
         c = robot.centre_of_mass_m
         height = height + (R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
-        s = float(scale[3, 0])
-        for i in range(6):
-            for j in range(max(i, 3), 6):
-                H[i][j] = H[i][j] * (s if i < 3 else s * s)
     total = energy(wires, S, zero).sum(0) + robot.mass_kg * GRAVITY * height
-    gradient = gradient * scale
     return _Point(total, gradient, H, tau, np.abs(gradient).max(0))
+
+
+def _scaled(gradient: Floats, H: Floats, scale: Floats) -> tuple[Floats, Floats]:
+    """Gradient and Hessian by rotations in metres at the platform's edge."""
+    if len(gradient) == 6:
+        H[3:] *= scale[3, 0]
+        H[:, 3:] *= scale[3, 0]
+    return gradient * scale, H
 
 
 def balance_at(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
-) -> tuple[Floats, list[list[Floats]]]:
+) -> tuple[Floats, Floats]:
     """Gradient and Hessian of the energy at poses; rotations count in metres at the platform's edge.
 
     Parameters
@@ -349,14 +347,15 @@ def balance_at(
     -------
     gradient : (6 or 3, n) array
         N.
-    hessian : nested lists of (n,) arrays
+    hessian : (6, 6, n) or (3, 3, n) array
         N/m.
     """
     scale = np.ones((robot.degrees, 1))
     scale[3:] = 1.0 / robot.size_m
-    offset = np.broadcast_to(offset_m, zero_m.shape).T
-    at = _evaluate(robot, wires, zero_m.T, offset, position_m.T, np.moveaxis(rotation, 0, -1), scale)
-    return at.gradient, at.H
+    R = rotation.transpose(1, 2, 0)
+    shape = statics.geometry(robot, position_m.T, R)
+    tau, slope = tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)
+    return _scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
 
 
 def tensions_at(
@@ -374,7 +373,7 @@ def tensions_at(
     (n, w) array
         N.
     """
-    shape = statics.geometry(robot, position_m.T, np.moveaxis(rotation, 0, -1))
+    shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
     return tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)[0].T
 
 

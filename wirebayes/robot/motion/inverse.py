@@ -96,11 +96,13 @@ def commands(
     Commands
     """
     grown = 1.0 + creep
-    shape = statics.geometry(robot, position_m.T, np.moveaxis(rotation, 0, -1))
+    shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
     linear = robot.is_linear[:, None]
     tau = tension_N.T
     free = statics.stretched(robot, shape, robot.beyond_m[:, None])
     drum = zero_tension_length(wires, free, tau)
+    if not linear.any():
+        return _of_drums(robot, drum, grown, error_m, tau)
     fixed = (robot.wire_m[:, None] + error_m) * grown
     moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
     zero = np.where(linear, fixed, drum)
@@ -109,6 +111,14 @@ def commands(
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
     zero, joint, offset, tau = np.broadcast_arrays(zero, joint, offset, tau)
     return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, zero.shape[1:]))
+
+
+def _of_drums(robot: Robot, zero: Floats, grown: Floats | float, error_m: Floats | float, tau: Floats) -> Commands:
+    """Commands of a robot without linear actuators, whose lengths beyond the exit points stay."""
+    feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
+    joint = zero / grown - error_m
+    zero, offset, tau = (np.broadcast_to(v, joint.shape) for v in (zero, robot.beyond_m[:, None], tau))
+    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, joint.shape[1:]))
 
 
 def lengths(robot: Robot, joint_m: Floats) -> tuple[Floats, Floats]:

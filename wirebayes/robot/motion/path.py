@@ -164,8 +164,8 @@ def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floa
     x = pose[0] + step[:, :3]
     if robot.degrees == 3:
         return x, pose[1]
-    turn = turning.compose(step[:, 3:].T / robot.size_m, np.moveaxis(pose[1], 0, -1))
-    return x, np.moveaxis(turn, -1, 0)
+    turn = turning.compose(step[:, 3:].T / robot.size_m, pose[1].transpose(1, 2, 0))
+    return x, turn.transpose(2, 0, 1)
 
 
 def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:

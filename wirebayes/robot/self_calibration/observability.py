@@ -39,7 +39,7 @@ def response(
     S, zero = statics.stretched(robot, shape, offset_m.T), zero_m.T
     tau, slope = tension(wires, S, zero)
     _, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
-    K = np.stack([np.stack(row, -1) for row in H], -2)
+    K = np.moveaxis(H, -1, 0)
     J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0)
     motion = np.asarray(-solve(K, J), np.float64)
     change = slope.T[:, :, None] * (np.swapaxes(J, 1, 2) @ motion) + np.eye(robot.legs)

@@ -115,7 +115,7 @@ def _linearised(robot: Robot, loops: _Loops, x: Floats, R: Floats, error: Floats
     J = statics.jacobian(robot, shape) * robot.lines[:, None]
     gap = statics.stretched(robot, shape, loops.offset_m.T).T - (loops.bare_m + error) * loops.stretch
     balance, H = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
-    K = np.stack([np.stack(row, -1) for row in H], -2) * (scale * scale.T)
+    K = np.moveaxis(H, -1, 0) * (scale * scale.T)
     loop_by_pose = np.moveaxis(J * scale[:, None], -1, 0).swapaxes(1, 2) * loops.weight[..., None]
     loop_by_length = -(loops.stretch * loops.weight)[:, None] * np.eye(legs)
     return _Equations(
