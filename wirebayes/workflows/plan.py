@@ -17,6 +17,7 @@ from wirebayes.io.experiment import Experiment, read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
 from wirebayes.io.readings import Hold, frozen
 from wirebayes.io.run_folder import open_run, plain, read_json, write_json
+from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
@@ -239,10 +240,11 @@ def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: 
     aim: tuple[str, ...] = ("parameters",)
     findings = folder / "discovery.json"
     if findings.is_file():
-        found = read_json(findings)["experiments"].get(sample.name, {})
-        rivals = [e for e in (*found.get("set", ()), *found.get("group", ())) if e in effects]
-        rivals = list(dict.fromkeys(rivals))
-        aim = tuple(rivals[:2]) if len(rivals) > 1 else aim
+        report: DiscoveryJson = read_json(findings)
+        if sample.name in report["experiments"]:
+            found = report["experiments"][sample.name]
+            rivals = list(dict.fromkeys(e for e in (*found["set"], *found["group"]) if e in effects))
+            aim = tuple(rivals[:2]) if len(rivals) > 1 else aim
     return _Request(_like(_measured(sample, folder)), guess, aim, None, None, about)
 
 

@@ -18,6 +18,7 @@ from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckJson
 from wirebayes.json_files.comparison import ComparisonJson
 from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.json_files.export import ExportSummary
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 from wirebayes.json_files.pose import PoseJson
@@ -593,7 +594,7 @@ class Calibration(Result[CalibrateJson]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Export(Result[dict[str, Any]]):
+class Export(Result[ExportSummary]):
     """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.
 
     Examples
@@ -609,7 +610,7 @@ class Export(Result[dict[str, Any]]):
         paths = sorted(path for path in self.folder.iterdir() if path.is_file() and path.name not in own)
         return {path.name: path.read_text(encoding="utf-8") for path in paths}
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> ExportSummary:
         """Names of the files, and the rows of the creep table."""
         header, *rows = self.files["creep-table.csv"].splitlines()
         names = header.split(",")

@@ -1,0 +1,10 @@
+"""What `export` prints with ``--json``; the creep table is ``creep-table.csv``."""
+
+from typing import TypedDict
+
+
+class ExportSummary(TypedDict):
+    """Names of the files, and the creep table's rows by its header."""
+
+    files: list[str]
+    creep_table: list[dict[str, float]]
