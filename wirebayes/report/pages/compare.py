@@ -51,7 +51,7 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
         difference, held = r["difference"], r["held_out"]
         errors = (number(s and s["rmse_N"], 2) for s in ((held["free"], held["given_first"]) if held else (None, None)))
         scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
-        lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _brief(r.get("meaning") or "")])
+        lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _plain(r.get("meaning") or "")])
     blocks.append(
         Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")
     )
@@ -61,6 +61,6 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     return Section(name, blocks)
 
 
-def _brief(meaning: str) -> str:
+def _plain(meaning: str) -> str:
     """What follows the figures, which have columns of their own."""
     return re.split("[:;] ", meaning, maxsplit=1)[-1]

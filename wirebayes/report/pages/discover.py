@@ -70,11 +70,11 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
     known = [_held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
-    loose = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
+    unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
     if v.get("next_measurement"):
-        loose.append(f"Measure next: {v['next_measurement']}")
+        unknown.append(f"Measure next: {v['next_measurement']}")
     columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in known if p])]
-    blocks.append(Columns([*columns, Points("What is not known", loose or ["Nothing to report."])]))
+    blocks.append(Columns([*columns, Points("What is not known", unknown or ["Nothing to report."])]))
     file = picture_file(folder, name)
     if file is not None:
         alt = f"Readings of {name} against the plain and the final model."

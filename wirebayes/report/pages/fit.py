@@ -180,17 +180,17 @@ def _measured(stored: Stored) -> Points:
 def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...], trusted: bool) -> list[Points]:
     """What the readings determine and what they do not; only the model's own words where it is not to be trusted."""
     known: list[str] = []
-    loose: list[str] = []
+    undetermined: list[str] = []
     for name, share in shrunk.items():
         unit = unit_text(unit_of(name, effects))
         interval = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
-        (known if share >= MOST else loose).append(interval)
+        (known if share >= MOST else undetermined).append(interval)
     if not trusted:
-        return [Points("90 % intervals, if the model were right", known + loose)]
+        return [Points("90 % intervals, if the model were right", known + undetermined)]
     nothing = ["No parameter."]
     return [
         Points("What the readings determine (90 % intervals)", known or nothing),
-        Points("What the prior still decides", loose or nothing),
+        Points("What the prior still decides", undetermined or nothing),
     ]
 
 

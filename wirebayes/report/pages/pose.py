@@ -52,7 +52,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     if not pose.get("feasible", True):
         sentence = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
         blocks.insert(0, Text(sentence, strong=True))
-    blocks[:0] = [Text(sentence, strong=True) for sentence in _losses(pose)]
+    blocks[:0] = [Text(sentence, strong=True) for sentence in _urgent_warnings(pose)]
     view = robot_view(folder)
     turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
     captions = _CAPTIONS | dict.fromkeys(turned, _TURNED)
@@ -83,10 +83,10 @@ _FILES = (
 _TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "exit point")
 
 
-def _losses(pose: PoseJson) -> list[str]:
+def _urgent_warnings(pose: PoseJson) -> list[str]:
     """What must be read first: falls, slack wires and poses that are not held, as the command said them."""
-    telling = ("falls", "slack", "cannot begin", "cannot pull", "its tension", "softest motion")
-    return [w[:1].upper() + w[1:] + "." for w in pose.get("warnings", []) if any(word in w for word in telling)]
+    urgent = ("falls", "slack", "cannot begin", "cannot pull", "its tension", "softest motion")
+    return [w[:1].upper() + w[1:] + "." for w in pose.get("warnings", []) if any(word in w for word in urgent)]
 
 
 def _requested(pose: PoseJson) -> Points:
@@ -110,7 +110,7 @@ def _requested(pose: PoseJson) -> Points:
 
 
 def _answers(pose: PoseJson) -> list[Points]:
-    known, loose = [], []
+    known, unknown = [], []
     for entry in pose.get("drift", []):
         last = entry["times_s"][-1]
         if entry["distance_mm"]["q50"]:
@@ -130,9 +130,10 @@ def _answers(pose: PoseJson) -> list[Points]:
         chance = number(space["probability"], 2)
         known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
     sentences = [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
-    loose += [sentence for sentence in sentences if sentence not in _losses(pose)]
-    loose.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
-    return [Points("What is known", known or ["Nothing: the pose cannot be held."]), Points("What is not known", loose)]
+    unknown += [sentence for sentence in sentences if sentence not in _urgent_warnings(pose)]
+    unknown.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
+    known = known or ["Nothing: the pose cannot be held."]
+    return [Points("What is known", known), Points("What is not known", unknown)]
 
 
 def _slices(pose: PoseJson) -> list[Block]:
@@ -180,7 +181,7 @@ def _errors(pose: PoseJson) -> list[Block]:
                 continue
             low, middle, high = (entry["distance_mm"][q][i] for q in INTERVAL)
             who = [CONTROLLERS[entry["controller"]], f"{100 * entry['specimen_spread']:g} %"]
-            lines.append([*who, f"{time:g}", number(middle), span(low, high), _lasts(entry)])
+            lines.append([*who, f"{time:g}", number(middle), span(low, high), _longest_time(entry)])
     header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %", "longest time within tolerance, s"]
     return [Table(header, lines, _limits(pose["pose_error"][0]))] if lines else []
 
@@ -190,7 +191,7 @@ def _between(pose: PoseJson) -> list[Block]:
     for entry in pose.get("between_calibrations", []):
         loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
         spread = f"{100 * entry['specimen_spread']:g} %"
-        lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _lasts(entry)])
+        lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _longest_time(entry)])
     header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
     caption = "The pose is exact when a calibration ends. " + (
         _limits(pose["between_calibrations"][0]) if lines else ""
@@ -203,7 +204,7 @@ def _limits(entry: Tolerances) -> str:
     return f"Within tolerance: less than {allowed} with a probability of 95 % at all earlier times."
 
 
-def _lasts(entry: TimeWithin) -> str:
+def _longest_time(entry: TimeWithin) -> str:
     longest = number(float(entry["longest_time_within_s"]))
     return f"more than {longest}" if entry["still_within_at_the_end"] else longest
 

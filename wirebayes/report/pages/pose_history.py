@@ -62,7 +62,7 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
     if not pose["feasible"]:
         return Page(f"Robot {pose['robot']}", lead, [Section("Summary", [Text(pose["sentence"], strong=True)])])
     first: list[Block] = [Columns([Points("What was computed", _requested(pose)), *_answers(pose)])]
-    first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in pose["warnings"] if _loss(w)]
+    first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in pose["warnings"] if _is_urgent(w)]
     files = {name: picture_file(folder, name) for name in _CAPTIONS}
     pictures = {
         name: Picture(embedded(file), _CAPTIONS[name], _CAPTIONS[name], wide=name in _WIDE)
@@ -78,7 +78,7 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed)
 
 
-def _loss(warning: str) -> bool:
+def _is_urgent(warning: str) -> bool:
     """Whether a warning must be read first."""
     return "falls" in warning or "slack" in warning
 
@@ -140,16 +140,16 @@ def _answers(pose: PoseHistoryJson) -> list[Points]:
     left = pose["corrections"]["left_mm"]
     if left["q50"]:
         known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {_last(left)} mm.")
-    loose = [w[:1].upper() + w[1:] + "." for w in pose["warnings"] if not _loss(w)]
+    unknown = [w[:1].upper() + w[1:] + "." for w in pose["warnings"] if not _is_urgent(w)]
     clock = pose["clock"]
-    loose.append(
+    unknown.append(
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
         f"differ by {_mm(clock['largest_mm'])} mm at most, {_mm(clock['at_the_end_mm'])} mm at the end."
     )
     exact = "calibration" not in pose["history"] and not pose["history"].get("reference_sd_mm")
     if exact and pose["history"]["kind"] == "measured":
-        loose.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")
-    return [Points("What is known", known), Points("What is not known", loose)]
+        unknown.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")
+    return [Points("What is known", known), Points("What is not known", unknown)]
 
 
 def _last(band: Band) -> str:
