@@ -190,9 +190,9 @@ def _batch(found: BatchJson) -> list[str]:
 def _planned(row: JudgedProtocol) -> list[str]:
     budget = "" if row["within_budget"] else ", longer than the available time"
     lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
-    known = [f"{name} {row['parameters'][name]['sd_median']:.2g}" for name in _SHOWN if name in row["parameters"]]
+    known = [f"{name} {row['parameters'][name]['sd']:.2g}" for name in _SHOWN if name in row["parameters"]]
     creep = row["creep"]
-    known.append(f"creep after 1 h at {creep['tension_N']:.3g} N {creep['creep_1h_mm']['sd_median']:.2g} mm")
+    known.append(f"creep after 1 h at {creep['tension_N']:.3g} N {creep['creep_1h_mm']['sd']:.2g} mm")
     lines.append(f"  expected sd: {', '.join(known)}")
     if row["robot"] is not None and row["robot"]["drift_sd_mm"] is not None:
         lines.append(f"  drift of the robot after 1 h: sd {row['robot']['drift_sd_mm']:.2g} mm")

@@ -9,15 +9,12 @@ from wirebayes.json_files.values import Statistics
 class ExpectedWidth(TypedDict):
     """Of a quantity's posterior, over the simulated tests.
 
-    `sd` is the mean of its standard deviations, `sd_se` the standard error of that mean, `sd_median` their median,
-    which a few odd draws of a vague guess do not move. `width_90` is the mean length of its 90 % interval; in 90 % of
-    the tests that length lies between `width_90_low` and `width_90_high`. `guess_sd` is the standard deviation before
-    the test.
+    Medians: `sd` of its standard deviation, `width_90` of the length of its 90 % interval; in 90 % of the tests that
+    length lies between `width_90_low` and `width_90_high`. Means would depend on the one test in thirty whose posterior
+    has a second mode or a long tail. `guess_sd` is the standard deviation before the test.
     """
 
     sd: float
-    sd_se: float
-    sd_median: float
     width_90: float
     width_90_low: float
     width_90_high: float

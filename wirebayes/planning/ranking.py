@@ -36,7 +36,7 @@ class Judged:
         if tuple(aim) == ("parameters",):
             return self.expected.information_bits
         if tuple(aim) == ("creep",):
-            return 1.0 / max(self.expected.widths["creep_1h_mm"]["sd_median"], 1e-300)
+            return 1.0 / max(self.expected.widths["creep_1h_mm"]["sd"], 1e-300)
         one, other = aim
         return self.sensitivity.apart(one, other)
 

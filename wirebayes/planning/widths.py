@@ -253,9 +253,8 @@ def _log_volume(theta: Array, weight: Array, problem: Problem) -> Array:
 
 def _width(rows: Array, before: Array) -> ExpectedWidth:
     sd, length = rows.T
-    low, high = np.quantile(length, [0.05, 0.95])
-    se = float(sd.std(ddof=1) / np.sqrt(len(sd))) if len(sd) > 1 else 0.0
+    low, middle, high = np.quantile(length, [0.05, 0.5, 0.95])
     return {
-        "sd": float(sd.mean()), "sd_se": se, "sd_median": float(np.median(sd)), "width_90": float(length.mean()),
-        "width_90_low": float(low), "width_90_high": float(high), "guess_sd": float(before.std()),
+        "sd": float(np.median(sd)), "width_90": float(middle), "width_90_low": float(low), "width_90_high": float(high),
+        "guess_sd": float(before.std()),
     }  # fmt: skip

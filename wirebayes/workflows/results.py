@@ -463,10 +463,7 @@ class Plan(Result[PlanJson]):
     def _repr_html_(self) -> str:
         rows = [
             [row["name"], _figure(row["duration_min"]), _figure(row["information_bits"])]
-            + [
-                _figure(row["parameters"][n]["sd_median"] if n in row["parameters"] else None)
-                for n in ("k1", "B", "k2")
-            ]
+            + [_figure(row["parameters"][n]["sd"] if n in row["parameters"] else None) for n in ("k1", "B", "k2")]
             for row in self.protocols
         ]
         header = ["protocol", "minutes", "bits", "sd of k1, N", "sd of B", "sd of k2"]

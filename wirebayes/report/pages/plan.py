@@ -73,7 +73,7 @@ def _recommended(found: PlanJson) -> Points:
     creep = best["creep"]["creep_1h_mm"]
     points.append(
         f"The creep after an hour at {number(best['creep']['tension_N'])} N would be known to "
-        f"{number(creep['sd_median'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
+        f"{number(creep['sd'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
     )
     if not best["within_budget"]:
         points.insert(0, "No test fits into the available time.")
@@ -95,8 +95,8 @@ def _ranking(found: PlanJson) -> Table:
     lines = [
         [
             str(row["rank"]), row["name"], number(row["duration_min"]), number(row["information_bits"]),
-            *(number(row["parameters"][n]["sd_median"], 2) for n in names),
-            number(row["creep"]["creep_1h_mm"]["sd_median"], 2),
+            *(number(row["parameters"][n]["sd"], 2) for n in names),
+            number(row["creep"]["creep_1h_mm"]["sd"], 2),
             *([number(row["robot"] and row["robot"]["drift_sd_mm"], 2)] if robot else []),
             "yes" if row["within_budget"] else "too long",
         ]
@@ -123,13 +123,13 @@ def _protocol(row: JudgedProtocol) -> list[Block]:
     lines = [
         [
             _words(n),
-            *(number(value, 2) for value in (q["sd_median"], q["sd"], q["width_90"])),
+            *(number(value, 2) for value in (q["sd"], q["width_90"])),
             span(q["width_90_low"], q["width_90_high"], 2),
             "given" if is_given(q) else number(q["guess_sd"], 2),
         ]
         for n, q in quantities.items()
     ]
-    header = ["quantity", "sd, median", "sd, mean", "90 % width, mean", "in 90 % of tests", "sd of the guess"]
+    header = ["quantity", "sd", "90 % width", "in 90 % of tests", "sd of the guess"]
     creep = row["creep"]
     caption = f"Creep of {number(creep['length_mm'])} mm at {number(creep['tension_N'])} N; the longest hold lasts "
     blocks.append(Table(header, lines, caption + f"{number(creep['longest_hold_s'])} s."))

@@ -64,12 +64,12 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
 
 
 def _share(width: ExpectedWidth) -> float:
-    return np.nan if is_given(width) else width["sd_median"] / width["guess_sd"]
+    return np.nan if is_given(width) else width["sd"] / width["guess_sd"]
 
 
 def is_given(width: ExpectedWidth) -> bool:
     """Whether the guess states a value without uncertainty, so that there is nothing to compare with."""
-    return width["guess_sd"] <= _ROUNDING * width["sd_median"]
+    return width["guess_sd"] <= _ROUNDING * width["sd"]
 
 
 _ROUNDING = 1e-9  # of a standard deviation: what is left of a zero
