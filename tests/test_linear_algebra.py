@@ -51,7 +51,8 @@ def test_a_hold_left_out_at_absurd_parameters_is_impossible_and_harms_no_other_d
         by_setting = moves * np.array([0.0, 1.0])[:, None, None]
         carry = np.ones((holds, len(one)))
         line = Linearised(0.0 * moves, by_setting, moves, carry, carry, np.zeros((holds + 1, len(one))))
-        return likelihoods.leave_one_hold_out(line, readings, mask, one, one)
+        seen = readings, mask, one, one
+        return likelihoods.without_each_hold(line, likelihoods.chain(line, *seen), *seen)
 
     both = left_out(slice(0, 2))
     assert np.array_equal(both[:, :1], left_out(slice(0, 1))) and not np.isnan(both).any()

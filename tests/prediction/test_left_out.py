@@ -13,32 +13,36 @@ from wirebayes.prediction import leave_one_hold_out as module
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error, thinned
 
 
-@pytest.mark.parametrize(("tail", "refits"), [(0.49, False), (0.51, True), (np.nan, True)])
-def test_a_heavy_tail_of_the_importance_ratios_asks_for_a_refit(
-    tail: float, refits: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("tail", "sampled"), [(0.49, False), (0.51, True), (np.nan, True)])
+def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
+    tail: float, sampled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Above Pareto k of 0.5, or where it is not defined; what was not refitted counts as converged."""
+    """Above Pareto k of 0.5, or where it is not defined; what was not sampled counts as converged."""
     rng = np.random.default_rng(0)
     log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, without])])
     monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, tail)))
-    chains = SimpleNamespace(converged=False)
-    made: list[int] = []
+    known = np.log(stats.hmean(np.exp(log_p), axis=1))  # weights 1/p: the harmonic mean
+    refitted: list[int] = []
+
+    def in_turn(problem: Problem, holds: list, draws: np.ndarray, elpd: np.ndarray, seed: int, policy: Policy) -> tuple:
+        assert holds == [(0, j) for j in range(4)] and elpd == pytest.approx(known)
+        return np.array([1.0, 2.0, np.nan, 4.0]), True  # the third is apart
 
     def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
-        made.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
-        return SimpleNamespace(flat=np.zeros((500, 8)), chains=chains)
+        refitted.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
+        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=False))
 
+    monkeypatch.setattr(module, "log_densities", in_turn)
     monkeypatch.setattr(module, "fit", fit_without)
+    monkeypatch.setattr(module, "_by_steps", lambda problem, sample, hold, theta, seed: 3.0)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
     found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
-    assert list(found.refitted) == [refits] * 4 and found.converged is not refits
-    assert made == ([0, 1, 2, 3] if refits else [])
-    assert shares == [0.25, 0.5, 0.75, 1.0]
-    if not refits:  # weights 1/p: the harmonic mean
-        assert found.elpd == pytest.approx(np.log(stats.hmean(np.exp(log_p), axis=1)))
+    assert list(found.refitted) == [sampled] * 4 and found.converged is not sampled
+    assert refitted == ([2] if sampled else []) and shares == ([0.75, 1.0] if sampled else [1.0])
+    assert found.elpd == pytest.approx([1.0, 2.0, 3.0, 4.0] if sampled else known)
 
 
 def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch: pytest.MonkeyPatch) -> None:

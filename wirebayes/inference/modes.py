@@ -242,7 +242,7 @@ def search(
     width = passed.std(axis=0)
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
     start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
-    found = _distinct([climb(lambda points, rows: target(points), start)])
+    found = distinct([climb(lambda points, rows: target(points), start)])
     looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     for _ in range(_LOOKS):
@@ -253,7 +253,7 @@ def search(
         share = sag[strange] / sag[strange].sum()
         chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
         known, before = partial(_near, modes=found.z, curvature=found.curvature), len(found.z)
-        found = _distinct([found, climb(lambda points, rows: target(points), passed[chosen], until=known)])
+        found = distinct([found, climb(lambda points, rows: target(points), passed[chosen], until=known)])
         if len(found.z) < before + _MANY:
             break
     return Search(found, warm, cold, cold_height)
@@ -274,8 +274,18 @@ def _sag(target: LogPosterior, z: Array, height: Array, found: Optimum) -> Array
     return least
 
 
-def _distinct(found: Sequence[Optimum]) -> Optimum:
-    """The rows that no better one is near, none hopelessly below the best; best first."""
+def distinct(found: Sequence[Optimum]) -> Optimum:
+    """The rows that no better one is near, none hopelessly below the best; best first.
+
+    Parameters
+    ----------
+    found : sequence of Optimum
+        What climbs returned, put together.
+
+    Returns
+    -------
+    Optimum
+    """
     every = Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
     order = np.argsort(-every.log_density)
     keep: list[int] = []

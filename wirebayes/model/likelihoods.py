@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.linear_algebra import inv, log_determinant, solve
 from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
@@ -209,51 +208,79 @@ def jacobian(line: Linearised) -> Array:
     return out
 
 
-def leave_one_hold_out(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> Array:
-    """Probability of each hold's readings given those of all other holds, from the inverse of V by blocks.
+def without_each_hold(
+    line: Linearised, filtered: Filtered, readings: Array, mask: Array, variance: Array, setting_sd: Array
+) -> Array:
+    """Probability of the readings of all holds but one, for each hold in turn.
 
-    The hold's displacement and duration stay: only its readings are left out.
+    The hold's displacement and duration stay: only its readings are left out. What the holds before it say of the
+    carried creep is in `filtered`; what those after it say is gathered from the last hold backwards (a two-filter
+    smoother), as an information vector, because at first it is nothing.
 
     Parameters
     ----------
-    line : Linearised
-        The staircase, all holds included, with its derivatives.
-    readings : (H, R, n) or (H, R, 1) array
-        Tensions, N; what `mask` leaves out is ignored.
-    mask : (H, R) bool array
-        True where a reading was taken.
-    variance : (n,) array
-        Of one reading, rounding included, N² (`reading_variance`).
-    setting_sd : (n,) array
-        Standard deviation of a hold's position, mm.
+    line, readings, mask, variance, setting_sd
+        As for `chain`.
+    filtered : Filtered
+        What `chain` returned for them.
 
     Returns
     -------
     (H, n) array
-        Log densities; zero for an unrecorded hold, -inf where the model cannot be computed.
+        Log densities.
     """
-    holds, width, n = line.tension.shape
-    jac = np.moveaxis(jacobian(line), -1, 0) * mask[None, :, :, None]
-    residual: Array = np.moveaxis(np.where(mask[..., None], readings - line.tension, 0.0), -1, 0)
-    # Woodbury: V^-1 = (I - K (I + Kᵀ K)^-1 Kᵀ) / variance with K = setting J / sd of a reading.
-    scaled = jac.reshape(n, holds * width, holds) * (setting_sd / np.sqrt(variance))[:, None, None]
-    usable = np.asarray(np.isfinite(scaled).all(axis=(1, 2)) & np.isfinite(residual).all(axis=(1, 2)))
-    scaled, residual = np.where(usable[:, None, None], scaled, 0.0), np.where(usable[:, None, None], residual, 0.0)
-    inner = inv(np.eye(holds) + np.swapaxes(scaled, 1, 2) @ scaled)
-    r = residual.reshape(n, holds * width)
-    along = np.einsum("nbj,nb->nj", scaled, r)
-    pulled = (r - np.einsum("nai,ni->na", scaled, np.einsum("nij,nj->ni", inner, along))) / variance[:, None]
-    out = np.zeros((holds, n))
-    for j in np.flatnonzero(np.any(mask, axis=1)):
-        rows = j * width + np.flatnonzero(mask[j])
-        k = scaled[:, rows]
-        block = (np.eye(len(rows)) - k @ inner @ np.swapaxes(k, 1, 2)) / variance[:, None, None]
-        q = pulled[:, rows]
-        logdet = log_determinant(block)
-        square = np.einsum("na,na->n", q, solve(block, q[..., None])[..., 0])
-        value = -0.5 * (square - logdet + len(rows) * _LOG_2PI)
-        out[j] = np.where(usable & np.isfinite(value), value, -np.inf)
+    holds, _, n = line.tension.shape
+    noise, out = _Noise.of(variance, setting_sd), np.cumsum(filtered.log_likelihood, axis=0) - filtered.log_likelihood
+    later = _Later(np.zeros(n), np.zeros(n), np.zeros(n))
+    for j in reversed(range(holds)):
+        m, p = filtered.carried_mean[j], filtered.carried_var[j]
+        a, c = line.carry_by_creep[j], line.carry_by_setting[j]
+        out[j] += later.log_density(a * m, a * a * p + c * c * noise.setting_var)
+        later = later.with_hold(line, j, readings[j], mask[j], noise)
     return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Later:
+    """Log density of the later holds' readings by the creep x carried into them: constant + pull x - precision x² / 2.
+
+    Each (n,).
+    """
+
+    precision: Array
+    pull: Array
+    constant: Array
+
+    def log_density(self, mean: Array, var: Array) -> Array:
+        """Of those readings, the carried creep being normal with this mean and variance."""
+        wider = 1.0 + self.precision * var
+        square = self.precision * mean**2 - 2.0 * self.pull * mean - self.pull**2 * var
+        return np.asarray(self.constant - 0.5 * (square / wider + np.log(wider)))
+
+    def with_hold(self, line: Linearised, j: int, readings: Array, mask: Array, noise: _Noise) -> "_Later":
+        """The same with the readings (R, n) of hold j, the one before them, by the creep carried into that hold.
+
+        Parameters
+        ----------
+        line : Linearised
+        j : int
+        readings : (R, n) or (R, 1) array
+        mask : (R,) bool array
+        noise : _Noise
+        """
+        a, c, q = line.carry_by_creep[j], line.carry_by_setting[j], noise.setting_var
+        by_c, by_s = line.by_creep[j][mask], line.by_setting[j][mask]
+        r = readings[mask] - line.tension[j][mask]
+        cc, cs, ss, cr, sr, rr = (
+            np.einsum("rn,rn->n", one, other) * noise.weight
+            for one, other in ((by_c, by_c), (by_c, by_s), (by_s, by_s), (by_c, r), (by_s, r), (r, r))
+        )
+        # jointly in the carried creep and the setting error, which is then integrated out
+        cross, pull_s = cs + self.precision * a * c, sr + self.pull * c
+        wider = 1.0 + q * (ss + self.precision * c * c)
+        precision = cc + self.precision * a * a - q * cross * cross / wider
+        constant = self.constant - 0.5 * (rr + len(r) * noise.log_variance + np.log(wider) - q * pull_s**2 / wider)
+        return _Later(np.maximum(precision, 0.0), cr + self.pull * a - q * cross * pull_s / wider, constant)
 
 
 def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array) -> Array:

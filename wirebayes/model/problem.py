@@ -124,18 +124,34 @@ class Problem:
             total: Array = sum(holds.sum(axis=0) for holds in self.hold_log_likelihood(theta, readings))
         return np.where(np.isfinite(total), total, -np.inf)
 
+    def without_each_hold(self, theta: Array) -> tuple[Array, list[Array]]:
+        """(n,) log-likelihood, and per sample the (H, n) of the readings of all holds, of all samples, but one."""
+        with np.errstate(all="ignore"):
+            if self.likelihood == "hold":
+                own = self.hold_log_likelihood(theta)
+                whole = np.sum([holds.sum(axis=0) for holds in own], axis=0)
+                return whole, [whole - holds for holds in own]
+            each, without = [], []
+            for sample in self.samples:
+                line, variance, setting_sd = self.linearised(theta, sample)
+                seen = sample.readings, sample.protocol.mask, variance, setting_sd
+                filtered = likelihoods.chain(line, *seen)
+                each.append(filtered.log_likelihood.sum(axis=0))
+                without.append(likelihoods.without_each_hold(line, filtered, *seen))
+            whole = np.sum(each, axis=0)
+            return whole, [rest + (whole - own) for rest, own in zip(without, each, strict=True)]
+
     def leave_one_hold_out(self, theta: Array) -> list[Array]:
-        """Per sample the (H, n) log p(readings of a hold | all other readings, parameters)."""
-        if self.likelihood == "hold":
-            return self.hold_log_likelihood(theta)
+        """Per sample the (H, n) log p(readings of a hold | all other readings, parameters); 0 for an unrecorded hold.
+
+        -inf where the model cannot be computed.
+        """
+        whole, without = self.without_each_hold(theta)
         out = []
-        for sample in self.samples:
-            own = self.parameters(theta, sample)
-            variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
-            line = linearise(sample.protocol, own, sample.model)
-            out.append(
-                likelihoods.leave_one_hold_out(line, sample.readings, sample.protocol.mask, variance, own["setting_sd"])
-            )
+        for sample, rest in zip(self.samples, without, strict=True):
+            with np.errstate(all="ignore"):
+                value = np.where(sample.protocol.recorded[:, None], whole - rest, 0.0)
+            out.append(np.where(np.isfinite(value), value, -np.inf))
         return out
 
     def linearised(self, theta: Array, sample: Sample) -> tuple[Linearised, Array, Array]:
