@@ -135,9 +135,9 @@ def smoothed_leave_one_hold_out(
         own = seed_of(seed, "left out in turn")
         elpd[poor], converged = log_densities(problem, [where[i] for i in poor], theta, elpd[poor], own, policy)
     apart = np.flatnonzero(np.isnan(elpd))
-    for done, i in enumerate(apart):
+    for done, i in enumerate(apart.tolist()):
         progress((len(where) - len(apart) + done) / len(where))
-        s, j = where[int(i)]
+        s, j = where[i]
         own = seed_of(seed, "without", str(s), str(j))
         without = fit(without_hold(problem, s, j), own, policy=policy, rough=theta)
         if k[i] > _NO_OVERLAP or not exact:
