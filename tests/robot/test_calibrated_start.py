@@ -158,9 +158,9 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     known = content["history"]["calibration"]
     assert known["holds"] == 5
     assert known["duration_s"] == 150
-    said = json.loads((done / "calibrate.json").read_text())["with_creep_model"]["reference_error_mm"]
-    np.testing.assert_allclose(known["reference_error_mm"]["mean"], said["mean"])
-    np.testing.assert_allclose(known["reference_error_mm"]["sd"], said["sd"])
+    calibrated = json.loads((done / "calibrate.json").read_text())["with_creep_model"]["reference_error_mm"]
+    np.testing.assert_allclose(known["reference_error_mm"]["mean"], calibrated["mean"])
+    np.testing.assert_allclose(known["reference_error_mm"]["sd"], calibrated["sd"])
     assert "goes on where a calibration of 5 holds and 150 s ended" in (out / "report.html").read_text()
     capsys.readouterr()
     astray = tmp_path / "astray"
@@ -177,7 +177,7 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     heavier = tmp_path / "heavier.toml"
     text = (resources.files("wirebayes") / "data" / "robots" / "linear-7.toml").read_text()
     heavier.write_text(text.replace("mass_kg = 0.9", "mass_kg = 0.8"))
-    for arguments, said in (
+    for arguments, message in (
         ([*begin, "--calibration", str(done)], "--calibration: found beside a single pose"),
         ([*begin, *joint, "--calibration", str(done), "--reference-sd", "2"], "--reference-sd: found beside"),
         ([*begin, *joint, "--calibration", str(tmp_path / "no")], "found no calibrate.json in"),
@@ -189,6 +189,6 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     ):
         assert main([*arguments, "--output", str(tmp_path / "refused")]) == 2
         line = capsys.readouterr().err.strip()
-        assert said in line
+        assert message in line
         assert "\n" not in line
         assert not (tmp_path / "refused").exists()

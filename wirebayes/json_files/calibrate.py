@@ -74,7 +74,7 @@ class SessionDone(TypedDict):
 
 
 class CalibratedUnknowns(TypedDict):
-    """``unknowns.json``: the posterior that ``pose --calibration`` starts from.
+    """The posterior that ``pose --calibration`` starts from.
 
     `mean` and `covariance` are of the reference errors of all wires (m), the line's parameters (`line` names them;
     logarithms of those that are positive) and the logarithmic deviations of every wire's own parameters.
@@ -87,6 +87,17 @@ class CalibratedUnknowns(TypedDict):
     mean: Numbers
     covariance: Numbers
     session: SessionDone
+
+
+class BelongsTo(TypedDict):
+    """Hashes of the robot and of the posterior of its wires."""
+
+    robot: str
+    wires: str
+
+
+class UnknownsJson(BelongsTo, CalibratedUnknowns):
+    """The whole of ``unknowns.json``."""
 
 
 class CalibrateJson(CalibratedPoses, Observed):

@@ -10,6 +10,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
+from wirebayes.json_files.calibrate import BelongsTo, CalibrateJson, UnknownsJson
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
@@ -125,7 +126,8 @@ def calibrate(
                 found, known = answer(machine, prior, session, values, seed)
             write_json(run.directory / "calibrate.json", found)
             if found["with_creep_model"]["converged"]:
-                write_json(run.directory / UNKNOWNS, {**_belongs_to(machine, wires, experiment), **to_dict(known)})
+                unknowns: UnknownsJson = {**_belongs_to(machine, wires, experiment), **to_dict(known)}
+                write_json(run.directory / UNKNOWNS, unknowns)
             if found["pose_now"] is not None:
                 from wirebayes.report.pictures.robot import still_points  # matplotlib only where it is needed
 
@@ -162,7 +164,7 @@ def calibrated_of(
     folder = calibration.folder if isinstance(calibration, Calibration) else Path(calibration)
     expected = f"expected a calibration of {robot.name} that has converged"
     summary = folder / "calibrate.json"
-    found = read_json(summary, f"--calibration: found no calibrate.json in {folder}, {expected}")
+    found: CalibrateJson = read_json(summary, f"--calibration: found no calibrate.json in {folder}, {expected}")
     with stored_results(summary):
         name, converged = str(found["robot"]), bool(found["with_creep_model"]["converged"])
     if name != robot.name:
@@ -171,7 +173,7 @@ def calibrated_of(
         raise InputError(f"--calibration: found one that has not converged in {folder}, {expected}")
     path = folder / UNKNOWNS
     absent = f"{path}: found no such file, expected what calibrate writes; run it again in a new folder"
-    stored = read_json(path, absent)
+    stored: UnknownsJson = read_json(path, absent)
     with stored_results(path):
         own = _belongs_to(robot, wires, experiment)
         if stored["robot"] != own["robot"]:
@@ -181,7 +183,7 @@ def calibrated_of(
         return from_dict(stored, robot, line)
 
 
-def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> dict[str, str]:
+def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> BelongsTo:
     """What tells a robot and the posterior of its wires from others."""
     posterior = posterior_of(wires, experiment)
     kept = posterior if isinstance(posterior, str) else content(posterior)

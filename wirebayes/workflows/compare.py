@@ -14,7 +14,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.data_checks import of_experiments
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
-from wirebayes.json_files.comparison import ComparisonJson
+from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.problem import Likelihood
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import without_script
@@ -217,7 +217,7 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
         content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}}
         for one in plan.experiments:
             with stored_results(place.path / one.name):
-                models = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
+                models: list[ModelJson] = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
                 content["experiments"][one.name] = side_by_side(models, BASE)
             pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
         write_json(place.path / "comparison.json", content)

@@ -6,6 +6,7 @@ from typing import Any
 
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, read_json
+from wirebayes.json_files.summary import SummaryJson
 from wirebayes.workflows.fit import fits_in
 from wirebayes.workflows.options import PathLike, path_of
 from wirebayes.workflows.results import (
@@ -70,7 +71,8 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
     """
     place, own = Place(Path(folder)), path_of(own_effects)
     if (place.path / POSTERIOR).is_file():
-        name = str(read_json(place.path / SUMMARY)["experiment"])
+        summary: SummaryJson = read_json(place.path / SUMMARY)
+        name = str(summary["experiment"])
         return Posterior(place, own, computed=False, name=name)
     absent = f"{place.path}: found no {CONFIGURATION}, expected a folder of results"
     configuration = read_json(place.path / CONFIGURATION, absent)

@@ -225,7 +225,7 @@ class Posterior(Result[SummaryJson]):
         """What is suspicious about the readings, and why the posterior should not be believed, if so."""
         path, name = self.folder / SUMMARY, self.within if self.within != "." else self.name
         with stored_results(path):
-            summary = read_json(path)
+            summary: SummaryJson = read_json(path)
             return tuple(f"{name}: {message}" for message in cautions(summary))
 
     def _short_form(self) -> list[str]:
