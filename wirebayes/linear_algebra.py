@@ -37,12 +37,6 @@ def eigh(matrices: Array) -> tuple[Array, Array]:
     return values, vectors
 
 
-def log_determinant(matrices: Array) -> Array:
-    """Logarithms ``(...)`` of the determinants' sizes; NaN where a matrix is not finite."""
-    (out,) = _each(lambda a: (np.linalg.slogdet(a)[1],), matrices)
-    return out
-
-
 def _each(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> tuple[Array, ...]:
     """Results of a numpy function for every matrix of the stack it can be computed for."""
     usable = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))

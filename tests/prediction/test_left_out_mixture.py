@@ -1,17 +1,21 @@
 """All posteriors without a hold at once: the sum against its members, estimates against known integrals."""
 
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.special import logsumexp
 
+from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import ensemble
+from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.problem import Problem, build
 from wirebayes.prediction import left_out_mixture as module
-from wirebayes.prediction.leave_one_hold_out import without_hold
-from wirebayes.prediction.left_out_mixture import LeftOutMixture, log_densities
+from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, without_hold
+from wirebayes.prediction.left_out_mixture import LeftOutMixture, log_densities, log_mean
 
 
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
@@ -110,3 +114,37 @@ def test_a_sampling_that_did_not_converge_is_said(monkeypatch: pytest.MonkeyPatc
     draws = Normals().drawn(np.array([3.0, -1.0, -np.inf]), 4000, np.random.default_rng(1))
     monkeypatch.setattr(module, "_sampled", lambda *a: (draws, False))
     assert not found([0, 1], [3.0, -1.0])[1]
+
+
+@dataclass(frozen=True)
+class Between(Problem):
+    """The readings of the first hold count to a power only: 0 leaves them out, 1 is the full posterior."""
+
+    power: float = 1.0
+
+    def log_likelihood(self, theta: np.ndarray, readings: object = None) -> np.ndarray:
+        whole, without = self.without_each_hold(theta)
+        with np.errstate(all="ignore"):
+            value = without[0][0] + self.power * (whole - without[0][0])
+        return np.where(np.isfinite(value), value, -np.inf)
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+def test_a_hold_that_is_apart_agrees_with_thermodynamic_integration() -> None:
+    """The kite line's first hold, by posteriors at eight powers of its density, neighbours bridged."""
+    policy = Policy(walkers=64, round_draws=2048, ess=4000.0)
+    problem = build([experiments()[3]])
+    powers = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0]
+    log_p = []
+    for power in powers:
+        target = LogPosterior(Between(problem.samples, problem.prior, problem.likelihood, power))
+        z = ensemble.sample(target, 1, policy).z
+        theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
+        log_p.append(problem.leave_one_hold_out(theta)[0][0])
+    steps = zip(np.diff(powers), log_p[:-1], log_p[1:], strict=True)
+    expected = sum(log_mean(step * low, step * high) for step, low, high in steps)
+    fitted = fit(problem, 1, policy=replace(policy, ess=2000.0))
+    found = [smoothed_leave_one_hold_out(fitted, seed).elpd[0] for seed in (1, 2, 3)]
+    # draws of both ways know the density to some 0.15
+    assert np.mean(found) == pytest.approx(expected, abs=0.4)
