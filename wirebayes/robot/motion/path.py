@@ -19,6 +19,9 @@ from wirebayes.typing import Floats
 
 _SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
 _TRUST = 0.5  # a step that ends further from its prediction, relative to its length, is divided
+# The longest prediction that is believed, of the robot's span, and rad: where wires slacken at the new lengths the
+# stiffness is all but singular, the prediction goes anywhere, and any jump would be within its trust.
+_FARTHEST, _FARTHEST_RAD = 0.05, 0.5
 _SMALL = 1e-7  # of the platform's size: so short a Newton step leaves only rounding
 _JUMP = 1e-7  # of the robot's span: the smallest jump that counts as one
 
@@ -109,6 +112,8 @@ def _step(
         np.linalg.norm(there.position_m - predicted[0], axis=1), robot.size_m * np.linalg.norm(turn, axis=(1, 2))
     )
     near = off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
+    near &= np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
+    near &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
     return there, np.asarray(there.found & near)
 
 
