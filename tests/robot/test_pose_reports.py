@@ -237,7 +237,7 @@ def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, 
     line = draws.WireDraws({k: np.exp(rng.standard_normal(40)) for k in draws.CORE}, 1000.0)
     size = 1e-2 * (10.0 + np.log(line.parameters["B"]))
     size[held:] = NAN
-    courses = {s: at(size * (1.0 + s), np.zeros(40)) for s in (0.0, 0.1)}
+    courses = {s: at(size * (1.0 + s), np.zeros(40), (0.0, 30.0, 60.0)) for s in (0.0, 0.1)}
     found = answer._shares(line, courses, np.zeros(3), np.eye(3))
     assert (found["time_s"], found["output"]) == (60.0, "distance")
     if not shared:
