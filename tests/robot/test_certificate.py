@@ -3,7 +3,7 @@ import pytest
 
 from wirebayes.robot.mechanics import rotation, schema
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward
+from wirebayes.robot.motion import claim, forward
 from wirebayes.robot.proof.certificate import certify
 from wirebayes.robot.proof.enclosure import enclose
 
@@ -52,6 +52,17 @@ def test_every_sampled_pose_lies_in_the_guaranteed_enclosure(name):
         cayley = 2 * np.tan(0.5 * np.linalg.norm(turn, axis=1, keepdims=True)) * turn / np.linalg.norm(
             turn, axis=1, keepdims=True)  # fmt: skip
         assert (robot.size_m * np.abs(cayley).max(0) <= proof.radius_m[3:]).all()
+
+
+def test_a_proof_grows_with_the_robot():
+    """Lengths times a power of two, which rounds nothing: so are both boxes."""
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    known, many = np.full(robot.legs, k1), 2.0**7
+    small = certify(robot, "hooke", (known, known), (zero, zero), offset, x, R)
+    big = claim.scaled(robot, many, robot.mass_kg)
+    large = certify(big, "hooke", (known, known), (many * zero, many * zero), many * offset, many * x, R)
+    assert large.proved and large.unique_m == pytest.approx(many * small.unique_m, rel=1e-6)
+    np.testing.assert_allclose(large.radius_m, many * small.radius_m, rtol=1e-6)
 
 
 def test_a_wrong_pose_is_not_certified():

@@ -72,6 +72,9 @@ def test_poses_that_the_commands_do_not_hold_are_not_proved(hung: Any) -> None:
     one = way(robot, wires, course)
     assert one.proved(robot.home_m, np.eye(3), k1) is not None
     assert one.proved(robot.home_m + [0.0, 0.0, 0.01], np.eye(3), k1) is None
+    near = np.array([0.0, 0.0, 1e-6 * robot.span_m])  # what counts as the same place, relative to the robot's size
+    assert one.proved(robot.home_m + 0.8 * near, np.eye(3), k1) is not None
+    assert one.proved(robot.home_m + 1.2 * near, np.eye(3), k1) is None
     slack = proofs._Way(robot, wires.law, one.k1, one.strain, one.bare + 5.0, one.offset)
     assert slack.proved(robot.home_m, np.eye(3), k1) is None
 
