@@ -191,6 +191,8 @@ class _Way:
     def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> bool:
         p = []
         for value, (low, high) in ((k1_N, self.k1), (strain, band)):
+            if not np.all((low <= value) & (value <= high)):  # of wires that the proof does not cover
+                return False
             half = 0.5 * (high - low)
             p.append((value - 0.5 * (low + high)) / np.where(half > 0, half, 1.0))
         return proof.holds(here[0], here[1], np.concatenate(p), self.robot.size_m, here[2])
