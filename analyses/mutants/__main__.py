@@ -21,7 +21,8 @@ from analyses.mutants.tree import copy_of_the_checkout, preload, run
 # What decides, by package.
 MODULES = {
     "model": ["likelihoods", "problem"],
-    "inference": ["convergence", "sampler/burn_in", "sampler/ensemble", "sampler/kept", "sampler/moves"],
+    "inference": ["convergence", "sampler/burn_in", "sampler/ensemble", "sampler/kept", "sampler/moves",
+                  "sampler/stop_rule"],
     "results": ["contraction", "identifiability", "outliers", "posterior_checks"],
     "prediction": ["held_out", "leave_one_hold_out", "predictive", "table"],
     "comparison": ["candidates", "compare"],

@@ -8,7 +8,7 @@ import pytest
 
 from analyses.hidden_effects.cases import SIZES, seal, specs
 from wirebayes import cli, workers
-from wirebayes.discovery import held_out, linear_scan, power, screening
+from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
 from wirebayes.discovery.search import discover, final_models, investigate
 from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE, named
@@ -180,7 +180,9 @@ def test_what_two_lengths_leave_open_a_third_one_tells(tmp_path: Path) -> None:
     experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
     block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
     probes = {p.effect.name: p for p in screening.candidate_probes([block], CATALOGUE)[0]}
-    proposal = power.next_measurement(block, (probes["fixture_compliance"], probes["length_dependence"]), None)
+    proposal = next_measurement.next_measurement(
+        block, (probes["fixture_compliance"], probes["length_dependence"]), None
+    )
     assert "another length, 3600 mm" in proposal
     possible = list(probes)
     assert not any("compliance" in s for s in power.not_identifiable(block, list(CATALOGUE.values()), possible))

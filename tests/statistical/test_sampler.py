@@ -12,7 +12,7 @@ from wirebayes.inference import convergence
 from wirebayes.inference.fit import fit
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import burn_in, kept, moves
+from wirebayes.inference.sampler import burn_in, kept, moves, stop_rule
 from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.io import paper
@@ -141,7 +141,7 @@ def test_a_funnel_whose_neck_is_taken_for_its_last_coordinate_is_refused():
 
 
 def test_without_its_witness_the_sampler_believes_a_funnel_without_a_neck(monkeypatch):
-    monkeypatch.setattr(kept, "OUTWEIGHS", np.inf)
+    monkeypatch.setattr(stop_rule, "OUTWEIGHS", np.inf)
     assert funnels(0, 2)[:, 1].min() < 0.02
 
 
@@ -189,7 +189,7 @@ def fake(draws):
 
 def looked(draws, **settings):
     state, target = fake(draws)
-    return kept.looked(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **settings))
+    return stop_rule.looked(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **settings))
 
 
 def test_a_chain_that_gives_enough_draws_is_believed_and_one_with_too_few_is_not():

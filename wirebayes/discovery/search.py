@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery import power, residual_patterns, shrinking
+from wirebayes.discovery import next_measurement, power, residual_patterns, shrinking
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.linear_scan import Expansion, expand
 from wirebayes.discovery.model_space import smallest_set
@@ -365,9 +365,9 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
 
         weakest = trials[best_probe[max(best_probe, key=hiddenness)]]
     if answer.verdict in ("partial", "unknown"):
-        proposal = power.next_for_remainder(answer.stages[-1] if answer.stages else block)
+        proposal = next_measurement.next_for_remainder(answer.stages[-1] if answer.stages else block)
     else:
-        proposal = power.next_measurement(block, pair, weakest)
+        proposal = next_measurement.next_measurement(block, pair, weakest)
     return {"power": seen, "not_identifiable": hidden, "next_measurement": proposal}
 
 

@@ -11,22 +11,7 @@ from wirebayes import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
 from wirebayes.report.blocks import Page, View
-
-# who can show a command's results; each module has ``page(folder, configuration)``
-_PAGES = {
-    "reproduce": "wirebayes.report.pages.reproduce",
-    "import": "wirebayes.report.pages.check",
-    "check": "wirebayes.report.pages.check",
-    "fit": "wirebayes.report.pages.fit",
-    "batch": "wirebayes.report.pages.batch",
-    "compare": "wirebayes.report.pages.compare",
-    "discover": "wirebayes.report.pages.discover",
-    "plan": "wirebayes.report.pages.plan",
-    "pose": "wirebayes.report.pages.pose",
-    "calibrate": "wirebayes.report.pages.calibrate",
-    "export": "wirebayes.report.pages.export",
-    "simulate": "wirebayes.report.pages.simulate",
-}
+from wirebayes.report.pages import PAGES
 
 
 def write(folder: Path) -> Path:
@@ -50,10 +35,10 @@ def page_of_folder(folder: Path) -> Page:
     absent = f"{folder}: found no {CONFIGURATION}, expected a folder of results"
     configuration = read_json(folder / CONFIGURATION, absent)
     command = configuration.get("command") if isinstance(configuration, dict) else None
-    if not isinstance(command, str) or command not in _PAGES:
-        known = ", ".join(_PAGES)
+    if not isinstance(command, str) or command not in PAGES:
+        known = ", ".join(PAGES)
         raise InputError(f"{folder / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
-    page_of: Callable[[Path, dict[str, Any]], Page] = import_module(_PAGES[command]).page
+    page_of: Callable[[Path, dict[str, Any]], Page] = import_module(PAGES[command]).page
     with stored_results(folder):
         return page_of(folder, configuration)
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from wirebayes import __version__
-from wirebayes.discovery.power import alternatives
+from wirebayes.discovery.next_measurement import alternatives
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of

@@ -8,10 +8,11 @@ import pytest
 from tests.statistical.targets import gaussian
 from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import burn_in, ensemble, kept
-from wirebayes.inference.sampler.kept import OUTWEIGHS
+from wirebayes.inference.sampler import burn_in, ensemble, kept, stop_rule
+from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, Walkers
+from wirebayes.inference.sampler.stop_rule import OUTWEIGHS
 
 ENSEMBLES, WALKERS, D = 4, 32, 3
 EASY = {"ensembles": ENSEMBLES, "walkers": WALKERS, "ess": 1.0, "r_hat": 10.0, "most_steps": 4000}
@@ -35,7 +36,7 @@ def looked(z: np.ndarray, overlooked: float = 0.0, again: int = 0, **policy: flo
     state = replace(state, kept=Kept(blocks, tuple(np.zeros(block.shape[:2]) for block in blocks)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(burn_in, "overlooked", lambda *given: overlooked)
-        found = kept.looked(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
+        found = stop_rule.looked(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
     assert found.diagnostics is not None
     return found, found.diagnostics
 
@@ -159,14 +160,14 @@ def test_a_short_first_block_may_be_followed_by_short_ones() -> None:
 @pytest.mark.parametrize(("ess", "again"), [(2100.0, False), (1900.0, True)])
 def test_a_poor_proposal_is_learned_again(ess: float, again: bool) -> None:
     """Fewer than one effective draw in five evaluations: a mode may be about to be found, though little is missing."""
-    assert kept.promises_more(after(100, ess, evaluations=10_000), Policy(ess=2200.0)) is again
+    assert stop_rule.promises_more(after(100, ess, evaluations=10_000), Policy(ess=2200.0)) is again
 
 
 @pytest.mark.parametrize(("wanted", "again"), [(10_000.0, False), (80_000.0, True)])
 def test_what_is_left_to_do_is_weighed_against_a_new_start(wanted: float, again: bool) -> None:
     """At 0.25 effective draws an evaluation 10,000 wanted cost 20,000 more, 80,000 cost 300,000; learned once more, at
     0.4, 29,096 and 204,096."""
-    assert kept.promises_more(after(100, 5000.0, evaluations=20_000), Policy(ess=wanted)) is again
+    assert stop_rule.promises_more(after(100, 5000.0, evaluations=20_000), Policy(ess=wanted)) is again
 
 
 @pytest.mark.parametrize(
@@ -207,7 +208,7 @@ def test_a_block_is_kept_with_its_densities_and_what_it_cost() -> None:
 def test_walkers_belong_to_the_ensemble_in_whose_row_they_stand() -> None:
     policy = Policy(ensembles=3, walkers=2)
     blocks = [np.arange(6.0)[None, :, None] + 10.0 * np.array([0.0, 1.0])[:, None, None], np.full((1, 6, 1), 20.0)]
-    found = kept.by_ensemble(blocks, policy)
+    found = sampler_state.by_ensemble(blocks, policy)
     assert found.shape == (3, 3, 2, 1)
     assert found[1, :, :, 0].tolist() == [[2.0, 3.0], [12.0, 13.0], [20.0, 20.0]]
 
@@ -221,7 +222,7 @@ def test_a_positive_parameter_is_judged_by_its_logarithm(unit: float) -> None:
     expected = looked(z)[1]
     target.coordinates.log_columns[:] = True
     target.coordinates.to_natural = lambda z: unit * np.exp(z)
-    found = kept._diagnosed(target, by_ensemble(z))  # type: ignore[arg-type]
+    found = stop_rule._diagnosed(target, by_ensemble(z))  # type: ignore[arg-type]
     assert found.r_hat == pytest.approx(expected.r_hat) and found.ess == pytest.approx(expected.ess)
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import DEFAULT, Policy, describe
 from wirebayes.inference.sampler import burn_in, kept, resume
-from wirebayes.inference.sampler.state import BurnIn, State
+from wirebayes.inference.sampler.state import BurnIn, State, by_ensemble
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
 
@@ -110,7 +110,7 @@ def sample(
         progress(_share(state, policy))
         resume.save(state, checkpoint, of_fit)
     assert state.diagnostics is not None
-    z, log_density = (kept.by_ensemble(blocks, policy) for blocks in (state.kept.z, state.kept.log_density))
+    z, log_density = (by_ensemble(blocks, policy) for blocks in (state.kept.z, state.kept.log_density))
     found_, counted = state.diagnostics, state.kept
     return Chains(
         z, log_density, found_.autocorrelation, found_.ess, found_.r_hat, state.converged, state.why,

@@ -1,16 +1,15 @@
-"""Draws that are kept, block by block, and the stop rule (its policy: `wirebayes.inference.sampler.ensemble`)."""
+"""Draws that are kept, block by block, until the stop rule ends the run."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
+from wirebayes.inference.convergence import ENOUGH
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
-from wirebayes.inference.sampler.state import POOL, BurnIn, Diagnostics, Kept, Sampling, advance, move_of
+from wirebayes.inference.sampler.state import BurnIn, Kept, Sampling, advance, move_of
+from wirebayes.inference.sampler.stop_rule import doubtful, looked, promises_more
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.typing import Array
 
 
 def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
@@ -28,7 +27,7 @@ def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | Bu
         Burn-in where the proposal is to be learned once more.
     """
     state = looked(target, more(target, state, policy), policy)
-    if not state.finished and (_doubtful(state) or not state.learned.again and promises_more(state, policy)):
+    if not state.finished and (doubtful(state) or not state.learned.again and promises_more(state, policy)):
         return burn_in.again(target, state, policy)
     return state
 
@@ -55,13 +54,6 @@ def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     return replace(state, walkers=done.walkers, evaluations=state.evaluations + done.evaluations, kept=kept)
 
 
-def by_ensemble(blocks: Sequence[Array], policy: Policy) -> Array:
-    """(ensembles, steps, walkers, ...) of blocks (steps, n, ...)."""
-    every = np.concatenate(blocks)
-    apart = every.reshape(len(every), policy.ensembles, policy.walkers, *every.shape[2:])
-    return np.ascontiguousarray(np.moveaxis(apart, 1, 0))
-
-
 def block_steps(state: Sampling, policy: Policy) -> int:
     """As many steps as the last look promises to be enough, but no more than were kept so far."""
     kept, last = state.kept.steps, state.diagnostics
@@ -72,76 +64,4 @@ def block_steps(state: Sampling, policy: Policy) -> int:
     return min(wanted, policy.most_steps - kept)
 
 
-def looked(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
-    """Apply the stop rule to the draws kept so far.
-
-    Parameters
-    ----------
-    target : LogPosterior
-    state : Sampling
-    policy : Policy
-    """
-    z = by_ensemble(state.kept.z, policy)
-    steps, d = z.shape[1], z.shape[-1]
-    found = _diagnosed(target, z)
-    state = replace(state, diagnostics=found, learned=replace(state.learned, overlooked=0.0))
-    long_enough = steps >= ENOUGH * found.autocorrelation.max()
-    if long_enough and (found.ess >= policy.ess).all() and (found.r_hat <= policy.r_hat).all():
-        beyond = 0.0
-        if state.learned.trusted:
-            some = slice(None, None, 1 + z[..., 0].size // _WEIGHED)
-            places, heights = (np.concatenate(kept) for kept in (state.kept.z, state.kept.log_density))
-            beyond = burn_in.overlooked(state.learned, places.reshape(-1, d)[some], heights.ravel()[some])
-        state = replace(state, learned=replace(state.learned, overlooked=beyond))
-        if beyond <= OUTWEIGHS:
-            least, most = float(found.ess.min()), float(found.r_hat.max())
-            why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
-            return replace(state, finished=True, converged=True, why=why)
-        if state.learned.again >= _MOST_AGAIN:
-            why = (
-                f"not converged after {steps} steps: the proposal makes too little of some places, by a factor of "
-                f"e^{beyond:.1f} (allowed e^{OUTWEIGHS:.1f}); a narrow neck or a far mode may be missing"
-            )
-            return replace(state, finished=True, why=why)
-    elif steps >= policy.most_steps:
-        worst = target.problem.names[int(np.argmin(found.ess))]
-        why = (
-            f"not converged after {steps} steps: {worst} has ESS {found.ess.min():.0f} (wanted {policy.ess:.0f}), "
-            f"largest nested R-hat {found.r_hat.max():.4f} (allowed {policy.r_hat})"
-        )
-        return replace(state, finished=True, why=why)
-    return state
-
-
-def _diagnosed(target: LogPosterior, z: Array) -> Diagnostics:
-    """Diagnostics of (ensembles, steps, walkers, d) draws."""
-    theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1])).reshape(z.shape)
-    # Logarithms of positive parameters: a heavy tail must not hide the walk.
-    values = np.where(target.coordinates.log_columns, np.log(np.abs(theta) + 1e-300), theta)
-    autocorrelation = np.maximum(autocorrelation_steps(values), 1.0)
-    draws = values.shape[0] * values.shape[1] * values.shape[2]
-    return Diagnostics(autocorrelation, draws / autocorrelation, nested_r_hat(values))
-
-
-def _doubtful(state: Sampling) -> bool:
-    """Whether draws would be enough, were it not for places that the proposal overlooks."""
-    return state.learned.overlooked > OUTWEIGHS
-
-
-def promises_more(state: Sampling, policy: Policy) -> bool:
-    """Whether with a proposal as good as usual, learned once more, draws would be enough after fewer evaluations.
-
-    Or the proposal is so poor that it may be about to find a mode, whose share walkers took from it when they began.
-    """
-    assert state.diagnostics is not None
-    least = state.diagnostics.ess.min()
-    going_on = state.kept.evaluations * (policy.ess / least - 1.0)
-    poor = least < _POOR * state.kept.evaluations
-    return bool(poor or going_on > policy.ess / _USUAL + policy.round_draws)
-
-
 _LEAST_BLOCK = 8  # steps between two looks at the stop rule, which is not to be evaluated after every one
-OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
-_WEIGHED = 16384  # kept draws whose weights are looked at
-_MOST_AGAIN = 5  # times that the proposal may be learned once more for what it overlooks
-_USUAL, _POOR = 0.4, 0.2  # effective draws per kept evaluation

@@ -4,6 +4,7 @@ A run begins with `burn_in.init`; `burn_in.step` and `kept.step` lead from a sta
 only the random generator that a state carries goes on with every draw.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import emcee
 import numpy as np
 from emcee.moves.move import Move
 
+from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.proposal import Proposal
@@ -224,3 +226,10 @@ def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> Mo
         return EvolutionMove(ensembles)
     straight = learned.proposal.straight if isinstance(learned.proposal, Proposal) else None
     return PoolMove(learned.proposal, EvolutionMove(ensembles, straight), steps, POOL if frozen else _EXPLORING)
+
+
+def by_ensemble(blocks: Sequence[Array], policy: Policy) -> Array:
+    """(ensembles, steps, walkers, ...) of blocks (steps, n, ...)."""
+    every = np.concatenate(blocks)
+    apart = every.reshape(len(every), policy.ensembles, policy.walkers, *every.shape[2:])
+    return np.ascontiguousarray(np.moveaxis(apart, 1, 0))

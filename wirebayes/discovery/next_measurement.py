@@ -1,0 +1,161 @@
+"""What to measure next: the plan in which two explanations differ most, or one effect or the remainder stands out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wirebayes.discovery.linear_scan import Probe, expand, projected
+from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
+from wirebayes.typing import Array
+from wirebayes.wire.protocol import Protocol
+
+_WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
+_TRIED = "unloading, longer holds, finer steps, another length"
+
+
+@dataclass(frozen=True)
+class MeasurementPlan:
+    """A measurement one could make next: in words, and as holds at displacements, each read at the same times."""
+
+    words: str
+    displacement_mm: Array
+    times_s: Array
+    length_mm: float
+
+    @property
+    def protocol(self) -> Protocol:
+        """Its holds."""
+        return _holds(self.displacement_mm, self.times_s, self.length_mm)
+
+
+def alternatives(p: Protocol, alone: bool) -> list[MeasurementPlan]:
+    """What could be done with a sample instead; `alone` if there is no other, whose displacements would differ."""
+    recorded = p.recorded
+    x = p.displacement_mm[recorded]
+    down = x[-2::-1] if len(x) > 1 else x
+    log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
+    times = _longest_series(p)
+    span = f"{x.min():g} to {x.max():g} mm" if alone else "each sample's displacements"
+    dense = "600 s with 25 readings spaced evenly in the logarithm of time"
+    there_and_back = np.concatenate([x, down])
+    halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
+    last = f" from {x.max():g} to {x.min():g} mm" if alone else ", of every sample"
+    back = f"the same displacements back{last}, each held {times[-1]:g} s"
+    return [
+        MeasurementPlan(words, displacements, moments, p.length_mm)
+        for words, displacements, moments in (
+            (f"unload the wire after the last hold: {back}", there_and_back, times),
+            (f"hold each of the displacements {span} for {dense}", x, log_times),
+            (f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
+            (f"take twice as many, half as large steps over {span}", halved, times),
+        )
+    ]
+
+
+def _longest_series(p: Protocol) -> Array:
+    """Reading times of the hold with most readings."""
+    counts = p.mask.sum(axis=1)
+    return p.time_s[int(np.argmax(counts))][: int(counts.max())]
+
+
+def _holds(displacement: Array, times: Array, length_mm: float) -> Protocol:
+    """Holds at these displacements, each read at these times."""
+    h = len(displacement)
+    time, duration = np.tile(times, (h, 1)), np.full(h, times[-1])
+    return Protocol(length_mm, displacement, time, np.ones(time.shape, bool), duration, np.arange(1, h + 1))
+
+
+def _another_length(problem: Problem) -> tuple[str, Problem]:
+    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
+    longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
+    p, length = longest.protocol, 2.0 * longest.protocol.length_mm
+    protocol = _holds(2.0 * p.displacement_mm[p.recorded], _longest_series(p), length)
+    model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
+    more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
+    exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
+    prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
+    which = "a second" if len({s.protocol.length_mm for s in problem.samples}) == 1 else "another"
+    words = f"repeat the test at {which} length, {length:g} mm, with steps scaled alike"
+    return words, replace(problem, samples=(*problem.samples, more), prior=prior)
+
+
+def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
+    """The plan that best distinguishes two candidates, or best shows one effect, by projected signatures.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+        The fit whose test would be followed by another.
+    pair : (Probe, Probe) or None
+        Candidates to distinguish.
+    weakest : Probe or None
+        Without a pair: the effect to reveal.
+
+    Returns
+    -------
+    str
+        A sentence, also where no plan helps.
+    """
+    trials = list(pair) if pair else [weakest] if weakest else []
+    if not trials:
+        return "No candidate remains; repeating the same holds would narrow the parameters."
+    words, ratio = _best_plan(block, lambda target: _separation(target, block, trials))
+    names = " from ".join(t.effect.name for t in trials)
+    if ratio < _WORTH:
+        aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"
+        return f"None of the tests considered ({_TRIED}) would {aim} independently."
+    if pair:
+        known = np.isfinite(ratio) and ratio < 1e3
+        gain = f" {ratio:.1f} times as much as now" if known else "; at present they do not"
+        return f"To distinguish {names}: {words}. Their signatures would then differ{gain}."
+    return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
+
+
+def next_for_remainder(block: LaplaceFit) -> str:
+    """The plan in which a smooth remainder of the same size in newtons would stand out most."""
+    words, ratio = _best_plan(block, lambda target: _remainder_seen(target, block))
+    if ratio < _WORTH:
+        return f"None of the tests considered ({_TRIED}) would show more of what remains; repeat this one."
+    return f"To learn more of what remains: {words}. It would stand out {ratio:.1f} times as much as now."
+
+
+def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tuple[str, float]:
+    """Words of the plan with the largest value, and that value over the present test's."""
+    problem = block.target.problem
+    planned = [_another_length(problem)]
+    for plans in zip(*(alternatives(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
+        protocols = [plan.protocol for plan in plans]
+        empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
+        planned.append((plans[0].words, with_protocols(problem, protocols, empty)))
+    here = value(block.target)
+    best, words = max((value(replace_problem(block.target, other)), words) for words, other in planned)
+    return words, best / here if here > 0 else np.inf
+
+
+def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:
+    """Typical length, in standard deviations of a reading, of a smooth remainder of one newton after projection."""
+    x = expand(target, block.modes.z[:1], [])
+    smooth = replace(x, signatures=x.flexible, one_sided=np.zeros(x.flexible.shape[2], bool))
+    return float(np.sqrt((projected(smooth, float(x.ratio[0])) ** 2).sum()))
+
+
+def replace_problem(target: LogPosterior, problem: Any) -> LogPosterior:
+    """A target on other holds whose coordinates mean the same."""
+    out = LogPosterior(problem)
+    out.coordinates.ridges = target.coordinates.ridges
+    return out
+
+
+def _separation(target: LogPosterior, block: LaplaceFit, trials: Sequence[Probe]) -> float:
+    """Length of the first signature left when parameters, and the second where there is one, have taken their part."""
+    x = expand(target, block.modes.z[:1], trials)
+    p = projected(x, float(x.ratio[0]))
+    first = p[:, 0]
+    if p.shape[1] > 1 and (p[:, 1] ** 2).sum() > 0:
+        second = p[:, 1] / np.sqrt((p[:, 1] ** 2).sum())
+        first = first - second * (second @ first)
+    return float(np.sqrt(first @ first))
