@@ -45,6 +45,25 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     assert found.elpd == pytest.approx([1.0, 2.0, 3.0, 4.0] if sampled else known)
 
 
+def test_what_the_sum_does_not_settle_is_fitted_hold_by_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a bridge where the two posteriors have places in common (k up to 1), else by steps; so is what was apart."""
+    rng = np.random.default_rng(0)
+    log_p = rng.normal(size=(4, 500))
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, log_p[0]])])
+    tails = iter([0.4, 0.9, 1.1, 0.6])
+    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, next(tails))))
+    monkeypatch.setattr(module, "log_densities", lambda *asked: (np.array([7.0, 7.0, np.nan]), False))
+    fitted = SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=True))
+    monkeypatch.setattr(module, "fit", lambda *asked, **more: fitted)
+    monkeypatch.setattr(module, "_by_steps", lambda problem, sample, hold, theta, seed: 3.0)
+    monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert found.elpd[1:].tolist() == [2.0, 3.0, 3.0] and found.converged
+    assert list(found.refitted) == [False, True, True, True]
+
+
 def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.zeros((4, 500))])

@@ -105,10 +105,8 @@ def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
         return fit(problem_of(candidate, training, effects_of(candidate, training, known, seed)), own, policy=policy)
 
     full = fitted(task.train_holds or recorded)
-    again = replace(policy, ess=policy.ess / 2, most_steps=min(policy.most_steps, 400))
-    left = smoothed_leave_one_hold_out(
-        full, seed_of(seed, task.experiment.name, candidate.name, "without"), policy=again
-    )
+    own = seed_of(seed, task.experiment.name, candidate.name, "without")
+    left = smoothed_leave_one_hold_out(full, own, policy=replace(policy, ess=policy.ess / 2))
     early = full if task.train_holds else fitted(first)
     content: Judgement = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],

@@ -29,7 +29,7 @@ from wirebayes.typing import Floats
 # a posterior without a hold may have a second mode that the one with it never visits, and k says little of that.
 LARGEST_K = 0.5
 # a quarter of a fit's draws: elpd differences count from 4, and a hold's density is known to a tenth here
-REFIT = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=400)
+REFIT = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=1200)
 _NO_OVERLAP = 1.0  # k from which on draws of two posteriors need not have places in common
 _DRAWS = 4000  # the error of a hold's elpd by their number is then some hundredths, of differences that count from 4
 _DRAWS_OF_STEPS = 3000  # a hold's density is then known to some .15
@@ -129,18 +129,21 @@ def smoothed_leave_one_hold_out(
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K), True
     poor = np.flatnonzero(refitted)
+    apart = k > _NO_OVERLAP
     if exact:
         elpd[poor] = np.nan
     elif len(poor):
         own = seed_of(seed, "left out in turn")
-        elpd[poor], converged = log_densities(problem, [where[i] for i in poor], theta, elpd[poor], own, policy)
-    apart = np.flatnonzero(np.isnan(elpd))
-    for done, i in enumerate(apart.tolist()):
-        progress((len(where) - len(apart) + done) / len(where))
+        found, settled = log_densities(problem, [where[i] for i in poor], theta, elpd[poor], own, policy)
+        apart[poor] |= np.isnan(found)
+        elpd[poor] = found if settled else np.nan  # what the sum does not settle is fitted hold by hold
+    alone = np.flatnonzero(np.isnan(elpd)).tolist()
+    for done, i in enumerate(alone):
+        progress((len(where) - len(alone) + done) / len(where))
         s, j = where[i]
         own = seed_of(seed, "without", str(s), str(j))
         without = fit(without_hold(problem, s, j), own, policy=policy, rough=theta)
-        if k[i] > _NO_OVERLAP or not exact:
+        if apart[i]:
             elpd[i] = _by_steps(problem, s, j, without.flat, own)
         else:
             elpd[i] = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
