@@ -35,6 +35,29 @@ def test_help_names_every_command_and_loads_nothing_heavy():
         assert command.summary.split()[0] in result.stdout
 
 
+@pytest.mark.parametrize("command", [(), ("fit",)])
+def test_h_is_short_for_help(command, capsys):
+    assert main([*command, "-h"]) == 0
+    short = capsys.readouterr().out
+    assert main([*command, "--help"]) == 0
+    assert short == capsys.readouterr().out and "-h, --help" in short
+
+
+@pytest.mark.parametrize(
+    ("typed", "completed"),
+    [
+        ("wirebayes comp", ["compare"]),
+        ("wirebayes fit --lik", ["--likelihood"]),
+        ("wirebayes plan --bud", ["--budget-min"]),
+    ],
+)
+def test_a_shell_completes_commands_and_the_options_of_a_command(typed, completed):
+    """As bash asks; the options are those of the command's own module, which is loaded for it alone."""
+    asked = {"_WIREBAYES_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    answer = run(env=os.environ | asked)
+    assert answer.stdout.split() == completed and answer.returncode == 0
+
+
 def test_the_version_is_printed(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"wirebayes {__version__}\n"

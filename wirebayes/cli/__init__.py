@@ -3,6 +3,7 @@
 Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wrong is a bug and shows its traceback.
 """
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -151,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Of a damaged file, h5netcdf complains a second time, in a traceback from a destructor that stops nothing.
         sys.unraisablehook = lambda unraisable: None
     arguments = list(arguments)
-    called = next((word for word in arguments if not word.startswith("-")), None)
+    called = next((word for word in _typed(arguments) if not word.startswith("-")), None)
 
     import typer  # only now: Ctrl-C is welcome during imports, too
 
@@ -168,12 +169,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _typed(arguments: Sequence[str]) -> Sequence[str]:
+    """The arguments; a shell that asks how to complete a line has them in a variable of its own instead."""
+    if "_WIREBAYES_COMPLETE" not in os.environ:
+        return arguments
+    return os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
+
+
 def _application(called: str | None) -> "typer.Typer":
     """The whole command line, with only the called command's module loaded."""
     import typer
 
     # rich_markup_mode None: errors are plain lines, also for a program that reads them
-    application = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+    application = typer.Typer(
+        no_args_is_help=True, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]}
+    )
 
     def print_version(wanted: bool) -> None:
         if wanted:
