@@ -1,8 +1,9 @@
 """Systematic resampling."""
 
 import numpy as np
+import pytest
 
-from wirebayes.resampling import systematic_rows
+from wirebayes.resampling import next_power, systematic_rows
 
 
 def test_a_row_comes_as_often_as_its_weight_says_to_within_one() -> None:
@@ -32,3 +33,17 @@ class Last:
 def test_rounding_leads_to_no_row_beyond_the_last() -> None:
     weight = np.full(49, 1 / 49)
     assert systematic_rows(weight, 10_000, Last())[-1] == 48  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_the_next_power_leaves_as_many_rows_effective_as_asked(share: float) -> None:
+    log_weight = np.random.default_rng(2).normal(scale=30.0, size=500)
+    power = next_power(log_weight, 1.0, share)
+    weight = np.exp(power * log_weight)
+    assert 0.0 < power < 1.0 and weight.sum() ** 2 / (weight**2).sum() == pytest.approx(share * 500, rel=1e-6)
+    assert next_power(log_weight, 0.5 * power, share) == 0.5 * power  # more than asked for is allowed
+
+
+def test_a_power_is_never_nothing() -> None:
+    log_weight = np.where(np.arange(10) < 1, 0.0, -np.inf)
+    assert 0.0 < next_power(log_weight, 1.0, 0.5) < 1e-15

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.mixture import spread_rows
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.resampling import systematic_rows
+from wirebayes.resampling import next_power, systematic_rows
 from wirebayes.typing import Array
 
 Density = Callable[[Array, Array], Array]
@@ -313,7 +313,7 @@ def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generat
     value = np.where(np.isfinite(value), value, -1e300)
     power, way, height = 0.0, [], []
     while power < 1.0:
-        step = _next_step(value, 1.0 - power)
+        step = next_power(value, 1.0 - power, _EFFECTIVE)
         power += step
         weight = np.exp(step * (value - value.max()))
         kept = systematic_rows(weight, m, rng)
@@ -327,22 +327,6 @@ def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generat
         way.append(z)
         height.append(value)
     return np.concatenate(way), np.concatenate(height)
-
-
-def _next_step(value: Array, most: float) -> float:
-    """The largest step of the power that leaves enough rows effective."""
-
-    def effective(step: float) -> float:
-        weight = np.exp(step * (value - value.max()))
-        return float(weight.sum() ** 2 / (weight**2).sum())
-
-    if effective(most) >= _EFFECTIVE * len(value):
-        return most
-    low, high = -40.0, float(np.log(most))
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if effective(np.exp(middle)) > _EFFECTIVE * len(value) else (low, middle)
-    return float(np.exp(low))
 
 
 def rowwise(target: LogPosterior, readings: Sequence[Array]) -> Density:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wirebayes.resampling import systematic_rows
+from wirebayes.resampling import next_power, systematic_rows
 from wirebayes.typing import Array
 
 _EFFECTIVE = 0.5  # share of the draws that stays so at each step
@@ -43,7 +43,7 @@ def log_ratio_of_integrals(
     power, total = 0.0, 0.0
     for _ in range(_STEPS):
         gain = np.where(np.isfinite(second), second - first, -np.inf)
-        step = _next_step(gain, 1.0 - power)
+        step = next_power(gain, 1.0 - power, _EFFECTIVE)
         top = step * gain.max()
         weight = np.exp(step * gain - top)
         total += float(top + np.log(weight.mean()))
@@ -62,19 +62,3 @@ def log_ratio_of_integrals(
         if power >= 1.0:
             return total, z
     return float("nan"), z
-
-
-def _next_step(gain: Array, most: float) -> float:
-    """The largest power, at most `most`, that leaves enough draws effective; the smallest steps are taken anyway."""
-
-    def effective(power: float) -> float:
-        weight = np.exp(power * (gain - gain.max()))
-        return float(weight.sum() ** 2 / (weight**2).sum())
-
-    if effective(most) >= _EFFECTIVE * len(gain):
-        return most
-    low, high = -30.0, float(np.log(most))
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if effective(float(np.exp(middle))) > _EFFECTIVE * len(gain) else (low, middle)
-    return float(np.exp(low))
