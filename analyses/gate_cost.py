@@ -9,9 +9,6 @@ are printed beside what differs in p and in the most surprising name.
 
 import argparse
 import json
-import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -70,15 +67,6 @@ def cost_of(name: str, simulations: int) -> dict[str, Any]:
             "simulations": len(gate.test.null), "surprises": surprises, "further": further}  # fmt: skip
 
 
-def elsewhere(name: str, simulations: int, tree: Path) -> dict[str, Any]:
-    """One case in a process of its own, by the code of a checkout."""
-    environment = os.environ | {"PYTHONPATH": str(tree.resolve())}
-    environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, __file__, "--only", name, "--simulations", str(simulations)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
-
-
 def main() -> None:
     """Run the cases, a line of JSON each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -92,13 +80,16 @@ def main() -> None:
     if options.only:
         print(json.dumps(cost_of(options.only, options.simulations)))
         return
+    from analyses.checkouts import answered  # another checkout need not have it
+
     kinds = ("chain", "additive", "together", "effect")
     names = [*PAPER, *(f"benchmark:{i}" for i in range(options.benchmark))]
     names += [f"check:{kind}:{i}" for i in range(options.checks) for kind in kinds]
     trees = [Path(__file__).parents[1], *([options.against] if options.against else [])]
     records = []
     for name in names:
-        found = [elsewhere(name, options.simulations, tree) for tree in trees]
+        given = ["--only", name, "--simulations", str(options.simulations)]
+        found = [answered(__file__, given, tree) for tree in trees]
         if found[0]["p"] is None:
             continue
         records.append(found)

@@ -1,4 +1,4 @@
-"""Leave one hold out by importance sampling against refitting without every hold, on one wire and several models.
+"""Leave one hold out as a comparison does it against a fit without every hold, on one wire and several models.
 
     python analyses/leave_one_hold_out.py [--experiment roc-line-1.71m]
 
@@ -24,8 +24,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--experiment", default="roc-line-1.71m")
     experiment = select(experiments(), parser.parse_args().experiment)[0]
-    print(f"{experiment.name}: model, elpd by importance sampling (refits where Pareto k > {LARGEST_K}), "
-          "by refitting all, difference, largest difference of a hold, holds refitted by the diagnostic")  # fmt: skip
+    print(f"{experiment.name}: model, elpd as in a comparison (sampling where Pareto k > {LARGEST_K}), "
+          "by fits without every hold, difference, largest difference of a hold, holds sampled")  # fmt: skip
     fast, exact = {}, {}
     known = catalogue()
     for candidate in candidates(experiment, Candidate(BASE, "", ""), known, MODELS):
@@ -38,7 +38,7 @@ def main() -> None:
         fast[candidate.name], exact[candidate.name] = quick.total, slow.total
         print(f"{candidate.name:22s} {quick.total:8.2f} {slow.total:8.2f} {quick.total - slow.total:+6.2f} "
               f"{np.abs(quick.elpd - slow.elpd).max():6.2f}   {list(map(int, quick.hold[quick.refitted]))}"
-              + ("" if slow.converged and quick.converged else "  a refit did not converge"), flush=True)  # fmt: skip
+              + ("" if slow.converged and quick.converged else "  not converged"), flush=True)  # fmt: skip
     rankings = [sorted(scores, key=lambda name: -scores[name]) for scores in (fast, exact)]
     print("same ranking" if rankings[0] == rankings[1] else f"rankings differ: {rankings[0]} and {rankings[1]}")
 

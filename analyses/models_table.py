@@ -3,8 +3,8 @@
     wirebayes compare data/paper/experiments.toml --output out/compare
     python analyses/models_table.py out/compare/comparison.json > docs/models-table.inc
 
-Per wire: elpd against the plain model, leaving out each hold in turn, with its standard error (! where a fit or a refit
-did not converge; in brackets given each hold's first reading), and the rms error of the last third of the holds.
+Per wire: elpd against the plain model, leaving out each hold in turn, with its standard error (! where a sampling did
+not converge; in brackets given each hold's first reading), and the rms error of the last third of the holds.
 """
 
 import argparse

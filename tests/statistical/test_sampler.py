@@ -76,7 +76,7 @@ def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(
     t, ratio = worst(gaussian, HASTY)
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
-    monkeypatch.setattr(kept, "promises_more", lambda state, policy: False)
+    monkeypatch.setattr(stop_rule, "promises_more", lambda state, policy: False)
     stubborn = sample(TARGETS["two_modes"](), 1, HASTY)
     assert again.converged and stubborn.converged
     assert again.kept_evaluations == again.log_density.size  # none of those kept before
@@ -189,7 +189,7 @@ def fake(draws):
 
 def looked(draws, **settings):
     state, target = fake(draws)
-    return stop_rule.looked(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **settings))
+    return stop_rule.apply(target, state, Policy(ensembles=4, walkers=draws.shape[2], most_steps=10_000, **settings))
 
 
 def test_a_chain_that_gives_enough_draws_is_believed_and_one_with_too_few_is_not():

@@ -6,7 +6,7 @@ from wirebayes.json_files.values import Integers, Numbers
 
 
 class LeaveOneHoldOut(TypedDict):
-    """Log predictive density of each hold from all others, and which holds were refitted for it."""
+    """Log predictive density of each hold from all others, and the holds without which posteriors were sampled."""
 
     holds: Integers
     elpd: float

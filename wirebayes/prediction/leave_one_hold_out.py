@@ -51,7 +51,7 @@ class LeftOut:
     pareto_k : (m,) array
         Of the importance ratios; above `LARGEST_K` they were not used.
     refitted : (m,) bool array
-        Where the posterior without the hold was sampled itself.
+        Where the posterior without the hold was sampled, with those of other holds or by itself.
     converged : bool
         All those samplings converged.
     """
@@ -96,21 +96,22 @@ def smoothed_leave_one_hold_out(
     exact: bool = False,
     progress: Callable[[float], None] = lambda share: None,
 ) -> LeftOut:
-    """Leave out each recorded hold in turn, by Pareto-smoothed importance sampling and refits where it fails.
+    """Leave out each recorded hold in turn, by Pareto-smoothed importance sampling, and by sampling where it fails.
 
-    For converged draws of a posterior, whose weights' tail says whether they can be trusted and where a refit is worth
-    its time. The rough draws of a search are scored by `wirebayes.discovery.held_out.truncated_leave_one_hold_out`.
+    For converged draws of a posterior, whose weights' tail says whether they can be trusted and where sampling without
+    the hold is worth its time. The rough draws of a search are scored by
+    `wirebayes.discovery.held_out.truncated_leave_one_hold_out`.
 
     Parameters
     ----------
     fitted : Fit
         With a likelihood hold by hold, a hold's first reading stays given.
     seed : int
-        For the exact refits.
+        Of what is sampled without holds.
     policy : Policy
-        Of the exact refits.
+        Of what is sampled without holds.
     exact : bool
-        Refit without every hold, whatever the diagnostic says.
+        Fit without every hold, one by one, whatever the diagnostic says.
     progress : function of a share between 0 and 1
 
     Returns

@@ -17,7 +17,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import expit
+from scipy.special import expit, logsumexp
 
 from wirebayes.inference.modes import climb, distinct
 from wirebayes.inference.policy import Policy
@@ -107,7 +107,7 @@ def log_densities(
         over = np.minimum(total - whole, _MOST)
         ratio = log_mean(over[: len(draws)], over[len(draws) :])  # of the mixture's integral to the posterior's
         drawn_from = np.logaddexp(np.log(len(draws)) + whole, np.log(len(theta)) + total - ratio)
-        found = -np.array([_log_sum(without[s][j] - drawn_from) for s, j in members])
+        found = -np.array([logsumexp(without[s][j] - drawn_from) for s, j in members])
         share = np.exp(np.concatenate([[0.0], elpd[near] - found]) - ratio)
         apart = elpd[near] - found > _APART
         elpd[near] = np.where(apart, np.nan, found)
@@ -129,11 +129,6 @@ def _weights(problem: Problem, holds: list[tuple[int, int]], elpd: Array) -> tup
     for (s, j), value in zip(holds, elpd, strict=True):
         out[s][j] = value
     return out
-
-
-def _log_sum(log_values: Array) -> float:
-    top = log_values.max()
-    return float(top + np.log(np.exp(log_values - top).sum()))
 
 
 def log_mean(log_p: Floats, log_p_weighted: Floats) -> float:

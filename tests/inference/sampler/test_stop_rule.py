@@ -36,7 +36,7 @@ def looked(z: np.ndarray, overlooked: float = 0.0, again: int = 0, **policy: flo
     state = replace(state, kept=Kept(blocks, tuple(np.zeros(block.shape[:2]) for block in blocks)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(burn_in, "overlooked", lambda *given: overlooked)
-        found = stop_rule.looked(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
+        found = stop_rule.apply(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
     assert found.diagnostics is not None
     return found, found.diagnostics
 
@@ -179,7 +179,7 @@ def test_draws_count_as_burn_in_once_or_for_what_was_overlooked(
 ) -> None:
     poor = replace(after(100, 10.0, evaluations=10_000, again=again, overlooked=overlooked), finished=finished)
     monkeypatch.setattr(kept, "more", lambda target, state, policy: state)
-    monkeypatch.setattr(kept, "looked", lambda target, state, policy: state)
+    monkeypatch.setattr(stop_rule, "apply", lambda target, state, policy: state)
     monkeypatch.setattr(burn_in, "again", lambda target, state, policy: "anew")
     found = kept.step(None, poor, Policy())  # type: ignore[arg-type]
     assert (found == "anew") is starts_anew

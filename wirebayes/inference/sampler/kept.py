@@ -6,9 +6,8 @@ import numpy as np
 
 from wirebayes.inference.convergence import ENOUGH
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import burn_in
+from wirebayes.inference.sampler import burn_in, stop_rule
 from wirebayes.inference.sampler.state import BurnIn, Kept, Sampling, advance, move_of
-from wirebayes.inference.sampler.stop_rule import doubtful, looked, promises_more
 from wirebayes.inference.transform import LogPosterior
 
 
@@ -26,10 +25,11 @@ def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | Bu
     Sampling or BurnIn
         Burn-in where the proposal is to be learned once more.
     """
-    state = looked(target, more(target, state, policy), policy)
-    if not state.finished and (doubtful(state) or not state.learned.again and promises_more(state, policy)):
-        return burn_in.again(target, state, policy)
-    return state
+    state = stop_rule.apply(target, more(target, state, policy), policy)
+    if state.finished:
+        return state
+    worth_it = stop_rule.doubtful(state) or not state.learned.again and stop_rule.promises_more(state, policy)
+    return burn_in.again(target, state, policy) if worth_it else state
 
 
 def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:

@@ -15,8 +15,8 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
 
 
-def looked(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
-    """Apply the stop rule to the draws kept so far.
+def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
+    """Decide whether the draws kept so far are enough.
 
     Parameters
     ----------
