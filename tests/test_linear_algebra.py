@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wirebayes.linear_algebra import cholesky, eigh, inv, solve
 from wirebayes.model import likelihoods
@@ -56,6 +57,18 @@ def test_a_hold_left_out_at_absurd_parameters_is_impossible_and_harms_no_other_d
 
     both = left_out(slice(0, 2))
     assert np.array_equal(both[:, :1], left_out(slice(0, 1))) and not np.isnan(both).any()
+
+
+@pytest.mark.parametrize(("squared", "possible"), [(0.99e13, True), (1.01e13, False), (1e60, False)])
+def test_a_hold_is_not_left_out_where_rounding_would_decide(squared: float, possible: bool) -> None:
+    """The density of a later hold so far from its reading is a difference of numbers that have no decimals left."""
+    one, shape = np.ones(1), (2, 1, 1)
+    tension = np.array([0.0, np.sqrt(squared)]).reshape(shape)
+    line = Linearised(tension, 0.0 * tension, np.ones(shape), np.ones((2, 1)), np.ones((2, 1)), np.zeros((3, 1)))
+    seen = np.zeros(shape), np.ones((2, 1), bool), one, one
+    without = likelihoods.without_each_hold(line, likelihoods.chain(line, *seen), *seen)[:, 0]
+    assert np.isfinite(without).tolist() == [possible, True]
+    assert without[1] == pytest.approx(stats.norm.logpdf(0.0))  # its own readings, however far, take no part
 
 
 def test_given_readings_that_vary_as_one_condition_as_one_of_them() -> None:

@@ -14,10 +14,10 @@ from wirebayes.model.problem import Problem, build
 from wirebayes.prediction.leave_one_hold_out import (
     LeftOut,
     difference,
+    log_mean,
     smoothed_leave_one_hold_out,
     without_hold,
 )
-from wirebayes.prediction.left_out_mixture import log_mean
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 

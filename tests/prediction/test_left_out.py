@@ -24,44 +24,37 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, without])])
     monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, tail)))
     known = np.log(stats.hmean(np.exp(log_p), axis=1))  # weights 1/p: the harmonic mean
-    refitted: list[int] = []
 
-    def in_turn(problem: Problem, holds: list, draws: np.ndarray, elpd: np.ndarray, seed: int, policy: Policy) -> tuple:
-        assert holds == [(0, j) for j in range(4)] and elpd == pytest.approx(known)
-        return np.array([1.0, 2.0, np.nan, 4.0]), True  # the third is apart
+    def ratios(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        assert holds == [(0, j) for j in range(4)] and len(draws) == 500
+        return np.array([1.0, 2.0, 3.0, 4.0]), np.array([True, True, False, True])
 
-    def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
-        refitted.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
-        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=False))
-
-    monkeypatch.setattr(module, "log_densities", in_turn)
-    monkeypatch.setattr(module, "fit", fit_without)
-    monkeypatch.setattr(module, "_by_steps", lambda problem, sample, hold, theta, seed: 3.0)
+    monkeypatch.setattr(module, "log_densities", ratios)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
     found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
-    assert list(found.refitted) == [sampled] * 4 and found.converged is not sampled
-    assert refitted == ([2] if sampled else []) and shares == ([0.75, 1.0] if sampled else [1.0])
+    assert list(found.refitted) == [sampled] * 4 and found.converged is not sampled and shares == [1.0]
     assert found.elpd == pytest.approx([1.0, 2.0, 3.0, 4.0] if sampled else known)
 
 
-def test_what_the_sum_does_not_settle_is_fitted_hold_by_hold(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By a bridge where the two posteriors have places in common (k up to 1), else by steps; so is what was apart."""
-    rng = np.random.default_rng(0)
-    log_p = rng.normal(size=(4, 500))
+def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bridge between its draws and those of the full posterior; one that did not converge is said."""
+    log_p = np.random.default_rng(0).normal(size=(4, 500))
     problem = build([experiments()[1].train(4)])
-    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, log_p[0]])])
-    tails = iter([0.4, 0.9, 1.1, 0.6])
-    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, next(tails))))
-    monkeypatch.setattr(module, "log_densities", lambda *asked: (np.array([7.0, 7.0, np.nan]), False))
-    fitted = SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=True))
-    monkeypatch.setattr(module, "fit", lambda *asked, **more: fitted)
-    monkeypatch.setattr(module, "_by_steps", lambda problem, sample, hold, theta, seed: 3.0)
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
+    asked: list[int] = []
+
+    def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
+        asked.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
+        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=len(asked) != 2))
+
+    monkeypatch.setattr(module, "fit", fit_without)
     monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
-    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
-    assert found.elpd[1:].tolist() == [2.0, 3.0, 3.0] and found.converged
-    assert list(found.refitted) == [False, True, True, True]
+    shares: list[float] = []
+    found = smoothed_leave_one_hold_out(stub, exact=True, progress=shares.append)  # type: ignore[arg-type]
+    assert asked == [0, 1, 2, 3] and shares == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert found.elpd.tolist() == [2.0] * 4 and found.refitted.all() and not found.converged
 
 
 def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -106,7 +106,7 @@ def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
 
     full = fitted(task.train_holds or recorded)
     own = seed_of(seed, task.experiment.name, candidate.name, "without")
-    left = smoothed_leave_one_hold_out(full, own, policy=replace(policy, ess=policy.ess / 2))
+    left = smoothed_leave_one_hold_out(full, own)
     early = full if task.train_holds else fitted(first)
     content: Judgement = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],

@@ -230,13 +230,16 @@ def without_each_hold(
         Log densities.
     """
     holds, _, n = line.tension.shape
-    noise, out = _Noise.of(variance, setting_sd), np.cumsum(filtered.log_likelihood, axis=0) - filtered.log_likelihood
-    later = _Later(np.zeros(n), np.zeros(n), np.zeros(n))
+    noise, out = _Noise.of(variance, setting_sd), np.zeros((holds, n))
+    out[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
+    later, square = _Later(np.zeros(n), np.zeros(n), np.zeros(n)), np.zeros(n)
     for j in reversed(range(holds)):
         m, p = filtered.carried_mean[j], filtered.carried_var[j]
         a, c = line.carry_by_creep[j], line.carry_by_setting[j]
         out[j] += later.log_density(a * m, a * a * p + c * c * noise.setting_var)
+        out[j] = np.where(square < _ABSURD, out[j], -np.inf)
         later = later.with_hold(line, j, readings[j], mask[j], noise)
+        square = square + ((readings[j] - line.tension[j])[mask[j]] ** 2).sum(axis=0) * noise.weight
     return out
 
 
@@ -373,4 +376,5 @@ def hold_courses(
     return out
 
 
+_ABSURD = 1e13  # sum of squared residuals in variances: its rounding reaches some hundredths of a nat
 _NEWTON_STEPS = 30  # a limit for absurd parameters: others reach the tolerance after a few

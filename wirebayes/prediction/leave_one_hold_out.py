@@ -3,9 +3,8 @@
 Leaving a hold out drops its readings, never its displacement and duration: the wire creeps there all the same. The
 posterior without a hold is obtained from the full one by Pareto-smoothed importance sampling with the ratios ``1 /
 p(readings of the hold | all other readings, parameters)``. Where the tail of the ratios is too heavy for some holds,
-the sum of their posteriors is sampled once (`wirebayes.prediction.left_out_mixture`). A posterior so far from the full
-one that even this fails is sampled itself, and the density of the hold found by steps from it to the full posterior
-(`wirebayes.prediction.annealing`): the mean of the density over its draws would depend on the few that happen to fit.
+their densities are ratios of integrals, found by importance sampling from a proposal that is learned for them
+(`wirebayes.prediction.left_out_density`).
 """
 
 from collections.abc import Callable
@@ -15,14 +14,13 @@ from typing import Any
 import numpy as np
 from arviz_stats.base import array_stats
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.optimize import brentq
+from scipy.special import expit, logsumexp
 
 from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import Problem
-from wirebayes.prediction.annealing import log_ratio_of_integrals
-from wirebayes.prediction.left_out_mixture import log_densities, log_mean
+from wirebayes.prediction.left_out_density import log_densities
 from wirebayes.typing import Floats
 
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
@@ -30,9 +28,7 @@ from wirebayes.typing import Floats
 LARGEST_K = 0.5
 # a quarter of a fit's draws: elpd differences count from 4, and a hold's density is known to a tenth here
 REFIT = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=1200)
-_NO_OVERLAP = 1.0  # k from which on draws of two posteriors need not have places in common
 _DRAWS = 4000  # the error of a hold's elpd by their number is then some hundredths, of differences that count from 4
-_DRAWS_OF_STEPS = 3000  # a hold's density is then known to some .15
 _statistics: Any = array_stats
 
 
@@ -109,7 +105,7 @@ def smoothed_leave_one_hold_out(
     seed : int
         Of what is sampled without holds.
     policy : Policy
-        Of what is sampled without holds.
+        Of fits without a hold, if `exact`.
     exact : bool
         Fit without every hold, one by one, whatever the diagnostic says.
     progress : function of a share between 0 and 1
@@ -129,46 +125,23 @@ def smoothed_leave_one_hold_out(
         log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else _statistics.psislw(log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K), True
-    poor = np.flatnonzero(refitted)
-    apart = k > _NO_OVERLAP
+    poor = np.flatnonzero(refitted).tolist()
     if exact:
-        elpd[poor] = np.nan
-    elif len(poor):
-        own = seed_of(seed, "left out in turn")
-        found, settled = log_densities(problem, [where[i] for i in poor], theta, elpd[poor], own, policy)
-        apart[poor] |= np.isnan(found)
-        elpd[poor] = found if settled else np.nan  # what the sum does not settle is fitted hold by hold
-    alone = np.flatnonzero(np.isnan(elpd)).tolist()
-    for done, i in enumerate(alone):
-        progress((len(where) - len(alone) + done) / len(where))
-        s, j = where[i]
-        own = seed_of(seed, "without", str(s), str(j))
-        without = fit(without_hold(problem, s, j), own, policy=policy, rough=theta)
-        if apart[i]:
-            elpd[i] = _by_steps(problem, s, j, without.flat, own)
-        else:
+        for done, i in enumerate(poor):
+            progress(done / len(poor))
+            s, j = where[i]
+            without = fit(
+                without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta
+            )
             elpd[i] = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
-        converged &= without.chains.converged
+            converged &= without.chains.converged
+    elif poor:
+        elpd[poor], settled = log_densities(problem, [where[i] for i in poor], theta, seed_of(seed, "left out"))
+        converged = bool(settled.all())
     progress(1.0)
     names = tuple(problem.samples[s].name for s, _ in where)
     numbers = np.array([problem.samples[s].protocol.number[j] for s, j in where])
-    return LeftOut(names, numbers, elpd, k, refitted, bool(converged))
-
-
-def _by_steps(problem: Problem, sample: int, hold: int, theta: Floats, seed: int) -> float:
-    """Log density of a hold's readings, from draws (n, d) of the posterior without it."""
-    target = LogPosterior(problem)
-
-    def both(z: Floats) -> tuple[Floats, Floats]:
-        natural = target.coordinates.to_natural(z)
-        whole, without = problem.without_each_hold(natural)
-        with np.errstate(all="ignore"):
-            prior = target.log_prior(natural) + target.coordinates.log_jacobian(natural)
-            first, second = prior + without[sample][hold], prior + whole
-        return np.where(np.isfinite(first), first, -np.inf), np.where(np.isfinite(second), second, -np.inf)
-
-    start = target.coordinates.to_sampled(thinned(theta, _DRAWS_OF_STEPS))
-    return log_ratio_of_integrals(both, start, np.random.default_rng(seed))[0]
+    return LeftOut(names, numbers, elpd, k, refitted, converged)
 
 
 def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
@@ -199,6 +172,34 @@ def thinned(theta: Floats, draws: int = _DRAWS) -> Floats:
     rows = np.linspace(0, len(theta) - 1, min(draws, len(theta))).round().astype(int)
     kept: Floats = theta[rows]
     return kept
+
+
+def log_mean(log_p: Floats, log_p_weighted: Floats) -> float:
+    """Logarithm of the mean of p under a density q, from draws of q and of the density proportional to q p.
+
+    The bridge between the two with the least variance: it is where draws of the one, weighed by how likely they belong
+    to the other, balance the reverse.
+
+    Parameters
+    ----------
+    log_p : (n,) array
+        At draws of q.
+    log_p_weighted : (m,) array
+        At draws of the density proportional to q p.
+
+    References
+    ----------
+    C. H. Bennett, Efficient estimation of free energy differences from Monte Carlo data, J. Comput. Phys. 22 (1976);
+    X.-L. Meng and W. H. Wong, Statistica Sinica 6 (1996).
+    """
+    one, other = log_p[np.isfinite(log_p)], log_p_weighted
+
+    def unbalanced(middle: float) -> float:
+        return float(expit(one - middle).sum() - expit(middle - other).sum())
+
+    low, high = min(one.min(), other.min()), max(one.max(), other.max())
+    span = high - low + np.log(len(log_p) + len(other)) + 1.0
+    return float(brentq(unbalanced, low - span, high + span, maxiter=1000) + np.log(len(other) / len(log_p)))
 
 
 def standard_error(values: Floats) -> float:

@@ -1,0 +1,228 @@
+"""Several densities of the same parameters at once, by adaptive importance sampling.
+
+One proposal serves them all. Round by round its draws join a pool, where they are weighted for every density against
+the mixture of all proposals so far. The proposal is then learned anew from the whole pool: from the sum of the
+densities, each normalised, in which those that are known worst have the greatest shares. Once it is good enough, fresh
+draws of it give the integrals of all densities from the same evaluations, so that errors of their ratios largely
+cancel.
+
+References
+----------
+J.-M. Cornuet, J.-M. Marin, A. Mira and C. P. Robert, Adaptive multiple importance sampling, Scand. J. Stat. 39 (2012);
+A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importance sampling, JMLR 25 (2024).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from arviz_stats.base import array_stats
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from wirebayes.inference.sampler import mixture, proposal
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.resampling import systematic_rows
+from wirebayes.typing import Array
+
+_statistics: Any = array_stats
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """Draws of one proposal, weighted for each of m densities.
+
+    Attributes
+    ----------
+    z : (n, d) array
+    log_density : (n, m) array
+    log_proposal : (n,) array
+    settled : (m,) bool array
+        Densities of which there are as many effective draws as were wanted, with weights that can be trusted.
+    """
+
+    z: Array
+    log_density: Array
+    log_proposal: Array
+    settled: NDArray[np.bool_]
+
+    @property
+    def log_weight(self) -> Array:
+        """(n, m) logarithms of density over proposal."""
+        return self.log_density - self.log_proposal[:, None]
+
+    @property
+    def log_integral(self) -> Array:
+        """(m,) logarithms of the integrals."""
+        return np.asarray(logsumexp(self.log_weight, axis=0) - np.log(len(self.z)))
+
+    def drawn(self, density: int, n: int, rng: np.random.Generator) -> Array:
+        """(n, d) draws that follow one density, as far as the weights allow.
+
+        Parameters
+        ----------
+        density : int
+        n : int
+        rng : numpy Generator
+        """
+        return self.z[_rows(self.log_weight[:, density], n, rng)]
+
+
+@dataclass(frozen=True)
+class _Past:
+    """All draws so far: points, (n, m) log densities, and each of the proposals (r, n) and how many are of it."""
+
+    z: Array
+    log_density: Array
+    log_proposals: Array
+    proposals: tuple[Mixture | Proposal, ...]
+    counts: tuple[int, ...]
+
+    def joined(self, new: Weighted, current: Mixture | Proposal) -> "_Past":
+        """With the draws of one more proposal."""
+        of_old = np.vstack([self.log_proposals, current.log_density(self.z)])
+        of_new = np.vstack([*(q.log_density(new.z) for q in self.proposals), new.log_proposal])
+        return _Past(
+            np.vstack([self.z, new.z]), np.vstack([self.log_density, new.log_density]), np.hstack([of_old, of_new]),
+            (*self.proposals, current), (*self.counts, len(new.z)),
+        )  # fmt: skip
+
+    def points(self, wanted: NDArray[np.bool_], ess: float, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draws that follow the sum of the wanted densities to a power, and the sum itself.
+
+        Parameters
+        ----------
+        wanted : (m,) bool array
+        ess : float
+            Effective draws wanted of each density; those with fewer have greater shares.
+        rng : numpy Generator
+        """
+        drawn_from = mixture.log_sum(self.log_proposals + np.log(self.counts)[:, None])
+        log_weight = self.log_density - drawn_from[:, None]
+        found = effective(log_weight)
+        known = wanted & (found > 0)
+        share = np.clip(ess / found[known], 1.0, _MOST_SHARE)
+        normalised = self.log_density[:, known] - logsumexp(log_weight[:, known], axis=0)
+        together = np.logaddexp.reduce(normalised + np.log(share), axis=1)
+        hot, cold = (self.z[_rows(power * together - drawn_from, _LEARNED, rng)] for power in (_HOT, 1.0))
+        return hot, cold
+
+
+def sample(
+    densities: Callable[[Array], Array],
+    start: Mixture,
+    rough: Array,
+    order: NDArray[np.int64],
+    rng: np.random.Generator,
+    ess: float,
+) -> Weighted:
+    """Learn a proposal, then draw from it until there are enough effective draws of each density.
+
+    All draws are of the proposal that was learned last, so integrals have no bias from the learning; those of the
+    rounds before only teach. Among more than two densities, some may be given up: once the first rounds are over, those
+    that would need too many draws. Each is better sampled with the first alone, which is never given up.
+
+    Parameters
+    ----------
+    densities : function of (n, d) points to (n, m) arrays
+        Log densities, none of them normalised; -inf where a density is zero.
+    start : Mixture
+        Reaches every mode.
+    rough : (n, d) array
+        Points that roughly follow the densities.
+    order : (d,) array of int
+        In which coordinates are straightened (see `wirebayes.inference.sampler.transport_map`).
+    rng : numpy Generator
+    ess : float
+        Effective draws wanted of each density.
+
+    Returns
+    -------
+    Weighted
+    """
+    current = _learned(rough, rough, start, order, rng, start)
+    fresh = _weighted(densities, current, _FIRST, ess, rng)
+    past = _Past(fresh.z, fresh.log_density, fresh.log_proposal[None], (current,), (len(fresh.z),))
+    wanted = np.ones(len(fresh.settled), bool)
+    for done in range(_ROUNDS):
+        current = _learned(*past.points(wanted, ess, rng), start, order, rng, current)
+        needed = _RESERVE * len(fresh.z) * ess / np.maximum(effective(fresh.log_weight), 1.0)
+        if done >= _PATIENCE and len(wanted) > 2:
+            wanted[1:] &= needed[1:] <= _AFFORDABLE
+        most = int(needed[wanted].max())
+        ready = most < 2 * done * _LEARNING
+        n = min(max(most, _LEARNING), _AFFORDABLE) if ready else _LEARNING
+        fresh = _weighted(densities, current, n, ess, rng)
+        if (fresh.settled | ~wanted).all():
+            break
+        past = past.joined(fresh, current)
+    return fresh
+
+
+def _weighted(
+    densities: Callable[[Array], Array], current: Mixture | Proposal, n: int, ess: float, rng: np.random.Generator
+) -> Weighted:
+    z = current.rvs(n, rng)
+    log_density, log_proposal = densities(z), current.log_density(z)
+    log_weight = log_density - log_proposal[:, None]
+    enough = effective(log_weight) >= ess
+    trusted = [bool(e) and tail(w) <= _LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
+    return Weighted(z, log_density, log_proposal, np.array(trusted))
+
+
+def effective(log_weight: Array) -> Array:
+    """(m,) effective numbers of draws, (sum w)² / sum w², of weights (n, m); 0 where none has any weight."""
+    top = log_weight.max(axis=0)
+    weight = np.exp(log_weight - np.where(np.isfinite(top), top, 0.0))
+    return np.asarray(weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300))
+
+
+def tail(log_weight: Array) -> float:
+    """Shape k of the tail of (n,) weights, by a generalised Pareto distribution; NaN where there is none.
+
+    The smaller of two estimates, from the largest 3 √n weights and from the largest √n. Where a hill of the density is
+    drawn too seldom, its weights lie above a plateau of others, and a tail that holds both looks heavy.
+    """
+    values = -log_weight[np.isfinite(log_weight)]
+    if not len(values):
+        return np.nan
+    with np.errstate(all="ignore"):
+        return float(np.fmin(*(_statistics.psislw(values, r_eff=share)[1] for share in (1.0, 9.0))))
+
+
+def _rows(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """(n,) rows drawn by weight, in random order; none counts for more than the root of all rows."""
+    weight = np.exp(log_weight - log_weight.max())
+    weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
+    return rng.permutation(systematic_rows(weight, n, rng))
+
+
+def _learned(
+    hot: Array,
+    cold: Array,
+    start: Mixture,
+    order: NDArray[np.int64],
+    rng: np.random.Generator,
+    before: Mixture | Proposal,
+) -> Mixture | Proposal:
+    """The proposal fitted to points, or the one before where they are too few."""
+    known = before if isinstance(before, Proposal) else None
+    shares = proposal.EXPLORING if known else proposal.ROUGH_SHARES
+    try:
+        return proposal.fit(hot, cold, start, order, rng, shares, most=_COMPONENTS, points=_LEARNED, before=known)
+    except np.linalg.LinAlgError:
+        return before
+
+
+_LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
+_FIRST, _LEARNING = 1024, 2048  # draws of the first round and of others that only teach
+_ROUNDS = 20  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
+_PATIENCE = 4  # rounds in which all densities are learned, whatever they need
+_AFFORDABLE = 16_000  # draws for a density among others; alone, one takes some 3,000
+_LEARNED = 5000  # points that a proposal is learned from: it needs not be the best one
+_HOT = 0.4  # power of the densities that the wide parts of the proposal are fitted to
+_COMPONENTS = 8  # of the close part
+_RESERVE = 1.3  # draws beyond those that seem to be enough
+_MOST_SHARE = 10.0  # of a density that is known worst, in shares of one that is known well enough
