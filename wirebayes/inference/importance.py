@@ -21,6 +21,7 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from wirebayes.inference.modes import climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
@@ -143,11 +144,13 @@ def sample(
     Weighted
     """
     current = _learned(rough, rough, start, order, rng, start)
+    witness = rough[rng.permutation(len(rough))[:_WITNESSES]]
     fresh = _weighted(densities, current, _FIRST, ess, rng)
     past = _Past(fresh.z, fresh.log_density, fresh.log_proposal[None], (current,), (len(fresh.z),))
     wanted = np.ones(len(fresh.settled), bool)
     for done in range(_ROUNDS):
-        current = _learned(*past.points(wanted, ess, rng), start, order, rng, current)
+        hot, cold = (np.vstack([points, witness]) for points in past.points(wanted, ess, rng))
+        current = _learned(hot, cold, start, order, rng, current)
         needed = _RESERVE * len(fresh.z) * ess / np.maximum(effective(fresh.log_weight), 1.0)
         if done >= _PATIENCE and len(wanted) > 2:
             wanted[1:] &= needed[1:] <= _AFFORDABLE
@@ -161,6 +164,40 @@ def sample(
     return fresh
 
 
+def from_draws(
+    densities: Callable[[Array], Array],
+    draws: Array,
+    order: NDArray[np.int64],
+    rng: np.random.Generator,
+    ess: float,
+    near: Array | None = None,
+) -> Weighted:
+    """`sample`, begun from draws of nearly these densities: their modes are climbed to from the highest draws.
+
+    Parameters
+    ----------
+    densities : function of (n, d) points to (n, m) arrays
+    draws : (n, d) array
+    order : (d,) array of int
+    rng : numpy Generator
+    ess : float
+    near : (k, d) array, optional
+        Those of the draws from which to climb.
+    """
+    near = draws if near is None else near
+    height = densities(near)
+    width = near.std(axis=0)
+    spread = mixture.spread_rows(near / np.where(width > 0, width, 1.0), _STARTS, rng)
+    which = np.append(np.arange(height.shape[1]), np.zeros(len(spread), int))
+    begin = near[np.append(np.argmax(height, axis=0), spread)]
+    found = climb(
+        lambda z, rows: densities(z)[np.arange(len(rows)), which[rows]], begin, iterations=_STEPS, tolerance=1e-2
+    )
+    found = distinct([found])
+    start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
+    return sample(densities, start, draws, order, rng, ess)
+
+
 def _weighted(
     densities: Callable[[Array], Array], current: Mixture | Proposal, n: int, ess: float, rng: np.random.Generator
 ) -> Weighted:
@@ -168,7 +205,7 @@ def _weighted(
     log_density, log_proposal = densities(z), current.log_density(z)
     log_weight = log_density - log_proposal[:, None]
     enough = effective(log_weight) >= ess
-    trusted = [bool(e) and tail(w) <= _LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
+    trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
     return Weighted(z, log_density, log_proposal, np.array(trusted))
 
 
@@ -216,11 +253,15 @@ def _learned(
         return before
 
 
-_LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
+_STARTS = 6  # of climbs on the first density, besides the highest draw
+_STEPS = 40  # to a mode; the proposal learns the rest
+_WIDER = 1.7  # times the covariance at a mode
+LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
 _FIRST, _LEARNING = 1024, 2048  # draws of the first round and of others that only teach
 _ROUNDS = 20  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
 _PATIENCE = 4  # rounds in which all densities are learned, whatever they need
 _AFFORDABLE = 16_000  # draws for a density among others; alone, one takes some 3,000
+_WITNESSES = 1250  # of the rough points, that are learned from in every round: what they know is not forgotten
 _LEARNED = 5000  # points that a proposal is learned from: it needs not be the best one
 _HOT = 0.4  # power of the densities that the wide parts of the proposal are fitted to
 _COMPONENTS = 8  # of the close part

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference import importance
-from wirebayes.inference.modes import climb
-from wirebayes.inference.sampler import mixture
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
@@ -39,25 +37,14 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     rng = np.random.default_rng(seed)
     target = LogPosterior(problem)
     z = target.coordinates.to_sampled(draws)
-    pool = _pool(target, holds, z, z, rng)
+    pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
     elpd, settled = pool.log_integral[0] - pool.log_integral[1:], pool.settled[0] & pool.settled[1:]
     for m in np.flatnonzero(~settled).tolist():
         near = pool.drawn(1 + m, len(z), rng)
-        own = _pool(target, [holds[m]], np.concatenate([z, near]), near, rng)
+        both = joined(target, [holds[m]])
+        own = importance.from_draws(both, np.concatenate([z, near]), target.coordinates.order, rng, _ESS, near)
         elpd[m], settled[m] = own.log_integral[0] - own.log_integral[1], own.settled.all()
     return elpd, settled
-
-
-def _pool(
-    target: LogPosterior, holds: Holds, rough: Array, near: Array, rng: np.random.Generator
-) -> importance.Weighted:
-    """The full posterior and those without some holds; their modes are climbed to from the highest places of `near`."""
-    densities = joined(target, holds)
-    heights = densities(near)
-    top = near[np.argmax(heights, axis=0)]
-    found = climb(lambda z, rows: densities(z)[np.arange(len(rows)), rows], top, iterations=_STEPS, tolerance=1e-2)
-    start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(top)))
-    return importance.sample(densities, start, rough, target.coordinates.order, rng, _ESS)
 
 
 def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
@@ -81,6 +68,4 @@ def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
 
 
 _ESS = 400.0  # a ratio of two integrals is then known to .07 at worst
-_STEPS = 40  # to a mode; the proposal learns the rest
-_WIDER = 1.7  # times the covariance at a mode
 _ROWS = 1024  # points at once: what stays in the cache
