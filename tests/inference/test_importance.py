@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from wirebayes.inference import importance
-from wirebayes.inference.importance import Weighted, effective, sample, tail
+from wirebayes.inference.importance import Weighted, effective, expected, from_draws, sample, tail
 from wirebayes.inference.sampler.mixture import Mixture
 
 D = 4
@@ -31,7 +31,7 @@ def three(z: np.ndarray) -> np.ndarray:
 
 def pool(densities: object, seed: int, *centres: float, ess: float = 500.0) -> Weighted:
     rng = np.random.default_rng(seed)
-    return sample(densities, start(*centres), rng.normal(size=(1000, D)), ORDER, rng, ess)  # type: ignore[arg-type]
+    return sample(densities, start(*centres), rng.normal(size=(1000, D)), np.empty((0, D)), ORDER, rng, ess)  # type: ignore[arg-type]
 
 
 def test_integrals_are_found_within_the_error_of_the_effective_draws() -> None:
@@ -46,10 +46,10 @@ def test_integrals_are_found_within_the_error_of_the_effective_draws() -> None:
 def test_draws_of_the_pool_follow_each_density() -> None:
     one = pool(three, 0, 0.0, 7.0, ess=4000.0)
     rng = np.random.default_rng(1)
-    for density, expected in enumerate([0.0, 0.2, 0.0]):
+    for density, beyond in enumerate([0.0, 0.2, 0.0]):
         far = one.drawn(density, 4000, rng)[:, 0] > 5.0
         # beyond 5 lies 2.3 % of the wide normal
-        assert far.mean() == pytest.approx(expected + (0.0228 if density == 2 else 0.0), abs=0.02)
+        assert far.mean() == pytest.approx(beyond + (0.0228 if density == 2 else 0.0), abs=0.02)
     assert stats.kstest(one.drawn(0, 2000, rng)[:, 2], "norm").pvalue > 1e-3
 
 
@@ -76,7 +76,7 @@ def test_a_density_that_would_take_too_many_draws_is_given_up(monkeypatch: pytes
     assert pool(counted, 0, 0.0).settled.tolist() == [True, True, False] and sum(few) < 16_000
     few.clear()
     monkeypatch.setattr(importance, "_AFFORDABLE", 1e9)
-    assert not pool(counted, 0, 0.0).settled[2] and len(few) == importance._ROUNDS + 1
+    assert not pool(counted, 0, 0.0).settled[2] and len(few) == importance._ROUNDS + 2
 
 
 @pytest.mark.parametrize("order", [[2, 0, 1], [0, 2]])
@@ -87,7 +87,7 @@ def test_the_first_density_and_one_of_two_are_not_given_up(order: list[int]) -> 
         few.append(len(z))
         return far(z)[:, order]
 
-    assert not pool(counted, 0, 0.0).settled[order.index(2)] and len(few) == importance._ROUNDS + 1
+    assert not pool(counted, 0, 0.0).settled[order.index(2)] and len(few) == importance._ROUNDS + 2
 
 
 @pytest.mark.parametrize(("needed", "settled"), [(15_999, True), (16_001, False)])
@@ -117,6 +117,46 @@ def test_weights_with_a_heavy_tail_do_not_settle(k: float, settled: bool, monkey
     monkeypatch.setattr(importance, "tail", lambda log_weight: k)
     monkeypatch.setattr(importance, "_ROUNDS", 4)
     assert pool(three, 0, 0.0, 7.0).settled.tolist() == [settled] * 3
+
+
+def two_hills(z: np.ndarray) -> np.ndarray:
+    return three(z)[:, 1:2] - 5.0
+
+
+def exact(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Draws of the two hills."""
+    far = rng.uniform(size=(n, 1)) < 0.2
+    return np.where(far, 7.0, 0.0) + np.where(far, 0.5, 1.0) * rng.normal(size=(n, D))
+
+
+def test_other_draws_tell_of_a_hill_that_a_proposal_misses() -> None:
+    """Its own weights are all alike, and promise far more."""
+    rng = np.random.default_rng(2)
+    witness = exact(1000, rng)
+    good, blind = start(0.0, 7.0), start(0.0)
+    for current, misses in ((good, False), (blind, True)):
+        fresh = importance._weighted(two_hills, current, 4000, 500.0, rng)
+        promised = expected(fresh, current, witness, two_hills(witness)[:, 0])
+        own = effective(fresh.log_weight)[0]
+        assert own > 1000 and fresh.settled[0]
+        assert promised < 1e-6 * own if misses else promised == pytest.approx(own, rel=0.2)
+
+
+@pytest.mark.parametrize(("promised", "settled"), [(249.0, False), (251.0, True)])
+def test_half_of_the_effective_draws_must_be_promised(
+    promised: float, settled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importance, "expected", lambda *given: promised)
+    assert pool(three, 0, 0.0, 7.0).settled.tolist() == [settled, True, True]
+
+
+def test_from_draws_every_hill_is_climbed() -> None:
+    """A thousandth of the draws lie on the second hill, which has a fifth of the density."""
+    rng = np.random.default_rng(4)
+    draws = exact(5000, rng)
+    draws = np.concatenate([draws[draws[:, 0] < 4.0], draws[draws[:, 0] > 4.0][:4]])
+    found = from_draws(two_hills, draws, ORDER, rng, 500.0)
+    assert found.settled[0] and found.log_integral[0] == pytest.approx(0.0, abs=0.15)
 
 
 def test_places_of_no_density_do_no_harm() -> None:

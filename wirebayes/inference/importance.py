@@ -114,7 +114,8 @@ class _Past:
 def sample(
     densities: Callable[[Array], Array],
     start: Mixture,
-    rough: Array,
+    draws: Array,
+    near: Array,
     order: NDArray[np.int64],
     rng: np.random.Generator,
     ess: float,
@@ -131,8 +132,10 @@ def sample(
         Log densities, none of them normalised; -inf where a density is zero.
     start : Mixture
         Reaches every mode.
-    rough : (n, d) array
-        Points that roughly follow the densities.
+    draws : (n, d) array
+        Points that roughly follow the first density.
+    near : (k, d) array
+        Points near the others, none if there are none or they are like the first.
     order : (d,) array of int
         In which coordinates are straightened (see `wirebayes.inference.sampler.transport_map`).
     rng : numpy Generator
@@ -143,13 +146,15 @@ def sample(
     -------
     Weighted
     """
-    current = _learned(rough, rough, start, order, rng, start)
-    witness = rough[rng.permutation(len(rough))[:_WITNESSES]]
+    known = np.concatenate([draws, near])
+    current = _learned(known, known, start, order, rng, start)
+    remembered, witness = (points[rng.permutation(len(points))[:_WITNESSES]] for points in (known, draws))
+    height = densities(witness)[:, 0]
     fresh = _weighted(densities, current, _FIRST, ess, rng)
     past = _Past(fresh.z, fresh.log_density, fresh.log_proposal[None], (current,), (len(fresh.z),))
     wanted = np.ones(len(fresh.settled), bool)
     for done in range(_ROUNDS):
-        hot, cold = (np.vstack([points, witness]) for points in past.points(wanted, ess, rng))
+        hot, cold = (np.vstack([points, remembered]) for points in past.points(wanted, ess, rng))
         current = _learned(hot, cold, start, order, rng, current)
         needed = _RESERVE * len(fresh.z) * ess / np.maximum(effective(fresh.log_weight), 1.0)
         if done >= _PATIENCE and len(wanted) > 2:
@@ -158,6 +163,7 @@ def sample(
         ready = most < 2 * done * _LEARNING
         n = min(max(most, _LEARNING), _AFFORDABLE) if ready else _LEARNING
         fresh = _weighted(densities, current, n, ess, rng)
+        fresh.settled[0] &= expected(fresh, current, witness, height) >= _LEAST_EXPECTED * ess
         if (fresh.settled | ~wanted).all():
             break
         past = past.joined(fresh, current)
@@ -172,30 +178,32 @@ def from_draws(
     ess: float,
     near: Array | None = None,
 ) -> Weighted:
-    """`sample`, begun from draws of nearly these densities: their modes are climbed to from the highest draws.
+    """`sample`, begun from draws: modes are climbed to from the highest ones, those of the first also from others.
 
     Parameters
     ----------
     densities : function of (n, d) points to (n, m) arrays
     draws : (n, d) array
+        Of the first density, roughly.
     order : (d,) array of int
     rng : numpy Generator
     ess : float
     near : (k, d) array, optional
-        Those of the draws from which to climb.
+        Points near the other densities.
     """
-    near = draws if near is None else near
-    height = densities(near)
-    width = near.std(axis=0)
-    spread = mixture.spread_rows(near / np.where(width > 0, width, 1.0), _STARTS, rng)
+    near = draws[:0] if near is None else near
+    known = np.concatenate([draws, near])
+    height = densities(known)
+    width = draws.std(axis=0)
+    spread = mixture.spread_rows(draws / np.where(width > 0, width, 1.0), _STARTS, rng)
     which = np.append(np.arange(height.shape[1]), np.zeros(len(spread), int))
-    begin = near[np.append(np.argmax(height, axis=0), spread)]
+    begin = known[np.append(np.argmax(height, axis=0), spread)]
     found = climb(
         lambda z, rows: densities(z)[np.arange(len(rows)), which[rows]], begin, iterations=_STEPS, tolerance=1e-2
     )
     found = distinct([found])
     start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
-    return sample(densities, start, draws, order, rng, ess)
+    return sample(densities, start, draws, near, order, rng, ess)
 
 
 def _weighted(
@@ -214,6 +222,25 @@ def effective(log_weight: Array) -> Array:
     top = log_weight.max(axis=0)
     weight = np.exp(log_weight - np.where(np.isfinite(top), top, 0.0))
     return np.asarray(weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300))
+
+
+def expected(fresh: Weighted, current: Mixture | Proposal, witness: Array, height: Array) -> float:
+    """Effective draws of the first density, as its weights at other draws of it promise.
+
+    Draws of a proposal know nothing of a hill that it misses, and their weights look fine.
+
+    Parameters
+    ----------
+    fresh : Weighted
+        Draws of the proposal.
+    current : Mixture or Proposal
+    witness : (n, d) array
+        Draws that roughly follow the first density.
+    height : (n,) array
+        Its logarithm there.
+    """
+    over = height - current.log_density(witness) - fresh.log_integral[0]
+    return float(len(fresh.z) * np.exp(min(np.log(len(over)) - logsumexp(over), 0.0)))
 
 
 def tail(log_weight: Array) -> float:
@@ -258,10 +285,11 @@ _STEPS = 40  # to a mode; the proposal learns the rest
 _WIDER = 1.7  # times the covariance at a mode
 LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
 _FIRST, _LEARNING = 1024, 2048  # draws of the first round and of others that only teach
-_ROUNDS = 20  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
+_ROUNDS = 14  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
 _PATIENCE = 4  # rounds in which all densities are learned, whatever they need
 _AFFORDABLE = 16_000  # draws for a density among others; alone, one takes some 3,000
 _WITNESSES = 1250  # of the rough points, that are learned from in every round: what they know is not forgotten
+_LEAST_EXPECTED = 0.5  # of the effective draws wanted: what a thousand rough draws promise is known to a factor
 _LEARNED = 5000  # points that a proposal is learned from: it needs not be the best one
 _HOT = 0.4  # power of the densities that the wide parts of the proposal are fitted to
 _COMPONENTS = 8  # of the close part

@@ -42,7 +42,7 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     for m in np.flatnonzero(~settled).tolist():
         near = pool.drawn(1 + m, len(z), rng)
         both = joined(target, [holds[m]])
-        own = importance.from_draws(both, np.concatenate([z, near]), target.coordinates.order, rng, _ESS, near)
+        own = importance.from_draws(both, z, target.coordinates.order, rng, _ESS, near)
         elpd[m], settled[m] = own.log_integral[0] - own.log_integral[1], own.settled.all()
     return elpd, settled
 
