@@ -32,7 +32,7 @@ from wirebayes.typing import Floats
 from wirebayes.workers import workers
 
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
-POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=1200)
+POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=600)
 MEANINGFUL_ELPD, MEANINGFUL_SE = 4.0, 2.0  # below either, the difference may be chance (Sivula et al. 2020)
 
 
