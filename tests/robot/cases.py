@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.robot.mechanics import rotation
+from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 
@@ -30,6 +30,15 @@ def commanded(robot, law, count, rng):
     wires = Wires(law, "saturating", {"k1": k1[None]}, np.full((robot.legs, 1), 1000.0))
     commands = inverse.commands(robot, wires, position, R, tau)
     return Cases(wires, position, R, commands.zero_m, commands.offset_m)
+
+
+def in_a_plane():
+    """A weight on four wires of 5 m, 250 N each, in a plane: robot, k1, zero, offset, x, R."""
+    exits = np.array([[3.0, 0.0, 4.0], [-3.0, 0.0, 4.0], [4.0, 0.0, 3.0], [-4.0, 0.0, 3.0]])
+    robot = replace(schema.read("hangprinter-4"), exit_m=exits, lines=np.ones(4), beyond_m=np.zeros(4), mass_kg=1.0)
+    one_kg_N = -statics.weight(robot, np.eye(3)[..., None])[2, 0]
+    robot = replace(robot, mass_kg=2 * 250.0 * (0.8 + 0.6) / one_kg_N)
+    return robot, np.full(4, 1000.0), np.full(4, 4.0), np.zeros(4), np.zeros(3), np.eye(3)
 
 
 def disturbed(robot, law, count, rng, amount=0.01):

@@ -54,15 +54,23 @@ def test_every_sampled_pose_lies_in_the_guaranteed_enclosure(name):
         assert (robot.size_m * np.abs(cayley).max(0) <= proof.radius_m[3:]).all()
 
 
-def test_a_proof_grows_with_the_robot():
+@pytest.mark.parametrize("many", [2.0**7, 2.0**-30])
+def test_a_proof_grows_with_the_robot(many):
     """Lengths times a power of two, which rounds nothing: so are both boxes."""
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    known, many = np.full(robot.legs, k1), 2.0**7
+    known = np.full(robot.legs, k1)
     small = certify(robot, "hooke", (known, known), (zero, zero), offset, x, R)
     big = claim.scaled(robot, many, robot.mass_kg)
     large = certify(big, "hooke", (known, known), (many * zero, many * zero), many * offset, many * x, R)
     assert large.proved and large.unique_m == pytest.approx(many * small.unique_m, rel=1e-6)
     np.testing.assert_allclose(large.radius_m, many * small.radius_m, rtol=1e-6)
+
+
+def test_a_direction_that_is_balanced_to_the_last_bit_is_proved_too():
+    """A weight on wires in a plane swings out of it like a pendulum: no force there, and none that rounding adds."""
+    robot, k1, zero, offset, x, R = cases.in_a_plane()
+    proof = certify(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
+    assert proof.proved and proof.radius_m.max() < 1e-14
 
 
 def test_a_wrong_pose_is_not_certified():

@@ -11,7 +11,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, drift, forward, inverse
 from wirebayes.robot.proof import proofs
 
-TIMES = np.array([0.0, 600.0])
+TIMES = np.array([0.0, 60.0, 600.0])
 
 
 @pytest.fixture(scope="module")

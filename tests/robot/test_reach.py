@@ -6,7 +6,7 @@ import pytest
 from tests.robot import cases
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward
+from wirebayes.robot.motion import claim, forward
 from wirebayes.robot.proof import reach as module
 from wirebayes.robot.proof.ball_arithmetic import Balance
 from wirebayes.robot.proof.reach import apart, reach
@@ -79,11 +79,37 @@ def test_a_wire_that_may_go_slack_is_enclosed_or_refused():
 
 def test_too_much_is_refused():
     robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke")
-    assert not reach(robot, "hooke", k1, zero, apart(0.5 * k1, 0.01 * zero), offset, x, R).proved
+    wide = reach(robot, "hooke", k1, zero, apart(0.5 * k1, 0.01 * zero), offset, x, R)
+    assert not wide.proved
+    assert wide.line_m.shape == (6, 16) and np.isnan(wide.line_m).all()
+    assert wide.radius_m.shape == wide.beside_m.shape == (6,) and np.isnan([wide.radius_m, wide.beside_m]).all()
     assert not reach(robot, "hooke", k1, zero, apart(2.0 * k1, 0 * zero), offset, x, R).proved
     # far from equilibrium there is nothing to prove
     away = reach(robot, "hooke", k1, zero, apart(1e-6 * k1, 1e-7 * zero), offset, x + [0, 0, 0.01], R)
     assert not away.proved or np.all(np.abs(away.centre_m - x) <= away.radius_m[:3])
+
+
+@pytest.mark.parametrize("many", [2.0**7, 2.0**-30])
+@pytest.mark.parametrize("share", [1e-9, 1e-5])  # the first box tried holds, and a wider one
+def test_what_is_proved_grows_with_the_robot(many, share):
+    """Lengths times a power of two, which rounds nothing: so is the box."""
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    small = reach(robot, "hooke", k1, zero, apart(share * k1, share * zero), offset, x, R)
+    big, zero = claim.scaled(robot, many, robot.mass_kg), many * zero
+    large = reach(big, "hooke", k1, zero, apart(share * k1, share * zero), many * offset, many * x, R)
+    assert small.proved and large.proved
+    np.testing.assert_allclose(large.radius_m, many * small.radius_m, rtol=1e-6)
+    np.testing.assert_allclose(large.beside_m, many * small.beside_m, rtol=1e-6)
+
+
+def test_a_direction_that_is_balanced_to_the_last_bit_is_proved_too():
+    robot, k1, zero, offset, x, R = cases.in_a_plane()
+    got = reach(robot, "hooke", k1, zero, apart(0 * k1, 1e-5 * zero), offset, x, R)
+    assert got.proved
+    signs = np.array(list(product((-1, 1), repeat=4)))
+    found = _poses(robot, "hooke", np.tile(k1, (16, 1)), zero * (1 + 1e-5 * signs), offset, x, R)
+    moved = np.abs(found.position_m).max(0)
+    assert (moved <= got.radius_m).all() and (got.radius_m < 1.1 * moved + 1e-8).all()
 
 
 CURVED = [("linear-7", "modified"), ("hangprinter-4", "hooke"), ("robocrane", "hooke")]

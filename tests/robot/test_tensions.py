@@ -53,6 +53,34 @@ def test_tensions_that_leave_their_bounds_come_back_to_the_corner_that_is_neares
     assert tensions.nearest(corner + 2.0 * way, structure, load, 1.0, 3.3) is None
 
 
+@pytest.mark.parametrize("N_per_N", [0.1, 1.0, 10.0])  # of load, by a tension of 1 N
+def test_one_wire_may_miss_its_bounds_by_rounding_and_no_more(N_per_N):
+    """A billionth of the tension, or of the load where that is more."""
+    structure, load, tau = np.array([[N_per_N]]), np.array([60.0]), 60.0 / N_per_N
+    billionth = 1e-9 * max(tau, 60.0)
+
+    def held(low, high):
+        return tensions.nearest(np.zeros(1), structure, load, low, high) is not None
+
+    assert held(tau + 0.9 * billionth, 9e9) and held(0.0, tau - 0.9 * billionth)
+    assert not held(tau + 1.1 * billionth, 9e9) and not held(0.0, tau - 1.1 * billionth)
+
+
+def test_a_load_that_the_wires_cannot_make_is_refused_beyond_rounding():
+    """A wire downwards, and a load that points a little to the side."""
+    structure = np.array([[0.0], [2.0]])
+    for aside, carried in ((0.9e-9, True), (1.1e-9, False)):
+        tau = tensions.nearest(np.zeros(1), structure, np.array([60.0 * aside, 60.0]), 1.0, 90.0)
+        assert (tau is not None) == carried
+
+
+def test_a_wire_that_gives_no_wrench_but_rounding_takes_its_reference():
+    """Beside a wire of 1 N for 1 N, one of as good as nothing: below 1e-10 it is free, above it the load decides."""
+    for lever, second_N in ((0.9e-10, 5.0), (1.1e-10, 0.0)):
+        tau = tensions.nearest(np.array([0.0, 5.0]), np.diag([1.0, lever]), np.array([60.0, 0.0]), -90.0, 90.0)
+        np.testing.assert_allclose(tau, [60.0, second_N], atol=1e-9)
+
+
 def test_a_pose_outside_the_wires_is_infeasible():
     robot = schema.read("cogiro-desk")
     tau = inverse.tensions(robot, np.array([[3.0, 0.0, 0.3]]), np.eye(3)[None])

@@ -408,7 +408,7 @@ def equilibria(
     low, high = robot.exit_m.min(0), robot.exit_m.max(0)
     low = low - np.array([0.0, 0.0, 0.5 * zero_m.max()])
     begin = rng.uniform(low, high, (starts, 3))
-    turn = np.eye(3) if robot.degrees == 3 else turning.matrix(rng.normal(0.0, 1.2, (starts, 3)))
+    turn = np.eye(3) if robot.degrees == 3 else turning.matrix(1.2 * rng.standard_normal((starts, 3)))
     turn = np.broadcast_to(turn, (starts, 3, 3))
     if known is not None:
         begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])

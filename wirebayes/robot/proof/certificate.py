@@ -83,8 +83,8 @@ def certify(
         image = _krawczyk(system, C, radius)
         if np.all(image < radius):
             break
-        radius = 1.2 * image + 1e-13 * span
-        if not np.all(radius < 0.5 * robot.size_m + 0.5 * span):
+        radius = 1.2 * image
+        if not np.all(radius < span):  # all of the robot: it grows and will not come back
             return nothing
     else:
         return nothing

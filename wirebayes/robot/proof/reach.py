@@ -31,7 +31,7 @@ class Reach:
     radius_m, beside_m : (6 or 3,) arrays
         Half widths: displacements, then turns times the platform's size. NaN when not proved.
     line_m : (6 or 3, q) array
-        The linear answer to each ``p``.
+        The linear answer to each ``p``. NaN when not proved.
     """
 
     proved: bool
@@ -97,7 +97,8 @@ def reach(
         python-flint is not installed.
     """
     d = robot.degrees
-    nothing = Reach(False, position_m, rotation, np.full(d, np.nan), np.full(d, np.nan), np.full((d, 1), np.nan))
+    unknown = np.full(d, np.nan)
+    nothing = Reach(False, position_m, rotation, unknown, unknown, np.full((d, generators[0].shape[1]), np.nan))
     k1_bounds, zero_bounds = _bounds(k1_N, generators[0]), _bounds(zero_m, generators[1])
     if min(k1_bounds[0].min(), zero_bounds[0].min()) <= 0:
         return nothing
@@ -109,12 +110,12 @@ def reach(
         return nothing
     Y = _linear_answer(middle, C, generators)
     along = np.abs(Y).sum(1) * _UP
-    beside = np.full(d, 1e-10 * robot.span_m) + 1e-3 * along
+    beside = np.full(d, 1e-10 * robot.span_m)
     for _ in range(30):
         image = _image(middle, wide, C, Y, generators, along, beside)
         if np.all(image < beside):
             return Reach(True, position_m, rotation, (along + beside) * _UP, beside, Y)
-        beside = 1.2 * image + 1e-13 * robot.span_m
+        beside = 1.2 * image
         if not np.all(beside < robot.span_m):
             break
     return nothing
