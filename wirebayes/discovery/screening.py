@@ -13,8 +13,10 @@ from scipy import stats
 
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, probes, scan
 from wirebayes.discovery.refit import occam
+from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import climb, rowwise
+from wirebayes.model.problem import LENGTH_EXPONENT
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
@@ -22,6 +24,8 @@ from wirebayes.wire.effect import Effect, EventEffect
 _ROWS = 100  # replicates linearised at once
 _FLEXIBLE = "unknown"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
+# What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
+_LEARNED_EXPONENT = LengthDependence("B").key
 _AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
@@ -75,7 +79,9 @@ def candidate_probes(
 
 def _variants(kind: type[Effect], block: LaplaceFit, several: bool) -> list[Effect]:
     if not issubclass(kind, EventEffect):
-        return kind.variants([e.protocol() for e in block.experiments])
+        found_by_all = kind.variants([e.protocol() for e in block.experiments])
+        learned = any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names)
+        return [v for v in found_by_all if not (learned and v.key == _LEARNED_EXPONENT)]
     taken = {e.key for e in block.effects}
     if kind.name in {e.name for e in block.effects}:
         return []
