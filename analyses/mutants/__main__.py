@@ -21,10 +21,10 @@ from analyses.mutants.tree import copy_of_the_checkout, preload, run
 # What decides, by package.
 MODULES = {
     "model": ["likelihoods", "problem"],
-    "inference": ["convergence", "sampler/burn_in", "sampler/ensemble", "sampler/kept", "sampler/moves",
+    "inference": ["convergence", "importance", "sampler/burn_in", "sampler/ensemble", "sampler/kept", "sampler/moves",
                   "sampler/stop_rule"],
     "results": ["contraction", "identifiability", "outliers", "posterior_checks"],
-    "prediction": ["held_out", "leave_one_hold_out", "predictive", "table"],
+    "prediction": ["held_out", "leave_one_hold_out", "left_out_density", "predictive", "table"],
     "comparison": ["candidates", "compare"],
     "discovery": ["global_test", "held_out", "model_space", "power", "refit", "settings", "shrinking", "stepwise",
                   "verdict"],
