@@ -10,7 +10,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
 from wirebayes.prediction import leave_one_hold_out as module
-from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error, thinned
+from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error, thinned, without_hold
 
 
 @pytest.mark.parametrize(("tail", "sampled"), [(0.49, False), (0.51, True), (np.nan, True)])
@@ -63,6 +63,21 @@ def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch:
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
     assert found.elpd.tolist() == [0.0] * 4 and found.pareto_k.tolist() == [0.0] * 4 and not found.refitted.any()
+
+
+def test_a_hold_is_left_out_of_its_own_sample_alone() -> None:
+    problem = build(experiments()[:3])
+    for sample in range(3):
+        without = without_hold(problem, sample, 1)
+        assert len(without.samples) == 3 and not without.samples[sample].protocol.mask[1].any()
+        assert all(without.samples[i] is problem.samples[i] for i in range(3) if i != sample)
+
+
+def test_where_the_model_cannot_be_computed_a_hold_has_no_density(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build([experiments()[1].train(4)])
+    whole, without = np.array([1.0, np.nan, -np.inf]), np.zeros((4, 3))
+    monkeypatch.setattr(Problem, "without_each_hold", lambda self, theta: (whole, [without]))
+    assert problem.leave_one_hold_out(np.empty(0))[0].tolist() == [[1.0, -np.inf, -np.inf]] * 4
 
 
 def test_thinned_rows_reach_from_the_first_to_the_last() -> None:

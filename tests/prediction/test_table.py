@@ -11,13 +11,28 @@ from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
 from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.prediction.table import HEADER, mixture_table, table
+from wirebayes.prediction.table import HEADER, dataset, mixture_table, table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 0.01}
 DRAWS = 40000
+
+
+def test_rows_as_a_dataset_have_names_and_units() -> None:
+    rows = [["roc", 3, 1.5, 0.0, *np.arange(5.0)], ["roc", 4, 2.5, 30.0, *np.arange(5.0, 10.0)]]
+    found = dataset(rows, {"seed": 7})
+    assert found.attrs == {"experiment": "roc", "seed": 7} and set(found.coords) == {
+        "hold",
+        "displacement_mm",
+        "time_s",
+    }
+    assert {name: found[name].values.tolist() for name in ("hold", "time_s", "q95_N")} == {
+        "hold": [3, 4], "time_s": [0.0, 30.0], "q95_N": [4.0, 9.0]
+    }  # fmt: skip
+    assert [found[name].attrs["units"] for name in HEADER[1:]] == ["1", "mm", "s", "N", "N", "N", "N", "N"]
+    assert dataset(rows[:1], {}).attrs["experiment"] == "roc"
 
 
 def test_quantiles_are_those_of_the_known_normal() -> None:

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from wirebayes.results.contraction import contraction, source
+from wirebayes.results.contraction import contraction, interval, source
+
+
+def test_an_interval_is_the_median_between_the_ends_of_the_middle_nine_tenths() -> None:
+    assert interval(np.arange(101.0)) == (5.0, 50.0, 95.0)
 
 
 def test_contraction_is_the_share_of_variance_taken_away_of_the_logarithm_if_positive() -> None:

@@ -1,6 +1,7 @@
 """The proved box of the pose after creep: it holds every pose that the bands allow, hardly more, and nothing else."""
 
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,15 @@ def test_the_box_holds_every_pose_that_the_bands_allow_and_is_no_wider_than_they
     low, high = np.asarray(band["low_mm"]), np.asarray(band["high_mm"])
     assert (low <= shift.min(0)).all() and (shift.max(0) <= high).all()
     assert (high - low < 1.5 * np.ptp(shift, axis=0)).all()
+
+
+def test_of_a_platform_that_falls_or_is_not_found_nothing_is_proved(hung: Any) -> None:
+    robot, wires, course = hung
+    nothing = {"band": {"time_s": 600.0, "share": 0.0, "low_mm": None, "high_mm": None}}
+    lost = SimpleNamespace(times_s=course.times_s, found=np.zeros(30, bool), falls=None)
+    fallen = SimpleNamespace(times_s=course.times_s, found=course.found, falls=SimpleNamespace(fell=np.array([True])))
+    for one in (lost, fallen):
+        assert proofs.enclosed(robot, wires, one, robot.home_m, np.eye(3)) == nothing
 
 
 def test_poses_that_the_commands_do_not_hold_are_not_proved(hung: Any) -> None:
