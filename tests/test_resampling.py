@@ -1,9 +1,9 @@
-"""Systematic resampling."""
+"""Draws from weighted ones: as often as weights say, none too often, and how far weights may go."""
 
 import numpy as np
 import pytest
 
-from wirebayes.resampling import next_power, systematic_rows
+from wirebayes.resampling import next_power, systematic_rows, truncated_rows
 
 
 def test_a_row_comes_as_often_as_its_weight_says_to_within_one() -> None:
@@ -21,6 +21,19 @@ def test_the_mean_number_of_draws_is_the_weight() -> None:
     weight = np.array([0.05, 0.0, 0.6, 0.35])
     counts = sum(np.bincount(systematic_rows(weight, 3, rng), minlength=4) for _ in range(4000))
     assert np.abs(counts / 12000 - weight).max() < 0.01
+
+
+def test_no_row_counts_for_more_than_the_root_of_all() -> None:
+    """Of 400 rows one has nearly all weight; twenty times the mean is left to it, a share of 20 / 21."""
+    log_weight = np.full(400, 0.0)
+    log_weight[7] = 50.0
+    weight = np.exp(log_weight - 50.0)
+    capped = np.minimum(weight, 20.0 * weight.mean())
+    rows = truncated_rows(log_weight, 10_000, np.random.default_rng(0))
+    assert np.mean(rows == 7) == pytest.approx(capped[7] / capped.sum(), abs=1e-3)
+    even = truncated_rows(np.zeros(400), 4000, np.random.default_rng(0))
+    assert (np.bincount(even, minlength=400) == 10).all()
+    assert np.abs(np.corrcoef(even, np.arange(4000))[0, 1]) < 0.1  # in random order
 
 
 class Last:

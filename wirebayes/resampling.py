@@ -30,6 +30,32 @@ def systematic_rows(weight: Array, n: int, rng: np.random.Generator) -> NDArray[
     return np.minimum(np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n), len(weight) - 1)
 
 
+def truncated_rows(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Rows drawn in proportion to their weights, none of which counts for more than the root of all rows.
+
+    Parameters
+    ----------
+    log_weight : (m,) array
+        -inf for a row without weight.
+    n : int
+        Number of draws.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (n,) int array
+        In random order.
+
+    References
+    ----------
+    E. L. Ionides, Truncated importance sampling, J. Comput. Graph. Stat. 17(2), 2008: the bound is the mean weight
+    times the root of all rows.
+    """
+    weight = np.exp(log_weight - log_weight.max())
+    weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
+    return rng.permutation(systematic_rows(weight, n, rng))
+
+
 def next_power(log_weight: Array, most: float, share: float) -> float:
     """The largest power of the weights, at most `most`, that leaves a share of the rows effective.
 

@@ -25,7 +25,7 @@ from wirebayes.inference.modes import climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.resampling import systematic_rows
+from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
 
 _statistics: Any = array_stats
@@ -68,7 +68,7 @@ class Weighted:
         n : int
         rng : numpy Generator
         """
-        return self.z[_rows(self.log_weight[:, density], n, rng)]
+        return self.z[truncated_rows(self.log_weight[:, density], n, rng)]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class _Past:
         share = np.clip(ess / found[known], 1.0, _MOST_SHARE)
         normalised = self.log_density[:, known] - logsumexp(log_weight[:, known], axis=0)
         together = np.logaddexp.reduce(normalised + np.log(share), axis=1)
-        hot, cold = (self.z[_rows(power * together - drawn_from, _LEARNED, rng)] for power in (_HOT, 1.0))
+        hot, cold = (self.z[truncated_rows(power * together - drawn_from, _LEARNED, rng)] for power in (_HOT, 1.0))
         return hot, cold
 
 
@@ -213,7 +213,7 @@ def _weighted(
     log_density, log_proposal = densities(z), current.log_density(z)
     log_weight = log_density - log_proposal[:, None]
     enough = effective(log_weight) >= ess
-    trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
+    trusted = [bool(e) and tail(w) <= _LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
     return Weighted(z, log_density, log_proposal, np.array(trusted))
 
 
@@ -256,13 +256,6 @@ def tail(log_weight: Array) -> float:
         return float(np.fmin(*(_statistics.psislw(values, r_eff=share)[1] for share in (1.0, 9.0))))
 
 
-def _rows(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """(n,) rows drawn by weight, in random order; none counts for more than the root of all rows."""
-    weight = np.exp(log_weight - log_weight.max())
-    weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
-    return rng.permutation(systematic_rows(weight, n, rng))
-
-
 def _learned(
     hot: Array,
     cold: Array,
@@ -283,7 +276,7 @@ def _learned(
 _STARTS = 6  # of climbs on the first density, besides the highest draw
 _STEPS = 40  # to a mode; the proposal learns the rest
 _WIDER = 1.7  # times the covariance at a mode
-LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
+_LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
 _FIRST, _LEARNING = 1024, 2048  # draws of the first round and of others that only teach
 _ROUNDS = 14  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
 _PATIENCE = 4  # rounds in which all densities are learned, whatever they need

@@ -232,14 +232,13 @@ def without_each_hold(
     holds, _, n = line.tension.shape
     noise, out = _Noise.of(variance, setting_sd), np.zeros((holds, n))
     out[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
-    later, square = _Later(np.zeros(n), np.zeros(n), np.zeros(n)), np.zeros(n)
+    later = _Later(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
     for j in reversed(range(holds)):
         m, p = filtered.carried_mean[j], filtered.carried_var[j]
         a, c = line.carry_by_creep[j], line.carry_by_setting[j]
         out[j] += later.log_density(a * m, a * a * p + c * c * noise.setting_var)
-        out[j] = np.where(square < _ABSURD, out[j], -np.inf)
+        out[j] = np.where(later.square < _ABSURD, out[j], -np.inf)
         later = later.with_hold(line, j, readings[j], mask[j], noise)
-        square = square + ((readings[j] - line.tension[j])[mask[j]] ** 2).sum(axis=0) * noise.weight
     return out
 
 
@@ -247,12 +246,13 @@ def without_each_hold(
 class _Later:
     """Log density of the later holds' readings by the creep x carried into them: constant + pull x - precision x² / 2.
 
-    Each (n,).
+    Each (n,), and the sum of their squared residuals, in variances, whose rounding the density bears.
     """
 
     precision: Array
     pull: Array
     constant: Array
+    square: Array
 
     def log_density(self, mean: Array, var: Array) -> Array:
         """Of those readings, the carried creep being normal with this mean and variance."""
@@ -283,7 +283,8 @@ class _Later:
         wider = 1.0 + q * (ss + self.precision * c * c)
         precision = cc + self.precision * a * a - q * cross * cross / wider
         constant = self.constant - 0.5 * (rr + len(r) * noise.log_variance + np.log(wider) - q * pull_s**2 / wider)
-        return _Later(np.maximum(precision, 0.0), cr + self.pull * a - q * cross * pull_s / wider, constant)
+        pull = cr + self.pull * a - q * cross * pull_s / wider
+        return _Later(np.maximum(precision, 0.0), pull, constant, self.square + rr)
 
 
 def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array) -> Array:

@@ -23,7 +23,7 @@ from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Learned, Pair, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.resampling import systematic_rows
+from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
 
 
@@ -93,7 +93,7 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
         state = _fitted(target, state, policy, *_resampled_twice(*walk, state.generator))
     state, (z, value, base) = _drawn(target, state, policy)
     weight = value - base
-    typical = weight[_resampled(weight, len(weight), state.generator)]
+    typical = weight[truncated_rows(weight, len(weight), state.generator)]
     acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
     state = state.knowing(acceptance=acceptance)
     middle, high = np.quantile(typical, [0.5, 0.999])
@@ -137,7 +137,7 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     done = policy.rounds - 1
     if learned.overlooked:  # few rounds of many draws: what is overlooked is rare
         done = max(done, policy.most_rounds - _FEW_ROUNDS)
-    hot = z[_resampled((_HOT - 1.0) * value, len(z), state.generator)]
+    hot = z[truncated_rows((_HOT - 1.0) * value, len(z), state.generator)]
     return _fitted(target, BurnIn(state.walkers, learned, state.generator, state.evaluations, done), policy, hot, z)
 
 
@@ -220,7 +220,7 @@ def _fitted(
 
 def _resampled_twice(z: Array, value: Array, base: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Draws of the warm density and of the density, from places whose log density of being there is `base`."""
-    hot, cold = (z[_resampled(power * value - base, len(z), rng)] for power in (_HOT, 1.0))
+    hot, cold = (z[truncated_rows(power * value - base, len(z), rng)] for power in (_HOT, 1.0))
     return hot, cold
 
 
@@ -229,7 +229,7 @@ def _placed(policy: Policy, log_weight: Array, rng: np.random.Generator) -> NDAr
     chosen = []
     for i in range(policy.ensembles):
         own = np.arange(i, len(log_weight), policy.ensembles)
-        chosen.append(own[_resampled(log_weight[own], policy.walkers, rng)])
+        chosen.append(own[truncated_rows(log_weight[own], policy.walkers, rng)])
     return np.concatenate(chosen)
 
 
@@ -237,13 +237,6 @@ def _walking(target: LogPosterior, policy: Policy) -> int:
     """Walkers in burn-in: few, for the same number of evaluations takes them further."""
     each = min(policy.walkers, max(policy.walkers // 4, 2 * len(target.problem.names) + 2))
     return each * policy.ensembles
-
-
-def _resampled(log_weight: Array, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """(n,) rows drawn by weight, systematically, in random order; no row counts for more than the root of all rows."""
-    weight = np.exp(log_weight - log_weight.max())
-    weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
-    return rng.permutation(systematic_rows(weight, n, rng))
 
 
 def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:
