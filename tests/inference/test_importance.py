@@ -1,11 +1,14 @@
 """Integrals of several densities from one pool, against normals whose integrals are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from wirebayes.inference import importance
 from wirebayes.inference.importance import Weighted, effective, expected, from_draws, sample, tail
+from wirebayes.inference.sampler import proposal
 from wirebayes.inference.sampler.mixture import Mixture
 
 D = 4
@@ -177,3 +180,158 @@ def test_effective_draws_and_tails() -> None:
     rng = np.random.default_rng(0)
     for k in (0.3, 0.9):
         assert tail(np.log(stats.genpareto.rvs(k, size=20_000, random_state=rng))) == pytest.approx(k, abs=0.1)
+
+
+def test_a_tail_that_is_nowhere_is_no_number_and_the_lighter_estimate_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert np.isnan(tail(np.full(5, -np.inf)))
+    asked: list[tuple[list[float], float]] = []
+    answers: dict[float, float] = {}
+
+    def psislw(values: np.ndarray, r_eff: float) -> tuple[None, float]:
+        asked.append((values.tolist(), r_eff))
+        return None, answers[r_eff]
+
+    monkeypatch.setattr(importance, "_statistics", SimpleNamespace(psislw=psislw))
+    for first, second, found in ((0.9, 0.4, 0.4), (0.4, 0.9, 0.4), (np.nan, 0.8, 0.8), (0.8, np.nan, 0.8)):
+        answers.update({1.0: first, 9.0: second})
+        assert tail(np.array([1.0, -np.inf, 3.0])) == found
+    assert asked[:2] == [([-1.0, -3.0], 1.0), ([-1.0, -3.0], 9.0)]
+
+
+def test_the_integral_is_the_mean_weight() -> None:
+    """Of each density, whatever the others are; a draw without density counts among the draws."""
+    weight = np.array([[1.0, 5.0], [2.0, 0.0], [6.0, 1.0]])
+    log_proposal = np.array([0.5, -1.0, 2.0])
+    with np.errstate(divide="ignore"):
+        one = Weighted(np.zeros((3, 1)), np.log(weight) + log_proposal[:, None], log_proposal, np.ones(2, bool))
+    assert np.exp(one.log_integral) == pytest.approx([3.0, 2.0])
+    assert np.exp(one.log_weight[[0, 2]]) == pytest.approx(weight[[0, 2]])
+
+
+def test_what_other_draws_promise_is_the_effective_number_of_draws_of_the_proposal() -> None:
+    """All draws over the mean of the normalised weight at draws of the density; never more than all."""
+    current = SimpleNamespace(log_density=lambda z: z[:, 0])
+    fresh = Weighted(np.zeros((1000, 1)), np.full((1000, 1), 2.0), np.zeros(1000), np.ones(1, bool))
+    over = np.array([[0.0], [1.0], [-2.0]])  # of the witnesses, in nats above the integral, which is e²
+    height = over[:, 0] + 2.0 + np.array([3.0, 4.0, 5.0])
+    witness = np.array([[3.0], [4.0], [5.0]])
+    assert expected(fresh, current, witness, height) == pytest.approx(1000.0 / np.exp(over).mean())  # type: ignore[arg-type]
+    assert expected(fresh, current, witness, height - 9.0) == 1000.0  # type: ignore[arg-type]
+
+
+def past(log_density: np.ndarray, log_proposals: np.ndarray, counts: tuple[int, ...]) -> importance._Past:
+    z = np.arange(len(log_density), dtype=float)[:, None]
+    return importance._Past(z, log_density, log_proposals, (start(0.0),) * len(counts), counts)
+
+
+def test_all_draws_so_far_are_weighed_against_the_mixture_they_came_from() -> None:
+    """Two places; the first is as often as 3 x 1 + 1 x 5 = 8, the second as 3 x 1 + 1 x 1 = 4: twice the weight."""
+    places = np.repeat([0.0, 1.0], 400)
+    density = np.where(places == 0.0, np.log(3.0), 0.0)[:, None]
+    of = np.log(np.stack([np.ones(800), np.where(places == 0.0, 5.0, 1.0)]))
+    known = importance._Past(places[:, None], density, of, (start(0.0),) * 2, (3, 1))
+    hot, cold = known.points(np.ones(1, bool), 1e9, np.random.default_rng(0))
+    assert len(hot) == len(cold) == 5000
+    assert cold.mean() == pytest.approx(1.0 / (1.0 + 3.0 * 0.5), abs=0.002)
+    assert hot.mean() == pytest.approx(1.0 / (1.0 + 3.0**0.4 * 0.5), abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("ess", "wanted", "second"),
+    [
+        (40.0, [True, True], 1.0 / 2.0),  # both are known well enough: the same share
+        (400.0, [True, True], 8.0 / 10.0),  # 200 and 50 effective draws: 2 and 8 shares
+        (2000.0, [True, True], 10.0 / 20.0),  # ten shares at most
+        (400.0, [False, True], 1.0),
+        (400.0, [True, False], 0.0),
+    ],
+)
+def test_a_density_that_is_known_worse_has_a_greater_share(ess: float, wanted: list[bool], second: float) -> None:
+    """Two densities that have no place in common, on 200 and on 50 of the draws, and a third that is nowhere."""
+    at = np.arange(250) < 200
+    with np.errstate(divide="ignore"):
+        density = np.log(np.column_stack([at * 7.0, ~at * 1.0, np.zeros(250)]))
+    _, cold = past(density, np.zeros((1, 250)), (250,)).points(np.array([*wanted, True]), ess, np.random.default_rng(0))
+    # a place of the second density has its share over 50, bounded by the root of all rows
+    assert (cold[:, 0] >= 200).mean() == pytest.approx(second, abs=0.002)
+
+
+def test_the_draws_of_one_more_proposal_are_known_to_all_of_them() -> None:
+    """Every point is weighed by every proposal, old points by the new one too."""
+    one, other = start(0.0), start(3.0)
+    rng = np.random.default_rng(0)
+    first, second = (importance._weighted(three, q, n, 1e9, rng) for q, n in ((one, 4), (other, 3)))
+    known = importance._Past(first.z, first.log_density, first.log_proposal[None], (one,), (4,)).joined(second, other)
+    z = np.vstack([first.z, second.z])
+    assert np.array_equal(known.z, z) and known.counts == (4, 3) and known.proposals == (one, other)
+    assert known.log_density == pytest.approx(three(z))
+    assert known.log_proposals == pytest.approx(np.stack([one.log_density(z), other.log_density(z)]))
+
+
+def test_a_proposal_is_learned_as_a_close_one_of_few_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what the start knows while nothing else is sure, from the mixtures before where there are some."""
+    asked: list[tuple[object, dict[str, object]]] = []
+    new = SimpleNamespace()
+
+    def fit(
+        hot: object, cold: object, begin: object, order: object, rng: object, shares: object, **more: object
+    ) -> object:
+        asked.append((shares, more))
+        if len(asked) == 3:
+            raise np.linalg.LinAlgError("no")
+        return new
+
+    monkeypatch.setattr(proposal, "fit", fit)
+    begin, z, rng = start(0.0), np.zeros((4, D)), np.random.default_rng(0)
+    before = proposal.Proposal(proposal.SHARES, None, begin, begin, begin, begin)  # type: ignore[arg-type]
+    assert importance._learned(z, z, begin, ORDER, rng, begin) is new
+    assert importance._learned(z, z, begin, ORDER, rng, before) is new
+    assert importance._learned(z, z, begin, ORDER, rng, before) is before  # points that span nothing
+    few = {"most": 8, "points": 5000}
+    assert asked[:2] == [
+        (proposal.ROUGH_SHARES, {**few, "before": None}),
+        (proposal.EXPLORING, {**few, "before": before}),
+    ]
+
+
+def test_climbs_begin_at_the_highest_draws_and_at_some_that_are_far_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In units of the widths, for coordinates have units of their own; the highest of those near the others too."""
+    rng = np.random.default_rng(0)
+    draws = np.column_stack([1e3 * rng.normal(size=5000), np.zeros(5000), np.full(5000, 4.0)])
+    draws[17, 1] = 1e-3  # far from the others, for this coordinate
+    near = np.array([[0.0, 5.0, 4.0], [0.0, 6.0, 4.0]])
+    begun: list[np.ndarray] = []
+    heights: list[np.ndarray] = []
+
+    def densities(z: np.ndarray) -> np.ndarray:
+        return np.column_stack([-z[:, 0], z[:, 1]])
+
+    def climb(density: object, z: np.ndarray, **known: object) -> None:
+        begun.append(z)
+        heights.append(density(z, np.arange(len(z))))  # type: ignore[operator]
+        assert known == {"iterations": 40, "tolerance": 1e-2}
+        raise InterruptedError
+
+    monkeypatch.setattr(importance, "climb", climb)
+    with pytest.raises(InterruptedError):
+        from_draws(densities, draws, np.arange(3), rng, 500.0, near)
+    (z,) = begun
+    assert len(z) == 2 + 6 and z[0, 0] == draws[:, 0].min() and z[1].tolist() == [0.0, 6.0, 4.0]
+    assert 1e-3 in z[2:, 1]
+    # the second climb is on the second density, all the others on the first
+    assert heights[0].tolist() == [-z[0, 0], 6.0, *(-z[2:, 0])]
+
+
+def test_modes_are_widened_and_rough_draws_and_those_near_the_others_are_handed_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given: list[tuple[object, ...]] = []
+    monkeypatch.setattr(importance, "sample", lambda *arguments: given.append(arguments))
+    draws = np.random.default_rng(0).normal(size=(200, D))
+    rng = np.random.default_rng(1)
+    from_draws(lambda z: normal(z, 0.0, 2.0, 0.0)[:, None], draws, ORDER, rng, 77.0)
+    _, begin, known, near, order, _, ess = given[0]
+    assert begin.centres == pytest.approx(np.zeros((1, D)), abs=0.05)  # type: ignore[attr-defined]
+    scale = begin.factors[0] @ begin.factors[0].T  # type: ignore[attr-defined]
+    assert scale == pytest.approx(1.7 * 4.0 * np.eye(D), rel=0.01, abs=0.01)
+    assert known is draws and near.shape == (0, D) and order is ORDER and ess == 77.0  # type: ignore[attr-defined]

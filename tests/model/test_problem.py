@@ -1,5 +1,8 @@
 """The likelihood of whole experiments against dense normals: rounding, and samples of one material at two lengths."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -7,8 +10,12 @@ from scipy import stats
 from tests.model.dense import columns, log_density, normal
 from tests.simulated import simulated_tests
 from wirebayes.effects import named
+from wirebayes.effects.event import GripSlip
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
-from wirebayes.model.problem import build
+from wirebayes.model.prior import Prior
+from wirebayes.model.problem import Likelihood, build, with_protocols, with_readings
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
 
@@ -58,3 +65,161 @@ def test_creep_grows_with_length_to_the_fitted_power(exponent):
             expected += log_density(r, covariance)
         found = problem.log_likelihood(at(problem, values | {"creep_length_exponent": exponent}))[0]
         assert found == pytest.approx(expected, rel=1e-9)
+
+
+def short(name: str = "a", material: str = "line", length_mm: float = 1000.0, **about: object) -> Experiment:
+    """Three holds of three readings, the second not recorded."""
+    times = ((0.0, 30.0, 60.0), (0.0, 50.0), (0.0, 20.0, 100.0))
+    bench = Bench(name, material, length_mm, displacements_mm=(1.0, 3.0, 2.0), times_s=times, unrecorded=frozenset({2}))
+    return replace(simulated_tests([bench], Truth(WIRE), seed=5)[0], **about)  # type: ignore[arg-type]
+
+
+def test_a_parameter_is_that_of_the_sample_or_of_the_material_or_of_all() -> None:
+    """The most specific name counts, whether it is sampled or fixed; one that is nowhere is an error."""
+    problem = build([short()])
+    sample = problem.samples[0]
+    names = ("k1", "k1[line]", "k1[a]", "k1[b]")
+    rest = dict.fromkeys(name for name in problem.names if name != "k1")
+    for n in (1, 2, 3):  # none of the others hides the last
+        free = {name: stats.norm() for name in (*names[:n], "k1[b]", *rest)}
+        theta = np.arange(2.0 * len(free)).reshape(2, -1)
+        own = replace(problem, prior=Prior(free, {}, frozenset())).parameters(theta, sample)
+        assert own["k1"].tolist() == theta[:, n - 1].tolist() and set(own) == {*rest, "k1"}
+    free = {name: stats.norm() for name in ("k1", *rest)}
+    known = replace(problem, prior=Prior(free, {"k1[a]": 7.0}, frozenset()))
+    assert known.parameters(np.zeros((3, len(free))), sample)["k1"].tolist() == [7.0] * 3
+    lacking = replace(problem, prior=Prior(dict.fromkeys(rest, stats.norm()), {}, frozenset()))
+    with pytest.raises(KeyError, match="k1"):
+        lacking.parameters(np.zeros((3, len(rest))), sample)
+
+
+@pytest.mark.parametrize("likelihood", ["chain", "hold"])
+def test_parameters_are_named_by_what_shares_them(likelihood: Likelihood) -> None:
+    """Of one test plainly; of several by sample and by material, where there are several; amplitudes by their scope."""
+    own = ["preload", "sensor_sd", "setting_sd"] if likelihood == "chain" else ["sensor_sd"]
+    wire, effects = ["k1", "B", "U", "k2", "N"], (named("memory"), named("sensor_drift"))
+    assert build([short()], likelihood=likelihood).names == (*wire, *own)
+    two = build([short("a"), short("b")], effects, likelihood=likelihood)
+    assert two.names == (*wire, "memory.omega", "sensor_drift.a", *(f"{n}[{s}]" for s in "ab" for n in own))
+    lots = build([short("a"), short("b", "other"), short("c", length_mm=500.0)], effects, likelihood=likelihood)
+    shared = [f"{n}[{m}]" for m in ("line", "other") for n in (*wire, "memory.omega")]
+    assert set(lots.names) == {*shared, "sensor_drift.a", *(f"{n}[{s}]" for s in "abc" for n in own)}
+    assert lots.prior.fixed == {"creep_length_exponent[line]": 1.0}  # the two of one material differ in length
+    assert [s.name for s in lots.samples] == ["a", "c", "b"]
+
+
+def test_what_is_positive_is_sampled_by_its_logarithm() -> None:
+    """Lengths of time among the amplitudes too; not what a prior of the file lets be negative."""
+    drift = named("second_relaxation")
+    assert build([short()], [drift]).prior.logarithmic == {
+        "k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd", "second_relaxation.T2"
+    }  # fmt: skip
+    below = {"distribution": "normal", "mean": 0.5, "sd": 0.1}
+    zero = {"distribution": "uniform", "low": 0.0, "high": 1.0}
+    problem = build([short("a", priors={"U": below, "N": zero, "preload": zero}), short("b")])
+    assert problem.prior.logarithmic == {
+        "k1", "B", "k2", "N", *(f"{name}[{s}]" for s in "ab" for name in ("sensor_sd", "setting_sd"))
+    }  # fmt: skip
+
+
+def test_priors_of_the_file_replace_those_of_the_most_specific_name() -> None:
+    def prior(value: float) -> dict[str, float]:
+        return {"fixed": value}
+
+    tables = {"k1": prior(5.0), "preload": prior(0.2), "creep_length_exponent": prior(0.5), "ageing.a": prior(0.0)}
+    problem = build([short("a", priors=tables), short("b", "other"), short("c", length_mm=500.0)])
+    assert problem.prior.fixed == {"k1[line]": 5.0, "preload[a]": 0.2, "creep_length_exponent[line]": 0.5}
+    # one test has no other name for its own; of one length no exponent is needed, and a table for it is no error
+    assert build([short("a", priors=tables)]).prior.fixed == {"k1": 5.0, "preload": 0.2}
+
+
+@pytest.mark.parametrize(("lines", "where"), [({}, "e.toml: prior.k3"), ({"k3": 7}, "e.toml, line 7: prior.k3")])
+def test_a_prior_of_no_parameter_is_refused_with_its_place(lines: dict[str, int], where: str) -> None:
+    wrong = short(priors={"k3": {"fixed": 1.0}}, prior_lines=lines, source=Path("e.toml"))
+    with pytest.raises(InputError) as error:
+        build([wrong])
+    assert str(error.value).startswith(f"{where}: found no such parameter")
+    assert str(error.value).endswith(
+        "expected one of B, N, U, creep_length_exponent, k1, k2, preload, sensor_sd, setting_sd, or effect.parameter"
+    )
+
+
+def test_data_without_noise_have_a_floor() -> None:
+    """The stated resolution, but no less than a hundred-thousandth of the largest tension in size."""
+    for stated in (0.0, 1e-6, 0.5):
+        e = short(resolution_N=stated)
+        holds = tuple(replace(h, tension_N=-h.tension_N) for h in e.holds)
+        largest = max(h.tension_N.max() for h in e.holds if h.recorded)
+        for test in (e, replace(e, holds=holds)):
+            assert build([test]).samples[0].resolution_N == max(stated, 1e-5 * largest)
+
+
+def test_samples_of_one_material_refer_to_one_length_and_one_tension() -> None:
+    one, long, other = short("a"), short("b", length_mm=2000.0), short("c", "other", length_mm=4000.0)
+    tensions = {e.name: e.tension()[e.protocol().mask] for e in (one, long, other)}
+
+    def mean(*names: str) -> float:
+        values = np.concatenate([tensions[name] for name in names])
+        return float(np.exp(np.log(values[values > 0]).mean()))
+
+    a, b, c = build([one, long, other]).samples
+    assert a.model.tension_ref_N == b.model.tension_ref_N == pytest.approx(mean("a", "b"))
+    assert c.model.tension_ref_N == pytest.approx(mean("c"))
+    assert a.model.length_ref_mm == b.model.length_ref_mm == pytest.approx(np.sqrt(2.0) * 1000.0)
+    assert c.model.length_ref_mm == 0.0 == build([one]).samples[0].model.length_ref_mm  # its own
+    assert build([one, short("d")]).samples[0].model.length_ref_mm == 1000.0  # to the last bit
+    priors = build([one, long, other]).prior.distributions
+    for name, length in (("B[line]", np.sqrt(2.0) * 1000.0), ("B[other]", 4000.0)):
+        assert priors[name].median() == pytest.approx(3.7e-4 * length)
+
+
+def test_an_event_acts_in_its_own_test_alone() -> None:
+    here, anywhere = GripSlip(hold=3, test="b"), GripSlip(hold=3)
+    problem = build([short("a"), short("b")], [here, anywhere, named("memory")])
+    keys = [[e.key for e in s.model.effects] for s in problem.samples]
+    assert keys == [["grip_slip@3", "memory"], ["grip_slip@b:3", "grip_slip@3", "memory"]]
+
+
+def test_a_typical_hold_lasts_the_median_of_the_recorded_ones() -> None:
+    problem = build([short()])
+    assert problem.samples[0].typical_hold_s == 80.0  # of 60 and 100; the unrecorded one lasts 50
+    still = replace(problem.samples[0].protocol, duration_s=np.array([0.0, 50.0, 0.0]))
+    assert with_protocols(problem, [still], [problem.samples[0].readings]).samples[0].typical_hold_s == 1.0
+
+
+@pytest.mark.parametrize("likelihood", ["chain", "hold"])
+def test_every_hold_s_part_and_all_readings_but_its_own(likelihood: Likelihood) -> None:
+    """Of two samples, against problems that never saw the hold; what is left out of one stays in the other."""
+    problem = build([short("a"), short("b", length_mm=1500.0)], likelihood=likelihood)
+    values = WIRE | {"preload[b]": 0.1}
+    theta = np.vstack([at(problem, values), at(problem, values | {"k1": 800.0})])
+    whole, without = problem.without_each_hold(theta)
+    assert whole == pytest.approx(problem.log_likelihood(theta), rel=1e-12)
+    left = problem.leave_one_hold_out(theta)
+    for s, sample in enumerate(problem.samples):
+        for j in range(3):
+            mask = sample.protocol.mask.copy()
+            mask[j] = False
+            protocols = [x.protocol for x in problem.samples]
+            protocols[s] = replace(sample.protocol, mask=mask)
+            blind = with_protocols(problem, protocols, [x.readings for x in problem.samples])
+            assert without[s][j] == pytest.approx(blind.log_likelihood(theta), rel=1e-9)
+            assert left[s][j] == pytest.approx(whole - without[s][j], abs=1e-9)
+        assert left[s].shape == (3, 2) and (left[s][1] == 0.0).all()  # it was not recorded
+
+
+def test_replicates_take_the_place_of_the_readings_row_by_row() -> None:
+    problem = build([short("a"), short("b")])
+    theta = np.vstack([at(problem, WIRE), at(problem, WIRE | {"B": 0.3})])
+    rng = np.random.default_rng(0)
+    drawn = [s.readings + 0.01 * rng.normal(size=(*s.readings.shape[:2], 2)) for s in problem.samples]
+    found = problem.log_likelihood(theta, drawn)
+    for i in range(2):
+        own = with_readings(problem, [y[..., i : i + 1] for y in drawn])
+        assert found[i] == pytest.approx(own.log_likelihood(theta[i : i + 1])[0], rel=1e-12)
+        parts = own.hold_log_likelihood(theta[i : i + 1])
+        assert found[i] == pytest.approx(sum(part.sum() for part in parts), rel=1e-12)
+    bad = theta.copy()
+    bad[0, 0] = np.nan
+    values = problem.log_likelihood(bad)
+    assert values[0] == -np.inf and np.isfinite(values[1])

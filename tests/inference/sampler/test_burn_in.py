@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.statistical.targets import gaussian
+from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
@@ -192,3 +193,176 @@ def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:
     for shares in (proposal.SHARES, proposal.EXPLORING, proposal.ROUGH_SHARES):
         assert sum(shares) == pytest.approx(1.0)
     assert proposal.SHARES[0] > proposal.EXPLORING[0] > proposal.ROUGH_SHARES[0]
+
+
+def test_a_walk_looks_further_every_time() -> None:
+    """With powers nearer to one and twice as many steps; half of the way is forgotten, densities are the target's."""
+    target, policy = gaussian(D), Policy(ensembles=2, walkers=16, round_draws=256)
+    walkers = burn_in._walking(target, policy)  # type: ignore[arg-type]
+    z = target.mean + 0.1 * np.random.default_rng(0).normal(size=(walkers, D))
+    begin = Walkers(z, target(z), np.random.RandomState(1).get_state())
+    state = replace(burning(), walkers=begin)
+    for walks, (power, more) in enumerate([(0.5, 1), (0.6, 2), (0.7, 4), (0.8, 8), (0.8, 8)]):
+        steps = 256 // walkers * more
+        before, spent = state.evaluations, target.evaluations
+        state, (places, value, walked) = burn_in._walked(target, state, policy)  # type: ignore[arg-type]
+        assert state.learned.walks == walks + 1 and state.walk is not None
+        assert all(kept is given for kept, given in zip(state.walk, (places, value, walked), strict=True))
+        assert len(places) == len(value) == (steps - steps // 2) * walkers
+        assert state.evaluations - before == target.evaluations - spent > 0
+        assert np.array_equal(state.walkers.positions, places[-walkers:])
+        assert value == pytest.approx(target(places)) and walked == pytest.approx(power * target(places))
+
+
+def test_a_walk_in_burn_in_has_small_pools_of_one_ensemble(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[object, ...]] = []
+    true = burn_in.move_of
+
+    def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> object:
+        asked.append((ensembles, steps, frozen))
+        return true(learned, ensembles, steps, frozen=frozen)
+
+    monkeypatch.setattr(burn_in, "move_of", move_of)
+    target, policy = gaussian(D), Policy(ensembles=2, walkers=16, round_draws=256)
+    z = target.mean + 0.1 * np.random.default_rng(0).normal(size=(32, D))
+    state = replace(burning(), walkers=Walkers(z, target(z), np.random.RandomState(1).get_state()))
+    burn_in._walked(target, state, policy)  # type: ignore[arg-type]
+    burn_in._frozen(target, state.knowing(acceptance=1.0), policy, (z, target(z), target(z)), 5)  # type: ignore[arg-type]
+    assert asked == [(1, 256 // burn_in._walking(target, policy), False), (2, 5, True)]  # type: ignore[arg-type]
+
+
+class Watched:
+    """What `burn_in.step` does with a round whose log weights are given, instead of doing it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, weight: np.ndarray) -> None:
+        self.did: list[object] = []
+        z = np.arange(len(weight), dtype=float)[:, None]
+        walk = np.full((4, 1), -1.0), np.zeros(4), np.zeros(4)
+
+        def fitted(
+            target: object, state: BurnIn, policy: Policy, hot: np.ndarray, cold: np.ndarray, **more: int
+        ) -> BurnIn:
+            self.did.append(("learned from the walk" if (cold < 0).all() else "learned", more))
+            return state
+
+        def frozen(target: object, state: BurnIn, policy: Policy, drawn: object, steps: int) -> int:
+            return steps
+
+        def walked(target: object, state: BurnIn, policy: Policy) -> tuple[BurnIn, object]:
+            self.did.append("walked")
+            return state, walk
+
+        monkeypatch.setattr(burn_in, "_drawn", lambda target, state, policy: (state, (z, weight, np.zeros(len(z)))))
+        monkeypatch.setattr(burn_in, "_walked", walked)
+        monkeypatch.setattr(burn_in, "_fitted", fitted)
+        monkeypatch.setattr(burn_in, "_frozen", frozen)
+
+
+def tenth(gap: float) -> np.ndarray:
+    """Log weights of which a tenth lies higher."""
+    return np.where(np.arange(5000) < 500, gap, 0.0)
+
+
+@pytest.mark.parametrize(("acceptance", "walks"), [(0.04, True), (0.06, False)])
+def test_a_walk_teaches_while_hardly_a_draw_would_be_accepted(
+    acceptance: float, walks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watched = Watched(monkeypatch, tenth(1.0))
+    state = burn_in.step(None, burning().knowing(acceptance=acceptance), Policy(rounds=5))  # type: ignore[arg-type]
+    assert isinstance(state, BurnIn) and state.round == 1 and state.learned.acceptance > 0.5
+    first = ["walked", ("learned from the walk", {})] if walks else []
+    assert watched.did == [*first, ("learned", {"points": 5000})]
+
+
+@pytest.mark.parametrize(
+    ("gap", "round_", "steps"),
+    [
+        (np.log(1.01), 2, 1),  # the last of three rounds, and the proposal fits
+        (np.log(4.3), 2, 4),  # a tail of e^1.46, and so many steps to find its share
+        (np.log(4.6), 2, None),  # a tail of e^1.53
+        (np.log(1.01), 1, None),  # two rounds are not enough
+        (np.log(4.6), 8, 4),  # the last of all rounds, whatever is left out
+        (np.log(8.2), 8, 8),
+        (np.log(8000.0), 8, 1),  # nearly all of the posterior is there: its median too
+    ],
+)
+def test_after_the_last_round_walkers_have_the_steps_that_great_weights_take(
+    gap: float, round_: int, steps: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watched = Watched(monkeypatch, tenth(gap))
+    state = replace(burning(), round=round_)
+    found = burn_in.step(None, state, Policy(rounds=3, most_rounds=9, tail=1.5))  # type: ignore[arg-type]
+    assert watched.did == [("learned", {"points": 5000 if steps is None else 12000})]
+    assert isinstance(found, BurnIn) if steps is None else found == steps
+
+
+@pytest.mark.parametrize(("share", "ends"), [(0.20, False), (0.30, True)])
+def test_a_quarter_must_be_accepted(share: float, ends: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of draws of which so many are worth anything, and those the same, so many are accepted."""
+    weight = np.where(np.arange(5000) < share * 5000, 0.0, -200.0)
+    Watched(monkeypatch, weight)
+    found = burn_in.step(None, burning(round=7), Policy(rounds=3, most_rounds=9))  # type: ignore[arg-type]
+    assert isinstance(found, BurnIn) is not ends
+
+
+def test_a_proposal_that_is_hardly_ever_accepted_does_not_teach(monkeypatch: pytest.MonkeyPatch) -> None:
+    for share, learned in ((0.04, False), (0.06, True)):
+        watched = Watched(monkeypatch, np.where(np.arange(5000) < share * 5000, 0.0, -200.0))
+        burn_in.step(None, burning(), Policy())  # type: ignore[arg-type]
+        assert bool(watched.did) is learned
+
+
+def test_the_proposal_is_fitted_to_this_round_and_the_one_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With as many components as there are modes, but no more than 24 and no fewer than the policy's."""
+    asked: list[dict[str, object]] = []
+    new = object()
+
+    def fit(hot: np.ndarray, cold: np.ndarray, *given: object, **more: object) -> object:
+        asked.append({"hot": hot.tolist(), "cold": cold.tolist(), "given": given, **more})
+        if len(asked) == 4:
+            raise np.linalg.LinAlgError("points do not span their space")
+        return new
+
+    monkeypatch.setattr(burn_in.proposal, "fit", fit)
+    target, rows = gaussian(1), [np.full((1, 1), float(i)) for i in range(6)]
+    state = burning()
+    for modes, (hot, cold) in zip((7, 2, 99), zip(rows[::2], rows[1::2], strict=True), strict=True):
+        state = burn_in._fitted(target, state.knowing(modes=modes), Policy(components=6), hot, cold)  # type: ignore[arg-type]
+        assert state.learned.proposal is new and state.seen == (hot, cold)
+    assert [a["hot"] for a in asked] == [[[0.0]], [[0.0], [2.0]], [[2.0], [4.0]]]
+    assert [a["cold"] for a in asked] == [[[1.0]], [[1.0], [3.0]], [[3.0], [5.0]]]
+    assert [(a["most"], a["points"], a["before"]) for a in asked] == [
+        (7, 12000, None),
+        (6, 12000, None),
+        (24, 12000, None),
+    ]
+    assert all(a["given"][-1] == proposal.EXPLORING for a in asked)  # type: ignore[index]
+    failed = burn_in._fitted(target, state.knowing(proposal=NORMAL), Policy(), *rows[:2])  # type: ignore[arg-type]
+    assert failed.learned.proposal is NORMAL and failed.seen == (rows[0], rows[1])
+
+
+def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkeypatch: pytest.MonkeyPatch) -> None:
+    target = gaussian(D)
+    taught: list[tuple[object, ...]] = []
+
+    def fit(hot: np.ndarray, cold: np.ndarray, start: Mixture, *given: object, **more: object) -> object:
+        taught.append((hot, cold, given[2]))
+        return "proposal"
+
+    monkeypatch.setattr(burn_in.proposal, "fit", fit)
+    evidence = np.array([0.0, np.log(3.0)])
+    curvature = np.stack([np.eye(D), 0.5 * np.eye(D)])
+    height = evidence + 0.5 * np.linalg.slogdet(curvature)[1]
+    known = Optimum(np.stack([target.mean, target.mean + 1.0]), height, curvature, np.ones(2, bool))
+    rough = target.mean + np.zeros((5, D))
+    policy = Policy(ensembles=2, walkers=40)
+    plain, learned = (burn_in.init(target, 1, policy, known, None, points) for points in (None, rough))  # type: ignore[arg-type]
+    start = plain.learned.start
+    assert start.weights == pytest.approx([0.25, 0.75]) and np.array_equal(start.centres, known.z)
+    scale = start.factors @ np.swapaxes(start.factors, 1, 2)
+    assert scale[1] == pytest.approx(2.0 * scale[0]) and scale[0] == pytest.approx(1.7 * np.eye(D))
+    assert plain.learned.proposal is start and plain.learned.acceptance == 0.0 and plain.learned.modes == 2
+    assert plain.learned.witness is None and plain.evaluations == target.evaluations / 2 > 0
+    assert len(plain.walkers.positions) == 2 * 10 and plain.round == 0  # a quarter of the walkers
+    assert learned.learned.proposal == "proposal" and learned.learned.acceptance == 1.0 and learned.seen is None
+    assert taught == [(rough, rough, proposal.ROUGH_SHARES)]

@@ -135,3 +135,72 @@ def test_without_straightening_some_steps_lead_from_mode_to_mode():
     nearest = np.clip(np.round(proposed / 100.0), 0, 1) * 100.0
     arrived = (np.abs(proposed - nearest) < 5.0).all(axis=1) & (np.abs(proposed - x) > 50.0).all(axis=1)
     assert arrived.mean() == pytest.approx(0.05, abs=0.01)
+
+
+class Unasked:
+    """A proposal that nobody may draw from."""
+
+    def rvs(self, n, random):
+        raise AssertionError("drawn from")
+
+
+def test_steps_too_few_for_a_pool_are_those_of_the_other_move():
+    """One step leaves no place for draws; so do steps when pools may have one only."""
+    for steps, most in ((1, 64), (5, 1)):
+        move = PoolMove(Unasked(), Stay(), steps, most)
+        sampler = emcee.EnsembleSampler(6, 1, density, moves=move, vectorize=True)
+        start = np.linspace(-1.0, 1.0, 6)[:, None]
+        sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+        assert np.array_equal(sampler.get_chain(), np.tile(start, (steps, 1, 1))) and move.steps == 0
+
+
+@pytest.mark.parametrize(
+    ("steps", "most", "sizes"), [(10, 4, [4, 3, 3]), (8, 4, [4, 4]), (3, 64, [3]), (9, 2, [2, 2, 2, 2, 1])]
+)
+def test_steps_are_cut_into_pools_of_nearly_one_size_and_none_is_larger(steps, most, sizes, monkeypatch):
+    asked = []
+
+    def pooled(self, model, state, k, true=PoolMove._pooled):
+        asked.append(k + 1)
+        return true(self, model, state, k)
+
+    monkeypatch.setattr(PoolMove, "_pooled", pooled)
+    walked(6, steps, most)
+    assert asked == [size for size in sizes if size > 1]
+
+
+def test_evolution_steps_are_differences_of_two_others_of_the_same_ensemble_times_a_known_length():
+    """Ensembles of three walkers in each half, on a line; lengths 2.38 / sqrt(2) and, in a fifth of the steps, one."""
+    others = np.array([0.0, 1.0, 10.0, 100.0, 300.0, 1000.0])[:, None]
+    x = np.repeat([7.0, -5.0], 3)[:, None]
+    random, seen = np.random.RandomState(0), [[], []]
+    for _ in range(2000):
+        y, log_factor = EvolutionMove(2).get_proposal(x, [others], random)
+        assert np.array_equal(log_factor, np.zeros(6))
+        for i in range(2):
+            seen[i].append((y - x)[3 * i : 3 * i + 3, 0])
+    long = 2.38 / np.sqrt(2.0)
+    for i, own in enumerate((others[:3, 0], others[3:, 0])):
+        gaps = np.array([a - b for a in own for b in own if a != b])
+        found = np.concatenate(seen[i])
+        shares = [np.isclose(found, length * gap).mean() for length in (long, 1.0) for gap in gaps]
+        assert shares == pytest.approx([0.8 / 6] * 6 + [0.2 / 6] * 6, abs=0.02)
+
+
+def test_straightened_steps_pay_for_the_volume_that_the_map_changes():
+    """Coordinates that are exponentials of straight ones: half of the steps short, none of them a whole difference."""
+
+    class Exponential:
+        def forward(self, x):
+            return np.log(x), -np.log(x).sum(axis=1)
+
+        def inverse(self, u):
+            return np.exp(u)
+
+    others, random = np.exp([[0.0], [1.0]]), np.random.RandomState(1)
+    x = np.full((4000, 1), 3.0)
+    y, log_factor = EvolutionMove(1, Exponential()).get_proposal(x, [others], random)
+    assert log_factor == pytest.approx(np.log(y / x)[:, 0])
+    moves, long = np.abs(np.log(y / x)), 2.38 / np.sqrt(2.0)
+    shares = [np.isclose(moves, length).mean() for length in (long, 0.5 * long)]
+    assert shares == pytest.approx([0.5, 0.5], abs=0.04) and sum(shares) == 1.0

@@ -185,7 +185,16 @@ def test_draws_count_as_burn_in_once_or_for_what_was_overlooked(
     assert (found == "anew") is starts_anew
 
 
-def test_a_block_is_kept_with_its_densities_and_what_it_cost() -> None:
+def test_a_block_is_kept_with_its_densities_and_what_it_cost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By large pools, for the proposal is frozen."""
+    asked: list[tuple[object, ...]] = []
+    true = kept.move_of
+
+    def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> object:
+        asked.append((ensembles, steps, frozen))
+        return true(learned, ensembles, steps, frozen=frozen)
+
+    monkeypatch.setattr(kept, "move_of", move_of)
     target = gaussian(D)
     policy = Policy(ensembles=ENSEMBLES, walkers=WALKERS, block=16)
     rng = np.random.RandomState(0)
@@ -203,6 +212,7 @@ def test_a_block_is_kept_with_its_densities_and_what_it_cost() -> None:
         assert found.accepted == (np.diff(whole, axis=0) != 0).any(axis=2).sum()
         assert state.evaluations == 1000 + found.evaluations
         assert target.evaluations - before >= 16 * ENSEMBLES * WALKERS
+    assert asked == [(ENSEMBLES, 16, True)] * 2
 
 
 def test_walkers_belong_to_the_ensemble_in_whose_row_they_stand() -> None:
@@ -234,3 +244,47 @@ def test_progress_counts_burn_in_as_a_fifth_and_then_effective_draws() -> None:
     kept_draws = [ensemble._share(after(100, ess), policy) for ess in (1.0, 500.0, 1000.0, 4000.0)]
     assert kept_draws == pytest.approx([0.2008, 0.6, 1.0, 1.0])
     assert ensemble._share(replace(after(100, 1.0), diagnostics=None), policy) == pytest.approx(0.2)
+
+
+def test_the_last_look_decides_which_draws_are_weighed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """About 16,384 of them, evenly; the places and densities that were kept, and no others."""
+    given: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def overlooked(learned: Learned, z: np.ndarray, value: np.ndarray) -> float:
+        given.append((z, value))
+        return 0.0
+
+    monkeypatch.setattr(burn_in, "overlooked", overlooked)
+    learned = Learned(None, None, 1, trusted=True)  # type: ignore[arg-type]
+    for steps, every in ((127, 1), (256, 3)):
+        z = draws(steps)
+        blocks = z[:50], z[50:]
+        state = Sampling(Walkers(z[-1], np.zeros(len(z[-1])), None), learned, None, 0)  # type: ignore[arg-type]
+        state = replace(state, kept=Kept(blocks, tuple(block.sum(axis=2) for block in blocks)))
+        found = stop_rule.apply(gaussian(D), state, Policy(**EASY))  # type: ignore[arg-type]
+        assert found.converged and np.array_equal(given[-1][0], z.reshape(-1, D)[::every])
+        assert np.array_equal(given[-1][1], given[-1][0].sum(axis=1))
+
+
+def test_effective_draws_are_all_draws_over_their_memory_and_no_more_than_all() -> None:
+    z = by_ensemble(draws(200, 0.5))
+    found = stop_rule._diagnosed(gaussian(D), z)  # type: ignore[arg-type]
+    memory = autocorrelation_steps(z)
+    assert found.autocorrelation == pytest.approx(memory) and (memory > 1.5).all()
+    assert found.ess == pytest.approx(200 * ENSEMBLES * WALKERS / memory)
+    zigzag = z.copy()
+    zigzag[:, ::2] = -zigzag[:, 1::2]  # a memory below one step is rounded up
+    assert stop_rule._diagnosed(gaussian(D), zigzag).ess == pytest.approx(200 * ENSEMBLES * WALKERS)  # type: ignore[arg-type]
+
+
+def test_autocorrelation_and_r_hat_are_ratios_of_variances_with_their_divisors() -> None:
+    """By definition, on few small numbers: means of walkers over one less than all, draws over all."""
+    values = np.random.default_rng(0).normal(size=(3, 4, 2, 1))
+    means = [values[e, :, w, 0].mean() for e in range(3) for w in range(2)]
+    expected = 4 * np.var(means, ddof=1) / np.var(values)
+    assert autocorrelation_steps(values) == pytest.approx([expected])
+    own = values.mean(axis=1)[..., 0]  # (ensembles, walkers)
+    between = np.var(own.mean(axis=1), ddof=1)
+    within = np.mean([np.var(own[e], ddof=1) + np.mean([np.var(values[e, :, w, 0], ddof=1) for w in range(2)])
+                      for e in range(3)])  # fmt: skip
+    assert nested_r_hat(values) == pytest.approx([np.sqrt(1.0 + between / within)])
