@@ -1,6 +1,7 @@
 """Scores of held-out holds against closed forms, and bands against readings they must and must not cover."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.held_out import _scores, held_out, pit_band, train_counts, two_thirds
+from wirebayes.prediction.held_out import Scores, _log_mean, _scores, held_out, pit_band, train_counts, two_thirds
 from wirebayes.wire.staircase import simulate
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
@@ -125,3 +126,89 @@ def test_training_counts() -> None:
     assert train_counts(8) == [5]
     assert two_thirds(8) == 5
     assert train_counts(3) == []
+
+
+def test_scores_are_moments_quantiles_and_ranks_of_the_draws_of_each_reading() -> None:
+    """A draw that equals the reading does not lie below it; the spread has the divisor of a sample."""
+    draws = np.zeros((2, 2, 4))
+    draws[0, 1], draws[1, 0] = [1.0, 2.0, 2.0, 5.0], [4.0, 8.0, 6.0, 10.0]
+    rows = np.array([[False, True], [True, False]])
+    tension, times = np.array([[0.0, 2.0], [9.0, 0.0]]), np.array([[0.0, 30.0], [60.0, 90.0]])
+    found = _scores(draws, rows, np.array([7, 8]), times, tension, np.array([1.0, 2.0]), 2.5)
+    assert found.hold.tolist() == [7, 8] and found.time_s.tolist() == [30.0, 60.0]
+    assert found.observed_N.tolist() == [2.0, 9.0] and found.mean_N.tolist() == [2.5, 7.0]
+    assert found.sd_N == pytest.approx([np.sqrt(3.0), np.sqrt(20.0 / 3.0)])
+    assert found.pit.tolist() == [0.25, 0.75]
+    assert found.quantiles_N[3].tolist() == [2.0, 7.0] and found.quantiles_N.shape == (7, 2)
+    assert found.rmse_N == pytest.approx(np.sqrt((0.5**2 + 2.0**2) / 2.0))
+    assert found.residual_sd == pytest.approx([-0.5 / np.sqrt(3.0), 2.0 / np.sqrt(20.0 / 3.0)])
+    assert found.elpd.tolist() == [1.0, 2.0] and found.elpd_together == 2.5
+
+
+def test_a_reading_at_the_end_of_an_interval_lies_inside() -> None:
+    ends = np.array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
+    nothing = np.zeros(0)
+    for reading, inside in ((1.0, 1.0), (-1.0, 1.0), (1.5, 0.0), (-1.5, 0.0)):
+        at = np.array([reading])
+        found = Scores(np.ones(1, int), at, at, at, at, ends[:, None], at, nothing, 0.0, nothing, 0.0)
+        assert found.coverage() == {0.5: inside, 0.9: 1.0, 0.99: 1.0}
+
+
+@pytest.mark.parametrize("probability", [None, 0.8])
+def test_the_band_by_counting(probability: float | None) -> None:
+    """Every course compared with all others at each level, one by one."""
+    rng = np.random.default_rng(3)
+    draws, observed = rng.normal(size=(4, 1)) + rng.normal(size=(4, 30)), np.array([0.0, 2.0, -1.0, 0.5])
+    band, p = pit_band(draws, observed) if probability is None else pit_band(draws, observed, probability)
+    levels = [i / 100 for i in range(101)]
+
+    def course(ranks: list[float]) -> list[float]:
+        return [sum(rank <= level for rank in ranks) / 4 for level in levels]
+
+    courses = [course([(sum(row < row[i]) + 0.5) / 30 for row in draws]) for i in range(30)]
+    own = course([sum(row < y) / 30 for row, y in zip(draws, observed, strict=True)])
+
+    def extreme(one: list[float]) -> float:
+        below = min(sum(other[k] <= one[k] for other in courses) for k in range(101))
+        above = min(sum(other[k] >= one[k] for other in courses) for k in range(101))
+        return 2.0 * min(below, above) / 30
+
+    each = [extreme(one) for one in courses]
+    assert p == pytest.approx(np.mean([value <= extreme(own) for value in each]))
+    pointwise = np.quantile(each, 1.0 - (probability or 0.95))
+    ends = np.quantile(courses, [pointwise / 2.0, 1.0 - pointwise / 2.0], axis=0)
+    assert band == pytest.approx(np.vstack([levels, ends]))
+
+
+def test_hold_by_hold_later_readings_are_scored_given_the_first() -> None:
+    """At two points in turn: the logarithm of the mean of two densities, for each hold to come."""
+    experiment = experiments()[1]
+    problem = build([experiment.train(8)], likelihood="hold")
+    at = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "sensor_sd": 0.006}
+    theta = np.array([[at[name] for name in problem.names]] * 2)
+    theta[1, 0] = 650.0
+    stub = SimpleNamespace(problem=problem, flat=np.tile(theta, (600, 1)))
+    result = held_out(stub, experiment, np.random.default_rng(0))  # type: ignore[arg-type]
+    each = build([experiment], likelihood="hold").hold_log_likelihood(theta)[0][8:]
+    assert result.given.elpd == pytest.approx(np.log(np.exp(each).mean(axis=1)), rel=1e-9)
+    assert result.experiment == "roc-line-1.71m" and result.trained == 8 and np.isnan(result.given.elpd_together)
+    assert len(result.given.observed_N) == 16 and (result.given.time_s > 0).all()
+
+
+def test_where_the_model_cannot_be_computed_a_draw_has_no_density() -> None:
+    log_p = np.log([[1.0, 2.0, 3.0], [1.0, 1.0, 1.0]])
+    log_p[0, 1], log_p[1, 2] = np.nan, np.inf
+    assert np.exp(_log_mean(log_p)) == pytest.approx([4.0 / 3.0, 2.0 / 3.0])
+
+
+def test_with_nothing_to_come_there_is_nothing_to_predict() -> None:
+    experiment = experiments()[1]
+    stub = SimpleNamespace(problem=build([experiment]), flat=np.zeros((3, 8)))
+    with pytest.raises(ValueError, match=r"roc-line-1\.71m: all 12 holds were trained on"):
+        held_out(stub, experiment, np.random.default_rng(0))  # type: ignore[arg-type]
+
+
+def test_training_counts_leave_two_holds_to_predict_and_are_rounded_to_nearest() -> None:
+    assert [two_thirds(n) for n in (3, 4, 5, 7, 10)] == [2, 3, 3, 5, 7]
+    counts = {n: train_counts(n) for n in (4, 5, 6, 7, 9, 10, 13)}
+    assert counts == {4: [], 5: [3], 6: [4], 7: [5], 9: [5, 6], 10: [5, 7, 8], 13: [5, 8, 9]}

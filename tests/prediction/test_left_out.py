@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+import arviz_base
+import arviz_stats
 import numpy as np
 import pytest
 from scipy import stats
@@ -10,7 +12,16 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
 from wirebayes.prediction import leave_one_hold_out as module
-from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error, thinned, without_hold
+from wirebayes.prediction.leave_one_hold_out import (
+    REFIT,
+    LeftOut,
+    difference,
+    log_mean,
+    smoothed_leave_one_hold_out,
+    standard_error,
+    thinned,
+    without_hold,
+)
 
 
 @pytest.mark.parametrize(("tail", "sampled"), [(0.49, False), (0.51, True), (np.nan, True)])
@@ -90,3 +101,105 @@ def test_thinned_rows_reach_from_the_first_to_the_last() -> None:
 def test_one_hold_has_no_standard_error() -> None:
     assert np.isnan(standard_error(np.array([3.0])))
     assert standard_error(np.array([1.0, 3.0])) == pytest.approx(2.0)  # sd √2, times √2
+
+
+def test_importance_weights_are_smoothed_as_arviz_smooths_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ArviZ's own leave-one-out on the same log densities; raw weights are off by more than the tolerance."""
+    rng = np.random.default_rng(5)
+    log_p = -0.5 * (np.array([0.5, 1.0, 2.0, 2.5])[:, None] + rng.normal(scale=0.35, size=(4, 4000))) ** 2
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((4000, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert not found.refitted.any()
+    one = {"posterior": {"x": np.zeros((1, 4000))}, "log_likelihood": {"y": log_p.T[None]}}
+    reference = arviz_stats.loo(arviz_base.from_dict(one), pointwise=True, reff=1.0)
+    np.testing.assert_allclose(found.elpd, reference.elpd_i, atol=1e-9)
+    np.testing.assert_allclose(found.pareto_k, reference.pareto_k, atol=1e-9)
+    raw = np.log(4000) - np.log(np.exp(-log_p).sum(axis=1))
+    assert np.abs(raw - found.elpd).max() > 1e-5
+
+
+@pytest.mark.parametrize(("centre", "width"), [(0.0, 1.0), (3.0, 0.3)])
+def test_log_mean_is_the_normalising_constant_of_a_normal(centre: float, width: float) -> None:
+    """A normal bump far out in a standard normal: its mean is known, and few draws of the standard normal see it."""
+    rng = np.random.default_rng(3)
+    variance = 1.0 / (1.0 + width**-2)
+
+    def log_p(x: np.ndarray) -> np.ndarray:
+        return -0.5 * ((x - centre) / width) ** 2
+
+    weighted = variance * centre / width**2 + np.sqrt(variance) * rng.normal(size=(400, 3000))
+    estimates = [log_mean(log_p(rng.normal(size=4000)), log_p(draws)) for draws in weighted]
+    truth = 0.5 * np.log(width**2 / (1.0 + width**2)) - 0.5 * centre**2 / (1.0 + width**2)
+    # the estimate is unbiased in the mean itself; 5 standard errors of 400 runs
+    shares = np.exp(np.array(estimates) - truth)
+    assert abs(shares.mean() - 1.0) < 5.0 * shares.std() / 20.0 + 0.01
+    plain = [np.log(np.exp(log_p(rng.normal(size=4000))).mean()) for _ in range(400)]
+    assert np.std(estimates) < (0.7 * np.std(plain) if centre else 0.01)
+
+
+def test_log_mean_bears_draws_where_the_density_is_zero() -> None:
+    rng = np.random.default_rng(4)
+    log_p = np.where(rng.uniform(size=20000) < 0.25, 0.0, -np.inf)
+    assert log_mean(log_p, np.zeros(5000)) == pytest.approx(np.log(0.25), abs=0.05)
+
+
+def test_difference_and_its_standard_error() -> None:
+    hold = np.array([1, 2, 3, 4])
+    names, none = ("a",) * 4, np.zeros(4)
+    one = LeftOut(names, hold, np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
+    other = LeftOut(names, hold, np.array([2.0, 2.0, 2.0, 2.0]), none, none > 0)
+    total, se = difference(one, other)
+    assert total == 4.0
+    assert se == pytest.approx(2 * np.std([1, 0, 3, 0], ddof=1))
+    assert one.total == 12.0 and one.se == pytest.approx(2 * np.std([3, 2, 5, 2], ddof=1)) and one.converged
+    for foreign in (LeftOut(names, hold + 1, none, none, none > 0), LeftOut(("b",) * 4, hold, none, none, none > 0)):
+        with pytest.raises(ValueError, match="same holds"):
+            difference(one, foreign)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_bridge_between_two_lots_of_draws_balances_them(seed: int) -> None:
+    """With n draws of the one and m of the other, the root of sum 1/(1 + m/n r/p) = sum 1/(1 + n/m p/r) is r."""
+    rng = np.random.default_rng(seed)
+    one, other = rng.normal(size=300), 0.5 + rng.normal(size=200)
+    r = np.exp(log_mean(one, other))
+    from_one = (1.0 / (1.0 + 200.0 / 300.0 * np.exp(one) / r) * np.exp(one)).mean()
+    from_other = (1.0 / (1.0 + 200.0 / 300.0 * np.exp(other) / r)).mean()
+    assert from_one / from_other == pytest.approx(r, rel=1e-9)
+    # far from zero, and of densities that are all the same
+    assert log_mean(one - 2000.0, other - 2000.0) == pytest.approx(np.log(r) - 2000.0, rel=1e-12)
+    assert log_mean(np.full(300, -7.0), np.full(200, -7.0)) == pytest.approx(-7.0)
+
+
+def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One for each hold, or one for all that are sampled together; zero where none is given."""
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
+    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, 0.9)))
+    monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
+    asked: list[tuple[int, object]] = []
+
+    def together(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        asked.append((seed, None))
+        return np.zeros(4), np.ones(4, bool)
+
+    def alone(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
+        asked.append((seed, policy))
+        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=True))
+
+    monkeypatch.setattr(module, "log_densities", together)
+    monkeypatch.setattr(module, "fit", alone)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    for given in ({}, {"seed": 0}, {"seed": 1}):
+        smoothed_leave_one_hold_out(stub, **given)  # type: ignore[arg-type]
+    seeds = [seed for seed, _ in asked]
+    assert seeds[0] == seeds[1] != seeds[2]
+    asked.clear()
+    for given in ({}, {"seed": 0}):
+        smoothed_leave_one_hold_out(stub, exact=True, **given)  # type: ignore[arg-type]
+    assert asked[:4] == asked[4:] and len({seed for seed, _ in asked}) == 4
+    # a quarter of a fit's draws, from fewer walkers
+    assert all(policy is REFIT for _, policy in asked) and REFIT.ess == Policy().ess / 4.0
+    assert (REFIT.walkers, REFIT.round_draws) == (Policy().walkers / 2, Policy().round_draws / 2)

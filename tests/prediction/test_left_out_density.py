@@ -33,6 +33,25 @@ def test_the_densities_are_those_of_problems_without_a_hold(likelihood: str) -> 
     np.testing.assert_allclose(found[good], expected.T[good], rtol=1e-7, atol=1e-6)
 
 
+def test_where_a_density_cannot_be_computed_it_is_zero() -> None:
+    """Each of them for itself, however many points there are."""
+    n = 2500
+    whole, without = np.arange(float(n)), np.stack([np.arange(n) + 0.5, np.zeros(n)])
+    whole[7], without[0, 9], without[0, 2100] = np.nan, np.inf, -np.inf
+    coordinates = SimpleNamespace(to_natural=lambda z: z, log_jacobian=lambda theta: 3.0 + 0.0 * theta[:, 0])
+
+    def parts(theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        rows = theta[:, 0].astype(int)
+        return whole[rows], [without[:, rows]]
+
+    problem = SimpleNamespace(without_each_hold=parts)
+    target = SimpleNamespace(problem=problem, coordinates=coordinates, log_prior=lambda theta: -theta[:, 0])
+    found = joined(target, [(0, 1), (0, 0)])(np.arange(float(n))[:, None])  # type: ignore[arg-type]
+    expected = np.column_stack([np.full(n, 3.0), 3.0 - np.arange(n), np.full(n, 3.5)])
+    expected[7, 0] = expected[9, 2] = expected[2100, 2] = -np.inf
+    assert np.array_equal(found, expected)
+
+
 class Normals:
     """A posterior on a plane whose integrals without a hold are known: a unit normal, others moved and widened."""
 

@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.model.dense import jacobian, normal
 from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
+from wirebayes.model import likelihoods
 from wirebayes.model.problem import build
-from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict
+from wirebayes.prediction import predictive
+from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict, settings_given_readings
 from wirebayes.wire.staircase import simulate
 
 TRUTH = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.006, "setting_sd": 0.02}
@@ -170,3 +173,136 @@ def test_draws_that_could_not_be_computed_leave_a_gap_and_given_readings_that_do
     first[:, 5] = np.inf
     with np.errstate(invalid="ignore"):
         assert np.isnan(_regressed(drawn, first, np.array([2.0, 2.0]))).any()
+
+
+class Given:
+    """A generator whose normal numbers are written down, one lot after the other."""
+
+    def __init__(self, *lots: np.ndarray) -> None:
+        self.lots = list(lots)
+
+    def normal(self, size: tuple[int, ...]) -> np.ndarray:
+        assert self.lots[0].shape == size
+        return self.lots.pop(0)
+
+
+def test_setting_errors_of_the_past_follow_their_normal_given_the_readings() -> None:
+    """Exactly: without chance it is the dense posterior's mean, and unit vectors make up a root of its covariance."""
+    experiment = wire().train(6)  # an unrecorded hold among them
+    problem = build([experiment])
+    sample, holds = problem.samples[0], len(experiment.holds)
+    own = {name: np.full(holds + 1, value) for name, value in TRUTH.items()}
+    chance = np.vstack([np.zeros(holds), np.eye(holds)])
+    drawn = settings_given_readings(own, sample, Given(chance))  # type: ignore[arg-type]
+    residual, covariance, _ = normal(sample.protocol, TRUTH, sample.model, sample.readings[..., 0], sample.resolution_N)
+    _, derivative = jacobian(sample.protocol, TRUTH, sample.model)
+    by_setting = derivative[sample.protocol.mask]
+    gain = TRUTH["setting_sd"] ** 2 * by_setting.T @ np.linalg.inv(covariance)
+    root = drawn[:, 1:] - drawn[:, :1]
+    assert drawn[:, 0] == pytest.approx(gain @ residual, rel=1e-6, abs=1e-9)
+    left = TRUTH["setting_sd"] ** 2 * (np.eye(holds) - gain @ by_setting)
+    assert root @ root.T == pytest.approx(left, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("key", [None, "memory"])
+def test_a_replicate_has_an_error_of_its_own_and_the_past_goes_on_as_the_readings_say(
+    key: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Holds to come and trained ones that nobody asks for follow the past; a replicate differs in its own hold."""
+    experiment, train = wire("nylon-1.5m"), 4
+    effects = [named(key)] if key else []
+    sample = build([experiment.train(train)], effects).samples[0]
+    protocol = experiment.protocol()
+    requested = protocol.recorded.copy()
+    requested[1] = False
+    holds, rng = len(protocol.number), np.random.default_rng(0)
+    trained = len(sample.protocol.number)
+    past, chance = 0.1 * rng.normal(size=(trained, 2)), rng.normal(size=(holds, 2))
+    own = {name: np.full(2, value) for name, value in (TRUTH | {"memory.omega": 0.6}).items()}
+    monkeypatch.setattr(predictive, "settings_given_readings", lambda own, sample, rng: past)
+    request = PredictionRequest(protocol, trained, requested, np.full(holds, np.nan))
+    found = predictive.chain_course(own, sample, request, Given(chance))  # type: ignore[arg-type]
+    drawn = chance * TRUTH["setting_sd"]
+    known = np.vstack([past, drawn[trained:]])
+    course = simulate(protocol, own, sample.model, known)
+    for j in range(holds):
+        expected = course
+        if j < trained and requested[j]:
+            replicate = known.copy()
+            replicate[j] = drawn[j]
+            expected = simulate(protocol, own, sample.model, replicate)
+        assert found[j] == pytest.approx(expected[j], rel=1e-12)
+    fresh = PredictionRequest(protocol, 0, requested, np.full(holds, np.nan))
+    found = predictive.chain_course(own, sample, fresh, Given(chance))  # type: ignore[arg-type]
+    assert found == pytest.approx(simulate(protocol, own, sample.model, drawn), rel=1e-12)
+
+
+def test_readings_are_rounded_evenly_within_half_a_step_and_only_requested_holds_are_drawn() -> None:
+    """However many draws there are; the sensor's error comes on top."""
+    experiment = wire()
+    problem = build([experiment])
+    sample = replace(problem.samples[0], resolution_N=0.5)
+    protocol = experiment.protocol()
+    requested = protocol.recorded & (protocol.number != 2)
+    request = PredictionRequest(protocol, 0, requested, np.full(len(requested), np.nan))
+    still = TRUTH | {"sensor_sd": 1e-9, "setting_sd": 1e-9}
+    for values, sd in ((still, 0.0), (still | {"sensor_sd": 0.2}, 0.2)):
+        theta = rows(values, problem.names, 1001)
+        drawn = predict(problem, theta, sample, request, np.random.default_rng(0))
+        assert drawn.shape == (*protocol.time_s.shape, 1001) and not drawn[~requested].any()
+        clean = simulate(protocol, {name: np.array([value]) for name, value in values.items()}, sample.model)
+        error = (drawn - clean)[requested]
+        if not sd:
+            assert np.abs(error).max() == pytest.approx(0.25, rel=0.01)
+        # five standard errors of 60,060 draws at most
+        assert error.mean() == pytest.approx(0.0, abs=5 * np.sqrt((0.25 / 12 + sd**2) / error.size))
+        assert error.var() == pytest.approx(0.25 / 12 + sd**2, rel=0.03)
+        assert len(np.unique(error[0, 0])) == 1001  # no lot of draws repeats another
+
+
+def test_given_first_readings_are_regressed_on_within_their_own_history() -> None:
+    """By least squares: a replicate on its own first reading, a hold to come on all first readings given up to it."""
+    rng = np.random.default_rng(2)
+    holds, width, n = 5, 3, 400
+    drawn = np.einsum("ij,jkn->ikn", rng.normal(size=(holds, holds)), rng.normal(size=(holds, width, n)))
+    requested = np.array([True, True, True, True, False])
+    first = np.array([np.nan, 1.5, -0.5, 2.0, 9.0])
+    request = PredictionRequest(wire().protocol(), 2, requested, first)
+    found = predictive._given_first(drawn.copy(), request)
+
+    def moved(readings: np.ndarray, known: list[int]) -> np.ndarray:
+        given = drawn[known, 0]
+        design = np.vstack([np.ones(n), given]).T
+        slopes = np.linalg.lstsq(design, readings.T, rcond=None)[0][1:]
+        return np.asarray(readings + slopes.T @ (first[known][:, None] - given))
+
+    assert np.array_equal(found[0], drawn[0])  # a replicate without a first reading of its own stays free
+    assert np.array_equal(found[4], drawn[4])  # nobody asks for it
+    for j, known in ((1, [1]), (2, [2]), (3, [2, 3])):
+        assert found[j] == pytest.approx(moved(drawn[j], known), abs=1e-9)
+        assert (found[j, 0] == first[j]).all()
+    free = replace(request, first_N=np.array([np.nan, np.nan, 1.0, np.nan, np.nan]))
+    later = predictive._given_first(drawn.copy(), free)
+    first = free.first_N
+    assert later[3] == pytest.approx(moved(drawn[3], [2]), abs=1e-9) and np.ptp(later[3, 0]) > 0.1
+
+
+def test_hold_by_hold_each_hold_follows_from_its_own_first_reading() -> None:
+    """Without noise it is the course through that reading; where that is not above zero, there is none."""
+    experiment = wire()
+    problem = build([experiment], likelihood="hold")
+    protocol = experiment.protocol()
+    sample = replace(problem.samples[0], resolution_N=1e-12)
+    requested = protocol.recorded & (protocol.number != 2)
+    first = np.where(protocol.number == 3, -1.0, experiment.tension()[:, 0])
+    theta = rows(TRUTH | {"sensor_sd": 1e-12}, problem.names, 3)
+    request = PredictionRequest(protocol, 0, requested, first)
+    drawn = predict(problem, theta, sample, request, np.random.default_rng(0))
+    own = {name: np.array([value]) for name, value in TRUTH.items()}
+    courses = likelihoods.hold_courses(protocol, own, sample.model, first[:, None])
+    for j, course in enumerate(courses):
+        if course is None or not requested[j]:
+            assert not drawn[j].any()
+            continue
+        expected = course[0] if protocol.number[j] != 3 else np.zeros_like(course[0])
+        assert drawn[j, 1:] == pytest.approx(np.tile(expected[1:], 3), abs=1e-9) and (drawn[j, 0] == first[j]).all()

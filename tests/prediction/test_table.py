@@ -100,3 +100,41 @@ def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_h
     assert [len(rows) for rows in asked] == used
     for rows in asked:
         assert (rows[0], rows[-1]) == (0.0, 8999.0) and np.ptp(np.diff(rows)) <= 1.0
+
+
+def test_figures_are_those_of_the_draws_to_the_last_bit_where_a_reading_is_given(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Means about the first draw, the spread with a sample's divisor; a hold of fewer readings has fewer rows."""
+    times = ((0.0, 30.0, 60.0), (0.0, 50.0), (0.0, 10.0, 20.0))
+    bench = Bench("wire", displacements_mm=(1, 2, 3), times_s=times, unrecorded=frozenset({1}))
+    experiment = simulated_tests([bench], Truth(WIRE), seed=1)[0]
+    protocol, holds = experiment.protocol(), experiment.recorded_holds
+    question = PredictionRequest(protocol, 0, protocol.recorded, np.full(3, np.nan))
+    stored = SimpleNamespace(theta=np.zeros((9, 1)), problem=None, sample=SimpleNamespace(name="wire"))
+    request = SimpleNamespace(stored=stored, prediction=question, holds=holds)
+    drawn = np.random.default_rng(0).normal(size=(3, 3, 9))
+    drawn[1, 0] = 0.1  # the sum of nine is not nine times as much
+    monkeypatch.setattr(module, "predict", lambda *given: drawn)
+    rows = table(request)  # type: ignore[arg-type]
+    where = [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
+    assert [row[:4] for row in rows] == [
+        ["wire", 2, 2.0, 0.0], ["wire", 2, 2.0, 50.0], *(["wire", 3, 3.0, time] for time in (0.0, 10.0, 20.0))
+    ]  # fmt: skip
+    for (j, k), row in zip(where, rows, strict=True):
+        here = drawn[j, k]
+        expected = [here.mean(), here.std(ddof=1), *np.quantile(here, [0.05, 0.5, 0.95])]
+        assert row[4:] == pytest.approx(expected, rel=1e-12)
+    assert rows[0][4:] == [0.1, 0.0, 0.1, 0.1, 0.1]
+
+
+def test_a_prediction_has_a_seed_of_its_own_and_zero_where_none_is_given() -> None:
+    experiment = simulated_tests([Bench(displacements_mm=(2,))], Truth(WIRE), seed=1)[0]
+    sample, protocol = build([experiment]).samples[0], experiment.protocol()
+    stored = Stored({name: np.full(9, value) for name, value in WIRE.items()}, sample, "chain")
+    question = PredictionRequest(protocol, 0, np.ones(1, bool), np.full(1, np.nan))
+    request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
+    found = {seed: table(request, seed) for seed in (0, 1)}  # type: ignore[arg-type]
+    assert table(request) == found[0] != found[1]  # type: ignore[arg-type]
+    mixed = [(1.0, request)]
+    assert mixture_table(mixed) == found[0] == mixture_table(mixed, 0)  # type: ignore[arg-type]
