@@ -11,6 +11,7 @@ from wirebayes.effects import named
 from wirebayes.io.paper import experiments
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import build
+from wirebayes.results import identifiability as module
 from wirebayes.results.identifiability import (
     SENSITIVE,
     Extrapolation,
@@ -18,6 +19,7 @@ from wirebayes.results.identifiability import (
     extrapolation,
     identifiability,
     in_words,
+    log_priors,
     sensitivity,
 )
 
@@ -43,6 +45,9 @@ def test_contraction_is_the_share_of_variance_taken_away() -> None:
         posterior = 1.0 / (1.0 + noise**-2)
         assert found[name]["contraction"] == pytest.approx(1.0 - posterior, abs=0.05)
         assert found[name]["posterior_range_90"] == pytest.approx(2 * 1.645 * np.sqrt(posterior), rel=0.06)
+        assert (
+            found[name]["prior_range_90"] == pytest.approx(2 * 1.645, rel=1e-3) and not found[name]["range_is_factor"]
+        )
     assert "the data determine it" in found["sharp"]["sentence"]
     assert "data and prior both determine it" in found["even"]["sentence"]
     assert "next to nothing" in found["vague"]["sentence"]
@@ -173,3 +178,94 @@ def test_weighted_quantiles_are_those_of_repeated_values() -> None:
     assert found == pytest.approx([1.0, 1.0, 2.0, 3.0])
     # halfway between the middles of two values' shares
     assert _weighted_quantiles(values, counts, [0.45]) == pytest.approx([1.5])
+
+
+def test_the_prior_of_a_positive_parameter_is_that_of_its_logarithm() -> None:
+    """Each parameter's own density by scipy, times the value where logarithms are what is measured."""
+    forms = {"k": stats.lognorm(0.5, scale=700.0), "shift": stats.norm(1.0, 2.0), "share": stats.beta(2.0, 5.0)}
+    prior = Prior(forms, {}, frozenset({"k", "share"}))
+    theta = prior.rvs(50, np.random.default_rng(0))
+    found = log_priors(SimpleNamespace(problem=SimpleNamespace(prior=prior)), theta)  # type: ignore[arg-type]
+    for i, form in enumerate(forms.values()):
+        own = form.logpdf(theta[:, i]) + (np.log(theta[:, i]) if i != 1 else 0.0)
+        assert found[:, i] == pytest.approx(own, rel=1e-12)
+    # the density of log k is normal
+    assert found[:, 0] == pytest.approx(stats.norm(np.log(700.0), 0.5).logpdf(np.log(theta[:, 0])))
+
+
+def test_sensitivity_is_the_distance_over_powers_a_tenth_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+
+    def weights(component: np.ndarray, alpha: float) -> np.ndarray:
+        asked.append(alpha)
+        return alpha * component
+
+    def distance(values: np.ndarray, low: np.ndarray, high: np.ndarray, *powers: float) -> float:
+        assert values.tolist() == [[1.0, 2.0, 4.0]] and list(powers) == asked
+        assert low == pytest.approx(np.exp(component / 1.1)[None]) and high == pytest.approx(
+            np.exp(component * 1.1)[None]
+        )
+        return 0.25
+
+    component = np.array([0.1, -0.2, 0.3])
+    monkeypatch.setattr(module, "_statistics", SimpleNamespace(power_scale_lw=weights, power_scale_sense=distance))
+    assert sensitivity(np.array([1.0, 2.0, 4.0]), component) == 0.25
+    assert asked == pytest.approx([1.0 / 1.1, 1.1])
+
+
+class Course:
+    """A fresh sample that creeps by the exponential of its first parameter, times the hours and the tension."""
+
+    def __init__(self, own: np.ndarray, model: object, length_mm: float) -> None:
+        assert length_mm == 1500.0
+        self.own = own
+
+    def creep_mm(self, tension_N: float, times_s: np.ndarray) -> np.ndarray:
+        return np.exp(self.own[:, 0]) * tension_N * np.asarray(times_s)[:, None] / 3600.0
+
+
+def test_half_the_prior_s_weight_takes_half_of_its_precision_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a posterior of precision 2 under a unit normal prior; the second of two samples, at a tension of 2 N."""
+    model = normal_model({"a": 1.0})
+    samples = [
+        SimpleNamespace(model=None, protocol=SimpleNamespace(length_mm=length, duration_s=np.array(durations)))
+        for length, durations in ((1000.0, [60.0, 900.0]), (1500.0, [120.0]))
+    ]
+    model.problem.samples = samples
+    model.problem.parameters = lambda theta, sample: theta
+    model.flat = np.sqrt(1.0 / 2.0) * stats.norm.ppf((np.arange(12_001) + 0.5) / 12_001)[:, None]
+    monkeypatch.setattr(module, "FreshSample", Course)
+    times = np.array([3600.0, 36_000.0])
+    found = extrapolation(model, 2.0, times, sample=1)
+    z = 1.6449 * np.array([-1.0, 0.0, 1.0])[:, None]
+    posterior, weaker = (np.log(band / times * 1800.0) for band in (found.posterior_mm, found.weaker_prior_mm))
+    assert posterior == pytest.approx(np.sqrt(1.0 / 2.0) * np.tile(z, 2), abs=0.002)
+    assert weaker == pytest.approx(np.sqrt(1.0 / 1.5) * np.tile(z, 2), abs=0.02)
+    assert np.log(found.prior_mm / times * 1800.0) == pytest.approx(np.tile(z, 2), abs=0.15)
+    assert found.longest_hold_s == 900.0 and found.tension_N == 2.0 and found.time_s is times
+    assert found.pareto_k == pytest.approx(0.25, abs=0.15)  # a weight above t, exp(x²/4) that is, is as rare as 1/t⁴
+    # without times and sample: to a day, of the first sample
+    with pytest.raises(AssertionError):
+        extrapolation(model, 2.0)
+    samples[0].protocol.length_mm = 1500.0
+    assert extrapolation(model, 2.0).time_s[[0, -1]].tolist() == [10.0, 86_400.0]
+
+
+def test_an_extrapolation_as_plain_values_has_the_figures_under_their_names() -> None:
+    band = np.array([[1.0], [2.0], [4.0]])
+    found = Extrapolation(np.array([7200.0]), 3.0, band, 10.0 * band, 100.0 * band, 0.3, 7200.0).to_dict()
+    for name, size in (("posterior_mm", 1.0), ("weaker_prior_mm", 10.0), ("prior_mm", 100.0)):
+        assert {q: v.tolist() for q, v in found[name].items()} == {"q05": [size], "q50": [2 * size], "q95": [4 * size]}
+    assert found["prior_share"] == pytest.approx([0.0]) and found["pareto_k"] == 0.3 and found["tension_N"] == 3.0
+    assert found["sentence"].startswith("Creep after 2 h at 3 N: it hardly depends") and found["warning"] == ""
+
+
+def test_a_ridge_names_all_who_are_on_it_but_itself() -> None:
+    words = in_words("k1", {
+        "contraction": 0.95, "prior_range_90": 20.0, "posterior_range_90": 1.5, "range_is_factor": False,
+        "prior_sensitivity": 0.0, "likelihood_sensitivity": 1.0, "ridges": {"B": -0.95, "U": 0.991},
+    })  # fmt: skip
+    assert words == (
+        "k1: the data determine it; its 90 % range is 1.5, the prior's 20; it is correlated with B (r = -0.95) and "
+        "U (r = +0.99), and their combination is known better."
+    )

@@ -122,3 +122,68 @@ def test_both_tails_of_every_specimen_and_parameter_share_the_risk():
 def test_the_share_would_be_seen_to_be_wrong(monkeypatch):
     monkeypatch.setattr(module, "MAD_EFFICIENCY", 1.0)
     assert share_of_false_alarms(12) > 1.5 * FALSE_ALARMS / 8
+
+
+def only(name, values, half=0.01, material="line"):
+    """Rows with one parameter, known to so much on either side."""
+    return [
+        {"name": f"s{i}", "material": material, "length_mm": 500.0,
+         "parameters": {name: {"q05": v - half, "q50": v, "q95": v + half}}}
+        for i, v in enumerate(values)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e4])
+def test_a_positive_parameter_is_compared_by_its_logarithm_in_any_unit(unit):
+    """Eleven specimens a factor of two apart from the first to the last but one, which lies at a hundredth."""
+    values = unit * np.append(np.geomspace(1.0, 2.0, 11), 0.01)
+    found = outliers(only("k2", values, 1e-4 * unit))
+    assert [o["experiment"] for o in found] == ["s11"]
+    x, sd = np.log(values), np.log((values + 1e-4 * unit) / (values - 1e-4 * unit)) / (2.0 * stats.norm.ppf(0.95))
+    assert found[0]["z"] == pytest.approx(robust_z(x, sd)[-1])
+
+
+def test_a_parameter_that_may_be_zero_is_compared_as_it_is():
+    """One whose interval begins at zero, or that is negative in a single specimen."""
+    for low in (0.0, -0.5):
+        values = np.append(np.linspace(1.0, 2.0, 11), low + 0.01)
+        found = outliers(only("slack", values, half=0.01))
+        z = robust_z(values, np.full(12, 0.02 / (2.0 * stats.norm.ppf(0.95))))
+        assert bool(found) == bool(abs(z[-1]) > threshold(12, 1))
+        assert outliers(only("slack", np.append(values, 40.0), half=0.01))[0]["z"] > 10.0
+
+
+def test_an_outlier_says_all_there_is_to_it():
+    values = [1.0, 1.01, 0.99, 1.02, 0.98, 1.0, 1.0, 3.0]
+    (found,) = outliers(only("preload", values))
+    assert found == {
+        "experiment": "s7", "material": "line", "parameter": "preload", "value": 3.0, "median": 1.0,
+        "z": found["z"], "specimens": 8,
+        "sentence": f"s7: preload is 3, {found['z']:.1f} robust standard deviations above the median of 8 specimens "
+                    "of line, 1",
+    }  # fmt: skip
+
+
+def test_specimens_without_a_parameter_or_a_material_do_not_count_for_it():
+    """Five of a lot have it: too few; of another lot six. What no lot is known of stands alone."""
+    values = [1.0, 1.01, 0.99, 1.02, 90.0]
+    some = only("preload", values)
+    others = [row(f"k{i}", 1000.0) for i in range(6)]
+    assert not outliers([*some, *others])
+    one_more = only("preload", [*values, 1.0])
+    assert [(o["experiment"], o["specimens"]) for o in outliers([*one_more, *others])] == [("s4", 6)]
+    assert not outliers(only("preload", [*values, 1.0], material=None))
+
+
+def test_equally_far_outliers_come_by_name():
+    values = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9.0, -7.0]
+    rows = only("preload", values)
+    for name, at in (("b", 9), ("a", 10)):
+        rows[at]["name"] = name
+    assert [(o["experiment"], o["z"] > 0) for o in outliers(rows)] == [("a", False), ("b", True)]
+
+
+def test_the_threshold_is_student_s_t_for_all_comparisons_of_a_material():
+    for specimens, parameters in ((6, 1), (12, 8)):
+        level = 1.0 - 0.05 / (2 * specimens * parameters)
+        assert threshold(specimens, parameters) == pytest.approx(stats.t(1.0 + 0.37 * specimens).ppf(level))
