@@ -1,6 +1,10 @@
 """The table of a comparison and what is judged, from scores that are written down."""
 
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,10 +13,12 @@ import pytest
 from wirebayes.comparison import candidates as module
 from wirebayes.comparison import compare
 from wirebayes.comparison.candidates import BASE, Candidate
-from wirebayes.comparison.compare import Task, judge, side_by_side
-from wirebayes.effects import CATALOGUE
+from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
+from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
+from wirebayes.prediction.held_out import HeldOut, Scores
 
 PLAIN = Candidate(BASE, "", "")
 
@@ -160,3 +166,188 @@ def test_a_law_of_time_constants_creeps_by_exponentials(name: str) -> None:
     if name == "two_modes":
         share = 0.6 * share + 0.4 * (1.0 - np.exp(-0.005 * t))
     assert crept[1:] / crept[-1] == pytest.approx(share[1:] / share[-1], rel=1e-9)
+
+
+def test_candidates_differ_from_the_base_as_their_sentences_say() -> None:
+    """Every one but the effects of the catalogue: what is kept at a value, what acts, and which law is another."""
+    fixed = {
+        "hooke_without_creep": {"B", "U", "k2", "N"}, "creep_at_once": {"k2", "N"}, "exponential": {"N"},
+        "logarithmic": {"k2", "N"}, "power_law": {"k2", "N"}, "two_modes": {"N"}, "independent_errors": {"setting_sd"},
+    }  # fmt: skip
+    acting = {"creep_at_once": ("at_once", "not_in_time"), "logarithmic": ("logarithmic",),
+              "power_law": ("power_law",), "two_modes": ("two_modes",)}  # fmt: skip
+    chosen = module.candidates(experiments()[0], PLAIN, {})
+    assert [c.name for c in chosen] == [
+        BASE, "hooke_without_creep", "creep_at_once", "exponential", "logarithmic", "power_law", "two_modes",
+        "modified_hooke", "additive", "hold_by_hold", "independent_errors", "unrecorded_skipped",
+    ]  # fmt: skip
+    laws = {"modified_hooke": {"law": "modified"}, "additive": {"history": "additive"},
+            "hold_by_hold": {"likelihood": "hold"}, "unrecorded_skipped": {"unrecorded": False}}  # fmt: skip
+    for c in chosen:
+        assert set(c.fixed) == fixed.get(c.name, set()) and c.effects == acting.get(c.name, ())
+        same = replace(c, name=BASE, question="", sentence="", fixed={}, effects=())
+        assert same == replace(PLAIN, **laws.get(c.name, {}))  # type: ignore[arg-type]
+        assert c is chosen[0] or (c.question and c.sentence)
+    values = {c.name: c.fixed for c in chosen}
+    assert values["hooke_without_creep"]["B"] == 0.0 == values["independent_errors"]["setting_sd"]
+    assert values["exponential"]["N"] == 1.0 == values["two_modes"]["N"]
+
+
+def test_of_another_base_the_laws_of_the_plain_model_are_candidates() -> None:
+    base = replace(PLAIN, law="modified", history="additive", likelihood="hold")
+    chosen = {c.name: c for c in module.candidates(experiments()[1], base, {})}
+    assert {"hooke", "saturating", "chain"} <= set(chosen) and len(chosen) == 10
+    assert not {"modified_hooke", "additive", "hold_by_hold", "independent_errors", "unrecorded_skipped"} & set(chosen)
+    assert chosen["hooke"] == replace(base, name="hooke", law="hooke", question=module.LAW,
+                                      sentence=chosen["hooke"].sentence)  # fmt: skip
+    assert (chosen["saturating"].history, chosen["chain"].likelihood) == ("saturating", "chain")
+    assert all(c.law == "modified" for name, c in chosen.items() if name != "hooke")
+
+
+def test_effects_that_the_test_could_show_are_candidates_and_only_those_asked_for() -> None:
+    """An event once, whatever hold; the base always."""
+    known = {name: CATALOGUE[name] for name in ("memory", "grip_slip", "lost_motion")}
+    names = [c.name for c in module.candidates(experiments()[0], PLAIN, known)]
+    assert names[12:] == ["memory", "grip_slip"]  # nothing turns back, so no motion is lost
+    some = module.candidates(experiments()[0], PLAIN, known, ["grip_slip", "additive"])
+    assert [c.name for c in some] == [BASE, "additive", "grip_slip"]
+    assert some[2].effects == ("grip_slip",) and some[2].sentence == CATALOGUE["grip_slip"].sentence
+    placed = replace(PLAIN, effects=("grip_slip@7", "memory", "two_modes"))
+    assert [e.key for e in module.effects_of(placed, experiments()[0], CATALOGUE, 0)] == list(placed.effects)
+
+
+def test_what_a_candidate_fixes_leaves_the_posterior() -> None:
+    """Unless the model has no such parameter."""
+    experiment = experiments()[0]
+    plain = module.problem_of(PLAIN, experiment, [])
+    fixed = replace(PLAIN, fixed={"N": 1.0, "setting_sd": 0.0, "nothing": 3.0})
+    found = module.problem_of(fixed, experiment, []).prior
+    assert found.fixed == {"N": 1.0, "setting_sd": 0.0}
+    assert list(found.distributions) == [name for name in plain.names if name not in ("N", "setting_sd")]
+    assert found.logarithmic == plain.prior.logarithmic - {"N", "setting_sd"}
+    by_hold = module.problem_of(replace(fixed, likelihood="hold", law="modified"), experiment, [])
+    assert by_hold.prior.fixed == {"N": 1.0} and by_hold.samples[0].model.law == "modified"
+
+
+@pytest.mark.parametrize(
+    ("gains", "meaning"),
+    [
+        ([2.0, 2.0], "elpd +4.0 ± 0.0 against plain, leaving out each hold in turn: predicts better"),
+        ([-2.0, -2.0], "elpd -4.0 ± 0.0 against plain, leaving out each hold in turn: predicts worse"),
+        ([6.0, 2.0], "elpd +8.0 ± 4.0 against plain, leaving out each hold in turn: predicts better"),
+        ([-6.0, -2.0], "elpd -8.0 ± 4.0 against plain, leaving out each hold in turn: predicts worse"),
+        ([7.0, 1.0], "elpd +8.0 ± 6.0 against plain, leaving out each hold in turn: no meaningful difference"),
+    ],
+)
+def test_exactly_four_and_exactly_two_standard_errors_mean_something(gains: list[float], meaning: str) -> None:
+    table = side_by_side([row(BASE, [0.0, 0.0]), row("other", gains)], BASE)
+    assert [r["meaning"] for r in table["models"] if r["name"] == "other"] == [meaning]
+
+
+def test_models_come_by_score_then_those_scored_otherwise_then_failures() -> None:
+    later = "later readings given each hold's first"
+    models = [
+        {"name": "broken", "failed": "no", "scored": "all readings"}, row("low", [1.0, 1.0]), row(BASE, [2.0, 2.0]),
+        row("worse", [8.0, 7.0], scored=later), row("better", [9.0, 9.0], scored=later), row("high", [3.0, 3.0]),
+        {"name": "also", "failed": "no", "scored": later},
+    ]  # fmt: skip
+    table = side_by_side(models, BASE)  # type: ignore[arg-type]
+    assert [r["name"] for r in table["models"]] == ["high", BASE, "low", "better", "worse", "broken", "also"]
+    assert table["base"] == BASE
+
+
+def scored(elpd: list[float]) -> Scores:
+    at = np.arange(3.0)
+    return Scores(
+        hold=np.array([2, 2, 3]), time_s=at, observed_N=at + 1.0, mean_N=at, sd_N=at + 0.5,
+        quantiles_N=np.outer([-9.0, -3.0, -2.0, 0.0, 2.0, 3.0, 9.0], np.ones(3)) + at, pit=at / 3.0,
+        elpd=np.array(elpd), elpd_together=7.0, pit_band=np.zeros((3, 101)), pit_p=0.25,
+    )  # fmt: skip
+
+
+def test_held_out_holds_as_plain_values() -> None:
+    fit = SimpleNamespace(problem=build([experiments()[1]], [named("memory")]))
+    found = compare._held_out(HeldOut("wire", 8, scored([1.0, 2.5]), scored([4.0])), fit)  # type: ignore[arg-type]
+    assert found["trained_on"] == 8 and found["holds"].tolist() == [2, 3] and found["effects"] == ["memory"]
+    free, given = found["free"], found["given_first"]
+    assert (free["elpd"], given["elpd"]) == (3.5, 4.0) and free["per_hold"].tolist() == [1.0, 2.5]
+    assert free["rmse_N"] == 1.0 and free["elpd_together"] == 7.0 and free["pit_p"] == 0.25
+    assert free["coverage"] == {"50": 1.0, "90": 1.0, "99": 1.0} and free["pit_band"].shape == (3, 101)
+    readings = free["readings"]
+    assert readings["hold"].tolist() == [2, 2, 3] and readings["observed_N"].tolist() == [1.0, 2.0, 3.0]
+    assert readings["mean_N"].tolist() == readings["time_s"].tolist() == [0.0, 1.0, 2.0]
+    assert readings["sd_N"][0] == 0.5 and readings["quantiles_N"].shape == (7, 3) and readings["pit"][0] == 0.0
+    assert compare._held_out(HeldOut("wire", 8, None, scored([4.0])), fit)["free"] is None  # type: ignore[arg-type]
+
+
+def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Named for its experiment and itself; a hold in the name is set off by a hyphen."""
+    experiment = experiments()[1]
+    tasks = [Task(experiment, replace(PLAIN, name=name)) for name in (BASE, "grip_slip@3", "memory")]
+    assert tasks[1].file == Path("roc-line-1.71m/models/grip_slip-3.json")
+    done = tmp_path / tasks[0].file
+    done.parent.mkdir(parents=True)
+    done.write_text("known")
+    judged: list[tuple[str, int, object]] = []
+
+    def judge(task: Task, seed: int, policy: object) -> dict[str, str]:
+        judged.append((task.candidate.name, seed, policy))
+        return {"name": task.candidate.name}
+
+    @contextmanager
+    def alone(pieces: int) -> Iterator[type[map]]:
+        assert pieces == 2
+        yield map
+
+    monkeypatch.setattr(compare, "judge", judge)
+    monkeypatch.setattr(compare, "workers", alone)
+    told: list[tuple[str, float, float]] = []
+    compare.run(tasks, tmp_path, 5, report=lambda *about: told.append(about))
+    assert judged == [("grip_slip@3", 5, compare.POLICY), ("memory", 5, compare.POLICY)]
+    assert told == [("models", 1, 2), ("models", 2, 2)]
+    assert done.read_text() == "known" and json.loads((tmp_path / tasks[2].file).read_text()) == {"name": "memory"}
+    # half the draws of a fit, from half the walkers
+    assert (compare.POLICY.ess, compare.POLICY.walkers, compare.POLICY.round_draws) == (
+        Policy().ess / 2, Policy().walkers / 2, Policy().round_draws / 2
+    )  # fmt: skip
+
+
+def test_a_judgement_has_seeds_of_its_own_for_every_model_and_number_of_holds(monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds: list[int] = []
+
+    def fit(problem: object, seed: int, policy: object) -> object:
+        seeds.append(seed)
+        raise InterruptedError("enough")
+
+    monkeypatch.setattr(compare, "fit", fit)
+    for seed, name, train in ((0, "a", None), (0, "a", 6), (0, "b", None), (1, "a", None), (0, "a", None)):
+        found = judge(Task(experiments()[1], replace(PLAIN, name=name), train), seed)
+        assert found["failed"] == "InterruptedError: enough" and found["name"] == name
+    assert len(set(seeds)) == 4 and seeds[0] == seeds[4]
+
+
+def test_without_the_holds_that_were_not_recorded_there_is_one_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+
+    def fit(problem: object, seed: int, policy: object) -> object:
+        seen.append(len(problem.samples[0].protocol.number))  # type: ignore[attr-defined]
+        raise InterruptedError
+
+    monkeypatch.setattr(compare, "fit", fit)
+    for unrecorded in (True, False):
+        judge(Task(experiments()[0], replace(PLAIN, unrecorded=unrecorded)), 0)
+    assert seen == [13, 12]
+
+
+def test_stacking_by_one_step_of_its_iteration() -> None:
+    """New weights are the mean shares of the densities; from equal ones on, until they stay."""
+    density = np.array([[1.0, 3.0], [2.0, 2.0], [4.0, 1.0]])
+    once = stacking(np.log(density), iterations=1)
+    assert once == pytest.approx((density / density.sum(axis=1, keepdims=True)).mean(axis=0))
+    share = density * once
+    assert stacking(np.log(density), iterations=2) == pytest.approx(
+        (share / share.sum(axis=1, keepdims=True)).mean(axis=0)
+    )
+    assert stacking(np.log(density), iterations=0) == pytest.approx([0.5, 0.5])

@@ -21,7 +21,8 @@ LAW, HISTORY, LIKELIHOOD = "Which elastic law?", "Which history?", "One history,
 SETTING, ABSENT = "Do setting errors matter?", "Was the wire held where readings are missing?"
 EFFECT = "Which effect helps?"
 BASE = "plain"
-_NO_CREEP = {"B": 0.0, "U": 1.0, "k2": 1.0, "N": 1.0}  # an amount of zero; what the others are does not matter then
+_NO_TIME_LAW = {"k2": 1.0, "N": 1.0}  # where something else stands for the time law, it does not matter what they are
+_NO_CREEP = {"B": 0.0, "U": 1.0, **_NO_TIME_LAW}  # an amount of zero; what the others are does not matter then
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,12 @@ def candidates(
     out = [base]
     out.append(other("hooke_without_creep", HOOKE, "The wire is a spring and does not creep.", fixed=_NO_CREEP))
     out.append(other("creep_at_once", HOOKE, RIVALS["at_once"].sentence, effects=("at_once", "not_in_time"),
-                     fixed={"k2": 1.0, "N": 1.0}))  # fmt: skip
+                     fixed=_NO_TIME_LAW))  # fmt: skip
     out.append(other("exponential", TIME, "The creep has one time constant: N = 1.", fixed={"N": 1.0}))
     out.append(other("logarithmic", TIME, RIVALS["logarithmic"].sentence, effects=("logarithmic",),
-                     fixed={"k2": 1.0, "N": 1.0}))  # fmt: skip
+                     fixed=_NO_TIME_LAW))  # fmt: skip
     out.append(other("power_law", TIME, RIVALS["power_law"].sentence, effects=("power_law",),
-                     fixed={"k2": 1.0, "N": 1.0}))  # fmt: skip
+                     fixed=_NO_TIME_LAW))  # fmt: skip
     out.append(other("two_modes", TIME, RIVALS["two_modes"].sentence, effects=("two_modes",), fixed={"N": 1.0}))
     if base.law == "hooke":
         out.append(other("modified_hooke", LAW, "Strain is taken over the stretched length, eq (3).", law="modified"))
