@@ -146,3 +146,126 @@ def test_priors_of_a_chain_are_those_of_the_plain_fit() -> None:
     # what other materials know of a shared amplitude is no prior of this kind
     assert corrected(known={"a": {}}) == pytest.approx(np.log(4.0))
     assert corrected(theta=np.inf) == pytest.approx(np.log(4.0))  # a place that the prior excludes says nothing
+
+
+def test_when_all_looks_are_spent_the_best_set_alone_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The seventh look finds two sets better than all before; the second of them is not looked at."""
+    many = {name: 20.0 - 0.01 * k for k, name in enumerate("abcdefg")}
+    found, order = explored(monkeypatch, many, {"g": {"h": 15.0, "i": 14.5}})
+    assert order == [*"abcdefg", "gh"]
+    assert {frozenset("gh"), frozenset("gi")} <= {s.key for s in found.sets} and frozenset("gi") not in found.fitted
+
+
+def test_without_a_single_name_there_is_the_plain_model_with_its_remainder(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, order = explored(monkeypatch, {}, smooth=3.0)
+    assert order == [] and found.fitted == {} and found.left_over == {}
+    assert [(s.names, s.log_bayes, s.remainder) for s in found.sets] == [((), 0.0, np.array([3.0]))]
+
+
+def test_a_fitted_set_keeps_its_evidence_and_has_the_remainder_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = explored(monkeypatch, {"a": 20.0, "b": 3.0}, {"a": {"b": 2.5}}, remainders={"a": 4.0, "ab": -1.0})
+    by_key = {s.key: s for s in found.sets}
+    assert list(found.fitted) == [frozenset("a")] and by_key[frozenset("a")] is found.fitted[frozenset("a")].effects
+    assert by_key[frozenset("a")].remainder == 4.0 and by_key[frozenset("a")].log_bayes == 20.0
+    pair = by_key[frozenset("ab")]
+    assert pair.remainder is None and pair.log_bayes == 22.5 and set(pair.presence) == {"a", "b"}
+
+
+class Fits:
+    """What `stepwise._fit` does with two blocks, one effect shared by them or in one alone, instead of fitting them."""
+
+    def __init__(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        *,
+        scanned: float = 0.0,
+        refitted: dict[str, float] | None = None,
+        scope: str = "material",
+        on: tuple[int, ...] = (0, 1),
+    ) -> None:
+        self.did: list[Any] = []
+        self.blocks: Any = [
+            SimpleNamespace(
+                experiments=f"e{b}", effects=(f"old{b}",), target=b, modes=SimpleNamespace(z=np.ones((2, 1)))
+            )
+            for b in range(2)
+        ]
+        refit = SimpleNamespace(effect="new", blocks=on, theta=[np.array([10.0 * b]) for b in on])
+        self.evidence = None if refitted is None else evidence(refitted)
+        further = SimpleNamespace(amplitudes=lambda name: dict.fromkeys(on, refit))
+        self.parent: Any = stepwise.FittedSet(
+            EffectSet(("a",), 7.0, {}, None), self.blocks, ("first",), further, ([], [], [])  # type: ignore[arg-type]
+        )  # fmt: skip
+        self.settings: Any = SimpleNamespace(
+            law="modified", history="additive", kinds={"b": SimpleNamespace(scope=scope)}
+        )
+
+        def fitted(experiments: str, effects: Any, law: str, history: str, rng: Any, near: Any) -> Any:
+            self.did.append(("fitted", experiments, effects, law, history, near.tolist()))
+            return SimpleNamespace(target=experiments, modes=SimpleNamespace(z=np.ones((2, 1))))
+
+        def informed(blocks: Any, effects: Any, rng: Any) -> Any:
+            self.did.append(("informed", effects))
+            return blocks
+
+        def weighed(blocks: Any, *given: Any, correction: Any, most: int, forms_a_name: int) -> Any:
+            self.did.append(("weighed", most, forms_a_name))
+            return self.evidence
+
+        scans = {"e0": 3.0, "e1": 4.0, 0: 5.0, 1: 6.0}
+        monkeypatch.setattr(stepwise, "fitted", fitted)
+        monkeypatch.setattr(stepwise, "informed", informed)
+        monkeypatch.setattr(stepwise, "weigh_names", weighed)
+        monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: scans[target])
+        monkeypatch.setattr(stepwise, "scan", lambda x: SimpleNamespace(flexible=[x]))
+        monkeypatch.setattr(stepwise.screening, "candidate_probes", lambda blocks, kinds: (["probe"], ["candidate"]))
+        monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
+
+    def fit(self) -> stepwise.FittedSet:
+        return stepwise._fit(self.parent, "b", self.settings, {}, np.random.default_rng(0))
+
+
+def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = Fits(monkeypatch, on=(1,))
+    found = fits.fit()
+    assert fits.did[0] == ("fitted", "e1", ("old1", "new"), "modified", "additive", [10.0])
+    assert found.blocks[0] is fits.blocks[0] and found.blocks[1].target == "e1"
+    assert found.effects.names == ("a", "b") and found.effects.remainder.tolist() == [5.0, 4.0]  # type: ignore[union-attr]
+    assert found.accepted == ("first", stepwise.Accepted("b", (1,), {1: "new"}))  # type: ignore[comparison-overlap, dict-item]
+    assert found.scanned[:2] == (["probe"], ["candidate"]) and len(found.scanned[2]) == 2
+
+
+@pytest.mark.parametrize(
+    ("scope", "on", "shared"),
+    [
+        ("material", (0, 1), False),
+        ("instrument", (0, 1), True),
+        ("environment", (0, 1), True),
+        ("instrument", (0,), False),
+    ],
+)
+def test_materials_inform_each_other_of_what_the_bench_has(
+    scope: str, on: tuple[int, ...], shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An amplitude that is one for all of them; of one material alone there is nobody to tell."""
+    fits = Fits(monkeypatch, scope=scope, on=on)
+    fits.fit()
+    assert ("informed", dict.fromkeys(on, "new")) in fits.did if shared else all(d[0] != "informed" for d in fits.did)
+
+
+@pytest.mark.parametrize(
+    ("scanned", "refitted", "weighed", "further"),
+    [
+        (1.29, {"c": 9.0}, False, False),  # by the scan not worth a refit
+        (1.3, {"c": 1.9, "d": 2.0}, True, True),
+        (9.0, {"c": 1.99}, True, False),  # refitted not worth adding
+        (9.0, {}, True, False),
+    ],
+)
+def test_a_further_effect_is_refitted_and_added_where_that_is_worth_it(
+    scanned: float, refitted: dict[str, float], weighed: bool, further: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fits = Fits(monkeypatch, scanned=scanned, refitted=refitted)
+    found = fits.fit()
+    assert (("weighed", 6, 1) in fits.did) is weighed
+    assert found.further is (fits.evidence if further else None)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.model.dense import normal
+from tests.model.dense import jacobian, normal
 from tests.simulated import simulated_tests
 from wirebayes.discovery import held_out
+from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth
@@ -75,3 +76,78 @@ def test_importance_weights_are_truncated(monkeypatch: pytest.MonkeyPatch) -> No
         problem.leave_one_hold_out = lambda theta: [np.log(impossible)]
         found = held_out.truncated_leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
     assert found[0] < -1e5 and found[1:] == pytest.approx(expected[1:], rel=1e-9)
+
+
+def test_scores_of_several_draws_are_averages_over_them() -> None:
+    """Two stiffnesses, each with the dense normal of its own: the mean density, the mean prediction, the mean noise."""
+    experiment = simulated_tests([Bench(unrecorded=frozenset({3}))], Truth(WIRE), seed=2)[0]
+    problem = build([experiment])
+    sample = problem.samples[0]
+    members = [WIRE | {"k1": k1} for k1 in (880.0, 920.0)]
+    theta = np.array([[values[name] for name in problem.names] for values in members])
+    densities, means, floors = [], [], []
+    for values in members:
+        r, covariance, hold = normal(sample.protocol, values, sample.model, experiment.tension(), sample.resolution_N)
+        _, derivative = jacobian(sample.protocol, values, sample.model)
+        own = np.concatenate([derivative[j, sample.protocol.mask[j], j] for j in range(12)])
+        past = hold < 9  # the first eight that were recorded
+        gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
+        left = covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]
+        error = r[~past] - gain @ r[past]
+        densities.append([stats.multivariate_normal(error[at] * 0.0, left[np.ix_(at, at)]).pdf(error[at])
+                          for at in (hold[~past] == j for j in (9, 10, 11))])  # fmt: skip
+        means.append(error)
+        noise = values["sensor_sd"] ** 2 + sample.resolution_N**2 / 12.0
+        floors.append((noise + own**2 * values["setting_sd"] ** 2)[~past])
+    own_parameters = problem.parameters(theta, sample)
+    found = held_out._scored(sample, sample.model, own_parameters, 8, np.random.default_rng(0))
+    assert found.holds == [10, 11, 12] and found.readings == 3 * experiment.tension().shape[1]
+    assert found.elpd == pytest.approx(np.log(np.mean(densities, axis=0)), rel=1e-6)
+    assert found.squares == pytest.approx((np.mean(means, axis=0) ** 2).mean(), rel=1e-6)
+    assert found.floor == pytest.approx(np.mean(floors), rel=1e-6)
+    assert found.rmse_N == pytest.approx(np.sqrt(found.squares))
+    # a draw with which the model cannot be computed has no density
+    theta[1, problem.names.index("k1")] = np.nan
+    with np.errstate(invalid="ignore"):
+        broken = held_out._scored(sample, sample.model, problem.parameters(theta, sample), 8, np.random.default_rng(0))
+    assert broken.elpd == pytest.approx(np.log(np.array(densities[0]) / 2.0), rel=1e-6)
+
+
+@pytest.mark.parametrize(("same", "near"), [(True, [1.0, 2.0]), (False, None)])
+def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
+    same: bool, near: list[float] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On the first holds of each experiment, with the laws of the block and five hundred draws."""
+    pair = simulated_tests([Bench("a"), Bench("b", displacements_mm=(1, 2, 3, 4))], Truth(WIRE), seed=2)
+    effects = (named("memory"),)
+    problem = build([e.train(k) for e, k in zip(pair, (7, 3), strict=True)], effects, law="modified")
+    given: list[tuple[object, ...]] = []
+
+    def fitted(experiments: list[Experiment], *rest: object) -> str:
+        given.append(([len(e.recorded_holds) for e in experiments], *rest))
+        return "trained"
+
+    def draws(trained: str, rng: object, n: int) -> tuple[object, np.ndarray]:
+        assert trained == "trained" and n == 500
+        values = WIRE | {"memory.omega": 0.5}
+        return problem, np.tile([values[name.split("[")[0]] for name in problem.names], (5, 1))
+
+    monkeypatch.setattr(held_out, "fitted", fitted)
+    monkeypatch.setattr(held_out, "_draws", draws)
+    target = SimpleNamespace(coordinates=SimpleNamespace(to_natural=lambda z: z))
+    block = SimpleNamespace(effects=effects if same else (), law="modified", history="saturating", target=target,
+                            modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])))  # fmt: skip
+    found = held_out.predicted(pair, [7, 3], effects, block, np.random.default_rng(0))  # type: ignore[arg-type]
+    ((counts, extra, law, history, _, start),) = given
+    assert (counts, extra, law, history) == ([7, 3], effects, "modified", "saturating")
+    assert start is None if near is None else start.tolist() == near  # type: ignore[attr-defined]
+    assert [one.holds for one in found] == [[8, 9, 10, 11, 12], [4]]
+
+
+def test_draws_of_a_block_come_with_all_its_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(held_out.rough_draws, "draws", lambda target, modes, rng, n: (target.problem, modes, n))
+    monkeypatch.setattr(held_out, "completed", lambda problem, theta, rng: (f"whole {problem}", theta, None))
+    block = SimpleNamespace(target=SimpleNamespace(problem="problem"), modes="modes")
+    assert held_out._draws(block, np.random.default_rng(0), 7) == (  # type: ignore[arg-type]
+        "whole problem", ("problem", "modes", 7)
+    )  # fmt: skip

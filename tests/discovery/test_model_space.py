@@ -149,3 +149,47 @@ def test_what_the_final_model_shares_the_probability_with() -> None:
     partial = alternatives(*given, "partial")  # type: ignore[arg-type]
     assert (partial[0].remains, partial[1].remains) == (True, False)
     assert partial[0].probability == pytest.approx(0.2 / 0.86)
+
+
+def test_none_or_one_effect_has_no_factor_whatever_the_catalogue_holds() -> None:
+    assert log_prior(0, 20) == log_prior(1, 20) == log_prior(1, 3) == 0.0
+    assert log_prior(2, 20) == pytest.approx(np.log(0.1 * 20 / (20 * 19 / 2)))
+
+
+def test_weights_by_hand() -> None:
+    """Of a set alone, and beside a remainder that is smooth or not; of nothing at all, and of a remainder alone."""
+    sets = [a_set("", 0.0, np.array([3.0])), a_set("a", 5.0, np.array([1.0])), a_set("ab", 9.0, None)]
+    without, beside = log_weights(sets, 20, {"a": 2, "b": 3})
+    pair = log_prior(2, 20) - np.log(2.0) - np.log(3.0)
+    assert without == pytest.approx([-np.inf, 5.0 - np.log(2.0), 9.0 + pair])
+    assert beside == pytest.approx([3.0, 5.0 - np.log(2.0) + np.log(0.5) + 1.0, -np.inf])
+    _, rough = log_weights(sets, 20, {"a": 2, "b": 3}, {frozenset("a"): 1.0, frozenset("ab"): 2.0})
+    assert rough == pytest.approx([3.0, beside[1] + np.log(2.0), 9.0 + pair + np.log(0.5) + 2.0])
+
+
+def test_where_nothing_can_be_missing_there_are_no_shares() -> None:
+    """Effects that do not act in a material, and a remainder that is elsewhere."""
+    sets = [EffectSet((), 0.0, {}, np.array([8.0, -40.0])), EffectSet(("a",), 9.0, {"a": np.array([1.0, 0.0])}, None)]
+    found = posterior(sets, np.array([-np.inf, 2.0]), np.array([-np.inf, -np.inf]), blocks=2)
+    assert found.shares == [{"a": 1.0, "unknown": 0.0}, {}]
+    assert found.nothing.tolist() == [0.0, 1.0] and found.remainder.tolist() == [0.0, 0.0]
+
+
+def test_a_set_whose_remainder_was_not_looked_for_has_it_everywhere_where_it_has_one() -> None:
+    sets = [EffectSet(("a",), 0.0, {"a": np.array([1.0, 0.5])}, None)]
+    found = posterior(sets, np.log([0.75]), np.log([0.25]), blocks=2)
+    assert found.remainder == pytest.approx([0.25, 0.25]) and found.nothing == pytest.approx([0.0, 0.375])
+    assert found.shares[1] == pytest.approx({"a": 0.5 / 0.625, "unknown": 0.125 / 0.625})
+
+
+def test_the_best_set_begins_with_the_best_first_name() -> None:
+    """Two sets that begin with b together outweigh the heaviest set, and the heavier of them is the best."""
+    sets = [a_set("a", 0.0, None), a_set("b", 0.0, None), a_set("bc", 0.0, None)]
+    found = posterior(sets, np.log([0.3, 0.2, 0.1]), np.log([0.1, 0.05, 0.25]), blocks=1)
+    assert found.best.names == ("b", "c") and sets[0].first == "a" and a_set("", 0.0).first == ""
+
+
+def test_a_set_that_holds_exactly_enough_is_enough() -> None:
+    assert smallest_set({"b": 0.25, "a": 0.5, "c": 0.25}, 0.75) == ["a", "b"]
+    assert smallest_set({"a": 0.5, "b": 0.5}, 0.5) == ["a"] and smallest_set({}) == []
+    assert smallest_set({"a": 0.5, "b": 0.3}) == ["a", "b"]

@@ -110,3 +110,59 @@ def test_probes_of_the_bench_do_what_they_say() -> None:
     # a wire of 500 N / 1000 mm and a fixture of 1e-3 mm/N in series: half a thousandth of the strain is the bench's
     assert power._Compliance().apply(value, own, hold) == pytest.approx(4.0 / (1.0 + 0.5e-3))
     assert isinstance(Probe(named("memory"), {}, 1.0, False), Probe)
+
+
+def test_a_group_takes_no_one_who_is_exactly_at_its_bound() -> None:
+    assert group_of(["a"], {("a", "b"): 0.95, ("a", "c"): 0.9501}) == ["a", "c"]
+
+
+@pytest.mark.parametrize("one_sided", [True, False])
+def test_a_detectable_amplitude_is_a_bisection_of_the_largest(one_sided: bool) -> None:
+    """Of all that are smaller than δ = 40 by the median norm; four simulations of five, exactly, are enough."""
+    asked: list[Any] = []
+
+    def of(i: int, rows: int) -> Any:
+        asked.append((i, rows))
+        return SimpleNamespace(log_bayes=lambda amplitude: np.where(np.arange(5) < 4, amplitude, 0.0) / 0.7)
+
+    null: Any = SimpleNamespace(norm=np.array([[9.0, 2.0], [9.0, 4.0], [9.0, 80.0]]), pieces=SimpleNamespace(of=of))
+    trial: Any = SimpleNamespace(one_sided=one_sided)
+    found = power.amplitude_80(null, trial, 1, power.occam(one_sided) + 2.0)
+    assert asked == [(1, 300)]
+    assert found == pytest.approx(1.4 + 0.5 * 10.0 / 2**12, abs=0.51 * 10.0 / 2**12) and found > 1.4
+    steps = found * 2**12 / 10.0  # of the largest, 40 over the median of the norms
+    assert steps == round(steps)
+    assert power.amplitude_80(null, trial, 1, power.occam(one_sided) + 10.0 / 0.7) is None  # it must be passed
+    assert power.amplitude_80(null, trial, 1, power.occam(one_sided) + 9.99 / 0.7) == pytest.approx(10.0, abs=0.02)
+
+
+def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From nine tenths on; a fixture's compliance is left to the catalogue where that can show it."""
+    asked: list[Any] = []
+
+    def expand(target: Any, z: np.ndarray, trials: Any) -> Any:
+        asked.append((target, z.tolist(), [(type(t.effect).__name__, t.own, t.step, t.one_sided) for t in trials]))
+        whole = np.tile([[6.0], [8.0]], len(trials))  # each of length ten
+        return SimpleNamespace(signatures=[whole, None], left=np.array([[1.0, 0.96, 0.0, 4.0], [0.1, 0.0, 0.5, 0.0]]))
+
+    monkeypatch.setattr(power, "expand", expand)
+    monkeypatch.setattr(power, "projected", lambda x, ratio: x.left[:, : x.signatures[0].shape[1]] + ratio)
+    block: Any = SimpleNamespace(target="target", modes=SimpleNamespace(z=np.array([[1.0], [2.0]])))
+    kinds: Any = [SimpleNamespace(name=n, shows=f"shows {n}") for n in ("memory", "toe")]
+    found = power.not_identifiable(block, kinds, ["memory"])
+    assert found == [
+        "constant force offset: 90.4 % of it is absorbed by the model's own parameters",
+        "scale of the displacement: 95.0 % of it is absorbed by the model's own parameters",
+        "toe: this protocol cannot show it (shows toe)",
+    ]
+    ((target, z, trials),) = asked
+    assert target == "target" and z == [[1.0]]
+    names = [
+        ("_SensorGain", "gain of the force sensor.a"), ("_ForceOffset", "constant force offset.a"),
+        ("_DisplacementScale", "scale of the displacement.a"), ("_Compliance", "compliance of the fixture.c"),
+    ]  # fmt: skip
+    assert trials == [(kind, {column: 1e-3}, 1e-3, False) for kind, column in names]
+    power.not_identifiable(block, kinds, ["fixture_compliance", "memory"])
+    assert [t[0] for t in asked[1][2]] == ["_SensorGain", "_ForceOffset", "_DisplacementScale"]
+    for kind in power._ABSORBABLE:
+        assert kind.amplitudes[0].neutral == 0.0

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wirebayes.discovery import refit
 from wirebayes.discovery.refit import occam
@@ -93,3 +94,99 @@ def test_climbs_begin_on_the_line_between_what_is_known() -> None:
     ends[2] = np.nan
     assert refit._between(grid, ends, 1, np.array([1.5]))[:, 0].tolist() == [10.0]
     assert refit._between(grid, ends, 0, np.array([-1.0, 0.5]))[:, 0].tolist() == [0.0, 5.0]
+
+
+def tried(monkeypatch: pytest.MonkeyPatch, top: float, effect: Any = TWO_SIDED, guess: float = 3.0) -> list[Any]:
+    """The amplitudes of each round of climbs, in units of δ."""
+    rounds: list[Any] = []
+    climbed = refit._climbed
+
+    def watched(pinned: Any, reference: float, amplitudes: np.ndarray, begin: Any) -> Any:
+        rounds.append(amplitudes / 1e-3)
+        return climbed(pinned, reference, amplitudes, begin)
+
+    monkeypatch.setattr(refit, "_climbed", watched)
+    refitted(monkeypatch, [top], effect, guess)
+    monkeypatch.setattr(refit, "_climbed", climbed)
+    return rounds
+
+
+def test_amplitudes_from_two_to_forty_and_the_scan_s_guess_are_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On both sides, or on the one that the prior allows; a guess next to nothing counts as three tenths."""
+    steps = [2.0, 3.0, 5.0, 10.0, 20.0, 40.0]
+    assert tried(monkeypatch, 9.0)[0] == pytest.approx([-s for s in reversed(steps)] + steps)
+    assert tried(monkeypatch, 9.0, guess=-3.0)[0] == pytest.approx([-s for s in reversed(steps)] + steps)
+    assert tried(monkeypatch, 9.0, named("toe"))[0] == pytest.approx(steps)
+    assert tried(monkeypatch, 9.0, named("toe"), guess=0.1)[0] == pytest.approx([0.3, 2.0, 5.0, 10.0, 20.0, 40.0])
+    # no farther than the prior reaches
+    bounded = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.004, 0.016), neutral=0.0)])
+    assert tried(monkeypatch, 9.0, bounded)[0] == pytest.approx([-4.0, -3.0, -2.0, 2.0, 3.0, 5.0, 10.0, 12.0])
+
+
+def test_a_top_within_is_looked_at_twice_more_closely(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, second, third = tried(monkeypatch, 9.0, named("toe"))
+    assert second == pytest.approx(np.linspace(5.0, 20.0, 8)[1:-1])
+    best = max(first.tolist() + second.tolist(), key=lambda a: -abs(a - 9.0))
+    every = np.sort(np.concatenate([first, second]))
+    at = int(np.argmin(abs(every - best)))
+    assert third == pytest.approx(np.linspace(every[at - 1], every[at + 1], 8)[1:-1])
+
+
+def test_a_top_outside_is_followed_outwards_six_times_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By 1.3, 1.7 and 2.3 from the end where it lies; within the bounds of the prior."""
+    for side in (1.0, -1.0):
+        rounds = tried(monkeypatch, side * 1e9)
+        assert len(rounds) == 1 + 6 + 2
+        for n in range(6):
+            assert rounds[1 + n] == pytest.approx(side * 40.0 * 2.3**n * np.array([1.3, 1.7, 2.3]))
+    few = tried(monkeypatch, 150.0)
+    assert [len(r) for r in few] == [12, 3, 3, 6, 6]  # 92, then 211.6, then back between them
+    bounded = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.1, 0.2), neutral=0.0)])
+    rounds = tried(monkeypatch, 1e9, bounded)
+    assert [len(r) for r in rounds] == [12, 3, 3, 6, 6]
+    assert rounds[1] == pytest.approx([52.0, 68.0, 92.0]) and rounds[2] == pytest.approx([100.0] * 3)
+    at_end = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.04, 0.08), neutral=0.0)])
+    assert [len(r) for r in tried(monkeypatch, 1e9, at_end)] == [12, 6, 6]  # the end of the prior is the end
+
+
+def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> None:
+    grid = np.array([1.0, 3.0, 4.0])
+
+    def around(best: int, end: float | None) -> np.ndarray:
+        value = np.zeros(3)
+        value[best] = 1.0
+        return refit._around(refit._Profile(grid, value, []), end)
+
+    for end in (None, 0.5):
+        assert around(1, end) == pytest.approx(np.linspace(1.0, 4.0, 8)[1:-1])
+        assert around(2, end) == pytest.approx(np.linspace(3.0, 4.0, 8)[1:-1])
+    assert around(0, None) == pytest.approx(np.linspace(-1.0, 3.0, 8)[1:-1])  # as far beyond as within
+    assert around(0, 0.5) == pytest.approx(np.linspace(0.5, 3.0, 8)[1:-1])
+
+
+def test_a_profile_keeps_what_it_had_and_is_sorted() -> None:
+    one = refit._Profile(np.array([1.0, 3.0]), np.array([10.0, 30.0]), [np.array([[1.0], [3.0]])])
+    other = refit._Profile(np.array([3.0, 2.0, 0.0]), np.array([-1.0, 20.0, 0.0]), [np.array([[9.0], [2.0], [0.0]])])
+    both = one.joined(other)
+    assert both.amplitude.tolist() == [0.0, 1.0, 2.0, 3.0] and both.value.tolist() == [0.0, 10.0, 20.0, 30.0]
+    assert both.ends[0][:, 0].tolist() == [0.0, 1.0, 2.0, 3.0] and both.best == 3
+
+
+def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
+    """Of several starts the best one counts, in each block for itself; evidence adds up over the blocks."""
+
+    def block(value: list[float], converged: list[bool]) -> Any:
+        ends = np.arange(float(len(value)))[:, None]
+        found = SimpleNamespace(converged=np.array(converged), log_evidence=np.array(value), z=ends)
+
+        def climb(start: np.ndarray, amplitude: np.ndarray) -> Any:
+            assert amplitude.tolist() == list(np.repeat([5.0, 6.0], len(value) // 2))
+            return found
+
+        return SimpleNamespace(climb=climb)
+
+    blocks = [block([1.0, 9.0, 4.0, 3.0], [True, False, True, True]), block([10.0, 20.0], [True, False])]
+    starts = [np.zeros((4, 1)), np.zeros((2, 1))]
+    found = refit._climbed(blocks, 100.0, np.array([5.0, 6.0]), starts)
+    assert found.value.tolist() == [1.0 + 10.0 - 100.0, -np.inf]
+    assert [ends[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]

@@ -12,6 +12,8 @@ from wirebayes.discovery.held_out import HeldOut, gap_closed, last_third
 from wirebayes.discovery.shrinking import _compared, _Gain
 from wirebayes.effects import named
 from wirebayes.io.paper import experiments
+from wirebayes.model.problem import build
+from wirebayes.wire.staircase import simulate
 
 
 def held(squares: float, elpd: Any = (0.0, 0.0), floor: float = 1.0, inside: float = 0.9) -> HeldOut:
@@ -157,3 +159,53 @@ def test_too_few_holds_are_not_held_out(monkeypatch: pytest.MonkeyPatch) -> None
         ([], False, None)
     ] * 2
     assert [m["model"] for m in found[0].steps] == ["plain", "a"]
+
+
+def test_a_trained_model_predicts_by_what_it_is_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(held_out, "predicted", lambda *given: given)
+    trained = shrinking._Trained(("e",), [4], ("effect",), "block")  # type: ignore[arg-type]
+    assert shrinking._predicted(trained, "rng") == (("e",), [4], ("effect",), "block", "rng")  # type: ignore[arg-type, comparison-overlap]
+
+
+def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The root mean square of the readings of that experiment alone, at the best parameters; padding does not count."""
+    one, other = experiments()[1].train(4), experiments()[3].train(4)
+    values = {
+        "k1": 700.0,
+        "B": 0.21,
+        "U": 0.6,
+        "k2": 0.03,
+        "N": 0.7,
+        "preload": 0.4,
+        "sensor_sd": 0.01,
+        "setting_sd": 0.02,
+    }
+    problem = build([one, other])
+    best = np.array([values[name.split("[")[0]] for name in problem.names])
+    target = SimpleNamespace(problem=problem, coordinates=SimpleNamespace(to_natural=lambda z: z))
+    modes = SimpleNamespace(z=np.stack([best, 2.0 * best]))
+    block: Any = SimpleNamespace(target=target, modes=modes, names=[s.name for s in problem.samples])
+    theta = {name: np.array([value]) for name, value in values.items()}
+    for e in (one, other):
+        mask = e.protocol().mask
+        left = (e.tension() - simulate(e.protocol(), theta)[..., 0])[mask]
+        assert shrinking.left_over(block, e.name) == pytest.approx(np.sqrt((left**2).mean()))
+
+    asked: list[Any] = []
+
+    def fitted(*given: Any) -> Any:
+        asked.append(given)
+        return block
+
+    monkeypatch.setattr(shrinking, "fitted", fitted)
+    slip = replace(named("grip_slip@4"), test="another")  # type: ignore[type-var]
+    whole: Any = SimpleNamespace(effects=(slip, named("memory")), law="hooke", history="additive")
+    memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]
+    assert memory is whole.effects[1] and asked == [([other], (memory,), "hooke", "additive", "rng")]
+    assert smooth == shrinking.discrepancy(other, shrinking.left_over(block, other.name))
+
+
+def test_a_gain_is_reported_by_its_three_numbers() -> None:
+    assert _Gain(9.0, 1.0, 2.0).to_dict() == {
+        "elpd_difference": 9.0, "elpd_difference_se": 1.0, "flexible_elpd_difference": 2.0
+    }  # fmt: skip

@@ -197,3 +197,118 @@ def test_more_models_than_three_beside_the_final_one_are_not_listed() -> None:
     assert len(alternatives(*given, "named")) == 2  # type: ignore[arg-type]
     space.without = [0.0] * 6
     assert alternatives(*given, "named") == []  # type: ignore[arg-type]
+
+
+def stood(inclusion: float = 1.0, gain: float = 50.0, remainder: float = 0.0, nothing: float = 0.0, **more: Any) -> Any:
+    """A decision for one effect in the first of two materials."""
+    found = SimpleNamespace(
+        shares=[more.get("shares", {"a": 1.0}), {"a": 1.0}], inclusion={"a": np.full(2, inclusion)},
+        remainder=np.full(2, remainder), nothing=np.full(2, nothing),
+    )  # fmt: skip
+    best = SimpleNamespace(accepted=(Accepted("a", (0,), {}),))
+    return verdict.Decision(found, best, None, {"a": np.array([gain, 0.0])})  # type: ignore[arg-type]
+
+
+def test_at_a_threshold_exactly() -> None:
+    """Nine tenths establish, a gain of four does not; with even odds nothing is said to be missing or to remain."""
+    assert len(verdict.established(stood(inclusion=0.9), 0)) == 1 and not verdict.established(
+        stood(inclusion=0.8999), 0
+    )
+    assert not verdict.established(stood(gain=4.0), 0) and len(verdict.established(stood(gain=4.0001), 0)) == 1
+    assert verdict_of(stood(nothing=0.5), 0)[0] == "named"
+    assert verdict_of(stood(remainder=0.5), 0)[0] == "named" and verdict_of(stood(remainder=0.5001), 0)[0] == "partial"
+    assert verdict_of(stood(shares={}), 0) == ("nothing-missing", [])
+    assert verdict_of(stood(), 1) == ("unknown", [])  # the only effect acts in the other material
+    assert verdict_of(stood(remainder=0.9), 1) == ("unknown", [])
+
+
+def test_an_effect_that_gains_exactly_four_does_not_predict(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert names(decided(monkeypatch, explored({"a": 10.0, "ab": 30.0}), {"ab": 4.0}, {})) == "a"
+    # the only effect need not predict
+    assert names(decided(monkeypatch, explored({"a": 10.0}), {"a": -9.0}, {})) == "a"
+
+
+def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every block simulated with its probes and its patterns; their scans are what p and the findings come from."""
+    blocks: Any = [
+        SimpleNamespace(target=SimpleNamespace(problem=f"p{b}"), modes=SimpleNamespace(z=np.array([[b], [9]])),
+                        names=[f"n{b}", "m"])
+        for b in range(2)
+    ]  # fmt: skip
+    asked: list[Any] = []
+
+    def simulated(block: Any, trials: Any, n: int, rng: Any) -> Any:
+        asked.append((block, trials, n))
+        return SimpleNamespace(scan=f"null of {block.target.problem}")
+
+    def findings(listed: Any, first: int, data: Any, null: Any, where: str) -> Any:
+        return [listed, first, data, null, where]
+
+    def tested(candidates: Any, data: Any, nulls: Any) -> Any:
+        assert candidates == ["candidate"] and nulls == ["null of p0", "null of p1"]
+        return SimpleNamespace(p=0.3 if data == [("p0", 0, "p0 columns"), ("p1", 1, "p1 columns")] else None)
+
+    def expand(target: Any, z: Any, trials: Any, columns: Any) -> Any:
+        assert trials == ["t1", "t2"] and z.shape == (1, 1)
+        return target.problem, z[0, 0], columns
+
+    monkeypatch.setattr(verdict, "simulated_with_patterns", simulated)
+    monkeypatch.setattr(
+        verdict.residual_patterns, "patterns", lambda problem: (f"{problem} list", f"{problem} columns")
+    )
+    monkeypatch.setattr(verdict.residual_patterns, "findings", findings)
+    monkeypatch.setattr(verdict.screening, "global_test", tested)
+    monkeypatch.setattr(verdict, "expand", expand)
+    monkeypatch.setattr(verdict, "scan", lambda x: x)
+    best: Any = SimpleNamespace(blocks=blocks, scanned=(["t1", "t2"], ["candidate"], []))
+    found = verdict._retested(best, Settings(), np.random.default_rng(0), map)
+    assert asked == [(block, ["t1", "t2"], 299) for block in blocks] and found.p == 0.3
+    assert found.where == [
+        [f"p{b} list", 2, (f"p{b}", b, f"p{b} columns"), f"null of p{b}", f"n{b}, m"] for b in range(2)
+    ]  # fmt: skip
+
+
+def test_a_remainder_that_fails_the_test_may_leave_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the smooth curve does not need the name, the remainder alone becomes the most probable."""
+    sets = explored({"a": 20.0}, smooth=19.0)
+    found = decided(monkeypatch, sets, {}, {"a": 1e-6})
+    assert found.best is None and found.retest is not None and found.retest.p == 1e-6 and found.gains == {}
+    assert verdict_of(found, 0) == ("unknown", [])
+
+
+def test_where_every_set_fails_to_predict_the_remainder_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = decided(monkeypatch, explored({"ab": 30.0, "ac": 29.0}), {"ab": 1.0, "ac": 1.0}, {})
+    assert found.best is None and found.retest is None and found.posterior.best.names == ()
+
+
+def alternative_models(**weights: tuple[float, float]) -> tuple[Any, Any, dict[str, Any]]:
+    sets = [EffectSet(tuple(names), 0.0, {}, np.zeros(1) if names == "b" else None) for names in weights]
+    block = {n: SimpleNamespace(effects=[SimpleNamespace(key=key) for key in n]) for n in weights}
+    space: Any = SimpleNamespace(
+        sets=sets, without=[w[0] for w in weights.values()], beside=[w[1] for w in weights.values()]
+    )
+    known: Any = SimpleNamespace(fitted={s.key: SimpleNamespace(blocks=[None, block["".join(s.names)]]) for s in sets})
+    return SimpleNamespace(posterior=space), known, block
+
+
+def test_a_remainder_that_is_in_another_material_does_not_remain_here() -> None:
+    """Of the weight beside b as much as the remainder is probable in this material: a half, alone, of even odds."""
+    decision, known, block = alternative_models(a=(0.4, 0.0), b=(0.2, 0.4))
+    known.fitted[frozenset("b")].effects = None
+    subsets = {"b": 0.25}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verdict, "over_subsets", lambda remainder: (0.0, np.array([9.0, subsets["b"]]), []))
+        found = verdict.alternatives(decision, known, 1, block["a"], "named")
+    shares = [(a.block.effects[0].key, a.remains, a.probability) for a in found]
+    assert [s[:2] for s in shares] == [("a", False), ("b", False), ("b", True)]
+    assert [s[2] for s in shares] == pytest.approx([0.4, 0.2 + 0.4 * 0.75, 0.4 * 0.25])
+
+
+def test_sets_that_are_one_model_in_this_material_add_up_and_the_final_one_may_be_none_of_them() -> None:
+    decision, known, block = alternative_models(ab=(0.3, 0.0), ba=(0.2, 0.0), c=(0.5, 0.0))
+    known.fitted[frozenset("ab")].blocks[1] = block["ab"]
+    found = verdict.alternatives(decision, known, 1, block["c"], "named")
+    assert [round(a.probability, 9) for a in found] == [0.5, 0.5]
+    other: Any = SimpleNamespace(effects=[SimpleNamespace(key="z")])
+    found = verdict.alternatives(decision, known, 1, other, "named")
+    assert found[0].block is other and found[0].probability == 0.0 and not found[0].remains
