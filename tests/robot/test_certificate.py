@@ -1,9 +1,12 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import rotation, schema
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, forward
+from wirebayes.robot.proof import certificate
 from wirebayes.robot.proof.certificate import certify
 from wirebayes.robot.proof.enclosure import enclose
 
@@ -116,3 +119,71 @@ def test_lengths_that_change_together_are_enclosed_piece_by_piece(name):
     assert (found.max(0) <= box.high_m).all()
     assert (box.high_m - box.low_m).max() < 2 * np.ptp(found, axis=0).max()
     assert not enclose(robot, "hooke", k1, zero, longer, offset, x, R, most=1).proved
+
+
+def test_the_box_without_a_second_equilibrium_is_the_enclosure_itself_where_nobody_asks():
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    known = np.full(robot.legs, k1)
+    given = robot, "hooke", (known, known), (zero, zero), offset, x, R
+    quick, whole = certify(*given, how_alone=False), certify(*given)
+    assert quick.proved and quick.unique_m == quick.radius_m.min() and quick.centre_m is x and quick.rotation is R
+    np.testing.assert_array_equal(quick.radius_m, whole.radius_m)
+    # boxes are tried from a ten-millionth of the robot's size on, each half as wide again
+    times = np.log(whole.unique_m / (1e-7 * robot.span_m)) / np.log(1.5)
+    assert times > 5 and times == pytest.approx(round(times), abs=1e-6)
+
+
+def test_what_was_not_proved_has_no_size():
+    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
+    known = np.full(robot.legs, k1)
+    proof = certify(robot, "hooke", (known, known), (zero + 1, zero + 1), offset, x, R)
+    assert (proof.proved, proof.unique_m) == (False, 0.0) and proof.centre_m is x and proof.rotation is R
+    assert proof.radius_m.shape == (robot.degrees,) and np.isnan(proof.radius_m).all()
+
+
+class Image:
+    """Krawczyk's images as they are written down, one after the other; how large the boxes were."""
+
+    def __init__(self, monkeypatch, *factors):
+        self.boxes, self.factors = [], list(factors)
+        system = SimpleNamespace(middle_slope=lambda: np.eye(3))
+        monkeypatch.setattr(certificate, "Balance", lambda *given: system)
+        monkeypatch.setattr(certificate, "_krawczyk", self)
+
+    def __call__(self, system, C, radius):
+        self.boxes.append(radius.copy())
+        factor = self.factors.pop(0) if len(self.factors) > 1 else self.factors[0]
+        return factor(radius) if callable(factor) else factor * radius
+
+
+def test_a_box_grows_until_its_image_lies_within_and_then_shrinks(monkeypatch):
+    robot = schema.read("hangprinter-4")
+    first = 1e-10 * robot.span_m
+    images = Image(monkeypatch, 10.0, 2.0, 0.9, 0.8, 1.5, 0.5)
+    proof = certify(robot, "hooke", None, None, None, "x", "R", how_alone=False)
+    grown = first * 1.2 * 10.0 * 1.2 * 2.0
+    sizes = [first, first * 12.0, grown, grown, 0.8 * grown, 0.8 * grown]
+    np.testing.assert_allclose([box[0] for box in images.boxes], sizes)
+    np.testing.assert_allclose(proof.radius_m, 0.4 * grown)
+
+
+def test_a_box_must_hold_its_image_in_every_direction(monkeypatch):
+    robot = schema.read("hangprinter-4")
+    narrow = lambda radius: radius * np.array([0.5, 0.5, 1.01])  # noqa: E731
+    images = Image(monkeypatch, narrow, narrow, 0.5)
+    assert certify(robot, "hooke", None, None, None, "x", "R", how_alone=False).proved
+    first = 1e-10 * robot.span_m
+    np.testing.assert_allclose(images.boxes[1], 1.2 * first * np.array([0.5, 0.5, 1.01]))
+    assert len(images.boxes) == 3 + 3
+
+
+def test_a_box_that_keeps_growing_is_given_up(monkeypatch):
+    """After forty images, or once it is as wide as the robot in any direction."""
+    robot = schema.read("hangprinter-4")
+    images = Image(monkeypatch, 1.0)
+    assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 40
+    images = Image(monkeypatch, 1e5)
+    assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 2
+    sideways = lambda radius: radius * np.array([0.5, 0.5, 1e12])  # noqa: E731
+    images = Image(monkeypatch, sideways)
+    assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 1

@@ -159,3 +159,97 @@ def test_strains_along_the_linear_answer_are_enclosed_and_what_cancels_does(name
         ball = module._strain(middle, wide, i, wide.strand(i, box.whole), box, generators[1][i])
         assert float(ball.lower()) <= strain[i].min() and strain[i].max() <= float(ball.upper())
         assert float(ball.upper() - ball.lower()) < 1.2 * np.ptp(strain[i])
+
+
+def proved(beside, line=None, turned=None):
+    """A proof about the origin; the linear answer to two parameters."""
+    d = len(beside)
+    line = np.zeros((d, 2)) if line is None else line
+    R = np.eye(3) if turned is None else turned
+    return module.Reach(True, np.array([1.0, 2.0, 3.0]), R, np.ones(d), np.array(beside), line)
+
+
+def test_a_pose_within_the_proof_is_the_equilibrium_that_was_proved():
+    """Beside the linear answer to the parameters, no farther than was proved, with what is not known of the pose."""
+    none = np.zeros(2)
+    proof = proved([0.5, 0.25, 0.125])
+    for k, far in enumerate((0.5, 0.25, 0.125)):
+        for side in (1.0, -1.0):
+            way = side * np.eye(3)[k]
+            assert proof.holds([1.0, 2.0, 3.0] + far * way, np.eye(3), none, 1.0, 0.0)  # to the bound itself
+            assert not proof.holds([1.0, 2.0, 3.0] + 1.01 * far * way, np.eye(3), none, 1.0, 0.0)
+            assert not proof.holds([1.0, 2.0, 3.0] + far * way, np.eye(3), none, 1.0, 0.01)
+            assert proof.holds(
+                [1.0, 2.0, 3.0] + 0.5 * far * way, np.eye(3), none, 1.0, 0.5 * np.array([0.5, 0.25, 0.125])
+            )
+    line = np.array([[1.0, 0.0], [0.0, -2.0], [0.5, 0.0]])
+    p = np.array([0.5, -0.25])
+    at = np.array([1.0, 2.0, 3.0]) + line @ p
+    assert proved([1e-9] * 3, line).holds(at, np.eye(3), p, 1.0, 0.0)
+    assert not proved([1e-9] * 3, line).holds(at, np.eye(3), -p, 1.0, 0.0)
+    unproved = module.Reach(
+        False, *(getattr(proof, n) for n in ("centre_m", "rotation", "radius_m", "beside_m", "line_m"))
+    )
+    assert not unproved.holds(np.array([1.0, 2.0, 3.0]), np.eye(3), none, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1e-3, 0.0])
+def test_a_turn_counts_by_twice_the_tangent_of_its_half(angle):
+    """Against the turn that was proved, times the platform's size."""
+    base = rotation.matrix(np.array([0.4, -0.2, 0.1]))
+    turn = rotation.matrix(angle * np.array([0.0, 0.6, 0.8])) @ base
+    far = 0.7 * 2.0 * np.tan(0.5 * angle) * np.array([0.0, 0.6, 0.8])
+    x, none = np.array([1.0, 2.0, 3.0]), np.zeros(2)
+    for part, held in ((1.001, True), (0.999, angle == 0.0)):
+        beside = np.concatenate([np.full(3, 1e-12), part * far + 1e-12])
+        assert proved(beside, turned=base).holds(x, turn, none, 0.7, 0.0) is held
+
+
+def test_wires_that_vary_apart_have_a_parameter_each_for_stiffness_and_length():
+    G, H = apart(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
+    assert G.tolist() == [[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]]
+    assert H.tolist() == [[0.0, 0.0, 3.0, 0.0], [0.0, 0.0, 0.0, 4.0]]
+
+
+def test_bounds_hold_every_sum_of_the_generators():
+    """To the outside of what rounding may add, and hardly more."""
+    middle, generators = np.array([0.1, 7.0]), np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
+    low, high = module._bounds(middle, generators)
+    assert (low < middle - [0.6, 0.0]).all() and (high > middle + [0.6, 0.0]).all()
+    np.testing.assert_allclose([low, high], [[-0.5, 7.0], [0.7, 7.0]], rtol=1e-11)
+
+
+@pytest.mark.parametrize(("stiff", "long"), [(1.001, 0.1), (0.1, 1.001), (1.0, 0.1), (0.1, 1.0)])
+def test_wires_that_might_have_no_stiffness_or_no_length_are_refused_at_once(stiff, long, monkeypatch):
+    """One of them is enough, though the others are sound; nothing is computed."""
+    robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke")
+
+    def none(*given):
+        raise AssertionError("computed")
+
+    monkeypatch.setattr(module, "Balance", none)
+    half_k1, half_zero = 0.1 * k1, 0.1 * zero
+    half_k1[2], half_zero[1] = stiff * k1[2], long * zero[1]
+    got = reach(robot, "hooke", k1, zero, apart(half_k1, half_zero), offset, x, R)
+    assert not got.proved and got.centre_m is x and got.rotation is R and got.line_m.shape == (3, 8)
+
+
+def test_a_platform_free_to_move_has_no_proof():
+    robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke")
+    got = reach(robot, "hooke", k1, zero + 5.0, apart(1e-6 * k1, 1e-6 * zero), offset, x, R)
+    assert not got.proved and np.isnan(got.radius_m).all()
+
+
+def test_the_linear_answer_is_the_slope_of_the_pose():
+    """By each wire's stiffness and length, against differences of solutions."""
+    robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke")
+    w = robot.legs
+    half = np.concatenate([1e-5 * k1, 1e-6 * zero])
+    middle = Balance(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
+    line = module._linear_answer(middle, np.linalg.inv(middle.middle_slope()), apart(half[:w], half[w:]))
+    values = np.concatenate([k1, zero]) + np.vstack([np.diag(half), -np.diag(half)])
+    found = _poses(robot, "hooke", values[:, :w], values[:, w:], offset, x, R)
+    turn = robot.size_m * rotation.vector(found.rotation @ R.T)
+    moved = np.concatenate([found.position_m - x, turn], axis=1)
+    slope = 0.5 * (moved[: 2 * w] - moved[2 * w :])
+    np.testing.assert_allclose(line.T, slope, atol=1e-3 * np.abs(slope).max())

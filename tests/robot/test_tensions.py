@@ -92,3 +92,38 @@ def test_a_users_own_choice_is_used():
     x, R = robot.home_m[None], np.eye(3)[None]
     stiffer = inverse.tensions(robot, x, R, choice=lambda s, w, lo, hi: tensions.minimum_norm(s, w, 5.85, hi))
     assert np.nanmin(stiffer) >= 5.85 - 1e-9 > inverse.tensions(robot, x, R).min()
+
+
+def test_tensions_exactly_at_a_bound_are_within():
+    """Of two wires the load decides the first, and the second is free: both at the lowest, or at the highest."""
+    structure = np.array([[1.0, 0.0]])
+    for low, high in ((2.0, 9.0), (0.0, 2.0), (2.0, 2.0)):
+        tau = tensions.nearest(np.array([7.0, 2.0]), structure, np.array([2.0]), low, high)
+        np.testing.assert_array_equal(tau, [2.0, 2.0])
+    # a hair outside they come back to the bound
+    tau = tensions.nearest(np.array([7.0, 2.0]), structure, np.array([2.0]), 0.0, 2.0)
+    np.testing.assert_array_equal(tau, [2.0, 2.0])
+    np.testing.assert_allclose(tensions.nearest(np.array([7.0, 5.0]), structure, np.array([2.0]), 1.0, 3.0), [2.0, 3.0])
+    np.testing.assert_allclose(tensions.nearest(np.array([7.0, 0.0]), structure, np.array([2.0]), 1.0, 3.0), [2.0, 1.0])
+
+
+@pytest.mark.parametrize("unit", [2.0**-20, 1.0, 2.0**20])
+def test_without_a_load_wires_pull_against_each_other(unit):
+    """As near to the reference as their balance allows, whatever the unit of force."""
+    structure, none = np.array([[1.0, -1.0]]), np.zeros(1)
+    tau = tensions.nearest(unit * np.array([3.0, 1.0]), structure, none, 0.0, unit * 9.0)
+    np.testing.assert_allclose(tau, unit * np.array([2.0, 2.0]), rtol=1e-12)
+    np.testing.assert_allclose(
+        tensions.nearest(np.zeros(2), structure, none, unit, unit * 9.0), [unit, unit], rtol=1e-9
+    )
+    np.testing.assert_allclose(tensions.minimum_norm(structure, none, unit, unit * 9.0), [unit, unit], rtol=1e-9)
+    np.testing.assert_allclose(tensions.middle(structure, none, unit, unit * 9.0), [unit * 5.0] * 2, rtol=1e-9)
+    assert tensions.nearest(np.zeros(2), np.array([[1.0, 1.0]]), none, unit, unit * 9.0) is None
+
+
+def test_bounds_that_no_tensions_reach_are_refused_and_those_they_touch_are_not():
+    """Ten newtons on two wires, at least five each: only five and five will do, and 5.1 each will not."""
+    structure, load = np.ones((1, 2)), np.array([10.0])
+    np.testing.assert_allclose(tensions.nearest(np.array([9.0, 1.0]), structure, load, 5.0, 9.0), [5.0, 5.0], atol=1e-6)
+    assert tensions.nearest(np.array([9.0, 1.0]), structure, load, 5.1, 9.0) is None
+    assert tensions.nearest(np.array([9.0, 1.0]), structure, load, 0.0, 4.9) is None
