@@ -234,3 +234,38 @@ def test_absurd_parameters_are_not_likely():
         with np.errstate(all="ignore"):
             found = filtered(LOADING, theta, y).log_likelihood.sum()
         assert not found > sensible
+
+
+@pytest.mark.parametrize("key", [None, "toe"])
+def test_the_jacobian_is_the_derivative_of_every_reading_by_every_setting_error(key):
+    """Against a complex step through all that follows."""
+    model = Model(effects=(named(key),) if key else (), tension_ref_N=2.0)
+    theta = PLAIN | ERRORS | STRONG
+    found = likelihoods.jacobian(linearise(LOADING, columns(theta), model))
+    expected = jacobian(LOADING, theta, model)[1]
+    assert found.shape == (6, 4, 6, 1)
+    assert found[LOADING.mask][..., 0] == pytest.approx(expected[LOADING.mask], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("times", [1.0, 0.99, 1.01])
+def test_residuals_that_are_absurd_say_nothing_of_the_holds_before(times):
+    """From a sum of squares of 1e13 variances on, which rounds to more than a few hundredths of a nat."""
+    theta = PLAIN | {"sensor_sd": 1.0, "setting_sd": 1e-9}
+    p = protocol([1.0, 2.0, 4.0], [TIMES] * 3)
+    line = linearise(p, columns(theta))
+    y = line.tension.copy()
+    y[1, 2] += 1e6 * times
+    y[2, 1] += 3e6 * times
+    noise = np.ones(1), np.array([1e-9])
+    filtered = likelihoods.chain(line, y, p.mask, *noise)
+    found = likelihoods.without_each_hold(line, filtered, y, p.mask, *noise)[:, 0]
+    assert np.isfinite(found).tolist() == [times < 1.0, True, True]
+
+
+def test_a_hold_of_one_reading_says_nothing_of_itself_beside_others():
+    """Its first reading is given; so it is for a hold whose first reading alone was taken."""
+    theta = PLAIN | {"sensor_sd": 0.01}
+    p = protocol([5.0, 3.0], [TIMES, [20.0]])
+    y = measured(p, theta | {"setting_sd": 0.0})
+    found = by_hold(p, theta, y)
+    assert found[0] != 0.0 and found[1] == 0.0

@@ -269,3 +269,10 @@ def test_a_ridge_names_all_who_are_on_it_but_itself() -> None:
         "k1: the data determine it; its 90 % range is 1.5, the prior's 20; it is correlated with B (r = -0.95) and "
         "U (r = +0.99), and their combination is known better."
     )
+
+
+def test_no_more_than_four_thousand_draws_are_looked_at_evenly() -> None:
+    rows = np.arange(9001.0)[:, None]
+    some = module._thinned(rows)[:, 0]
+    assert len(some) == 4000 and (some[0], some[-1]) == (0.0, 9000.0) and set(np.diff(some)) == {2.0, 3.0}
+    assert np.array_equal(module._thinned(rows[:7]), rows[:7])

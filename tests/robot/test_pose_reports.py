@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import draws, schema
-from wirebayes.robot.motion import claim, control, drift
+from wirebayes.robot.motion import claim, control, drift, forward
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.drift import Course, Falls
 from wirebayes.robot.pose import answer, controllers, stability
 from wirebayes.robot.pose.request import PoseRequest, band
 
 NEVER, NAN = np.inf, np.nan
-TIMES = np.array([0.0, 10.0, 60.0])
+TIMES = np.array([0.0, 10.0, 30.0, 60.0])
 
 
 def course(falls: Falls | None, legs: int = 3) -> Course:
     n = 0 if falls is None else len(falls.time_s)
-    return Course(TIMES, np.zeros((n, 3, 3)), np.zeros((n, 3, 3, 3)), np.ones((n, 3, legs)), None, None, falls)  # type: ignore[arg-type]
+    at = np.zeros((n, 4, 3)), np.zeros((n, 4, 3, 3)), np.ones((n, 4, legs))
+    return Course(TIMES, *at, None, None, falls)  # type: ignore[arg-type]
 
 
 # Five draws: two fall (one is caught), two hold, one never began.
@@ -37,7 +38,7 @@ def test_falls_are_shares_of_the_draws_that_began() -> None:
     found = stability.summary(course(FIVE))
     assert found["began"] == pytest.approx(0.8)
     assert found["fall_probability"] == 0.5
-    assert found["fall_probability_at"].tolist() == [0.0, 0.25, 0.5]
+    assert found["fall_probability_at"].tolist() == [0.0, 0.25, 0.5, 0.5]  # a fall at the time itself has happened
     assert found["fall_time_s"] == {"first": 5.0, "median": 17.5, "last": 30.0}
     assert found["fall_wires"].tolist() == [0.0, 0.5, 0.0]
     assert found["fall_distance_mm"] == {"first": 20.0, "median": 20.0, "last": 20.0}
@@ -212,7 +213,7 @@ def test_a_controller_without_creep_is_off_by_the_drift_of_its_command(hung: Any
     course = drift.from_command(robot, draws.for_robot(robot, one), request.position_m, request.rotation, TIMES)
     away_mm = 1e3 * np.linalg.norm(course.position_m[0] - request.position_m, axis=-1)
     assert (found["specimen_spread"], found["controller"], found["solved"]) == (0.0, "hooke_only", 1.0)
-    assert found["distance_mm"]["mean"] == pytest.approx(away_mm[[0, 2]], rel=1e-4, abs=1e-6) and away_mm[2] > 0.1
+    assert found["distance_mm"]["mean"] == pytest.approx(away_mm[[0, 3]], rel=1e-4, abs=1e-6) and away_mm[3] > 0.1
     # one draw is enough for the time between calibrations too
     rows = controllers.between_calibrations(robot, one, request, np.random.default_rng(1))
     assert [row["solved"] for row in rows] == [1.0] * 8
@@ -248,3 +249,162 @@ def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, 
     assert [row["sd_mm"] for row in found["sd_mm"]] == pytest.approx([sd, 1.1 * sd])
     lost = {0.0: courses[0.0], 0.1: at(np.full(40, NAN), np.zeros(40))}
     assert answer._shares(line, lost, np.zeros(3), np.eye(3))["sd_mm"][1]["sd_mm"] is None
+
+
+def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:
+    """Nothing catches it; no wire is slack but one may be; and it has begun in every draw."""
+    n = 4
+    fallen = Falls(
+        np.array([20.0, 40.0, 40.0, NEVER]), np.array([2, 2, 0, -1]), np.full(n, NEVER), np.full((n, 3), NEVER),
+        np.tile([0.9, 0.8, 0.1], (n, 1)), np.array([0.1, 0.1, 0.1, 0.5]),
+    )  # fmt: skip
+    found = stability.summary(course(fallen))
+    assert found["began"] == 1.0 and found["fall_probability"] == 0.75 and found["caught_probability"] == 0.0
+    assert found["fall_wires"].tolist() == [0.25, 0.0, 0.5] and found["fall_distance_mm"] is None
+    assert found["least_tension_wire"] == 3 and found["slack_time_s"] == [None] * 3
+    assert found["stiffness_share"]["mean"] == 0.5 and found["least_tension_share"]["mean"] == pytest.approx(0.1)
+    assert stability.warnings(course(fallen), 0.0) == [
+        "the platform falls in 75 % of the draws within 60 s (specimens alike), first after 20 s, in the median after "
+        "40 s, wire 3 giving way; nothing catches it nearby",
+        "wire 3 may keep only 10 % of its tension within 60 s (specimens alike)",
+    ]
+
+
+def test_wires_that_only_slacken_are_named_and_the_nearest_is_not_named_again() -> None:
+    n = 4
+    slack = np.full((n, 3), NEVER)
+    slack[0, 1] = 7.5
+    loose = Falls(
+        np.full(n, NEVER), np.full(n, -1), np.zeros(n), slack, np.tile([0.9, 0.1, 0.8], (n, 1)), np.full(n, 0.2)
+    )
+    assert stability.warnings(course(loose), 0.05) == [
+        "wires go slack within 60 s (specimens differing by 5 %): wire 2 in 25 % of the draws, first after 7.5 s",
+        "the stiffness against the softest motion may fall to 20 % within 60 s (specimens differing by 5 %)",
+    ]
+
+
+def test_a_platform_that_always_falls_has_no_margin_left() -> None:
+    n = 2
+    gone = Falls(
+        np.full(n, 5.0), np.zeros(n, int), np.full(n, 0.1), np.full((n, 3), NEVER), np.ones((n, 3)), np.ones(n)
+    )
+    found = stability.summary(course(gone))
+    assert found["fall_probability"] == 1.0 and found["least_tension_share"]["mean"] is None
+    assert found["stiffness_share"]["mean"] is None and len(stability.warnings(course(gone), 0.0)) == 1
+
+
+def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From beside the pose, by a hundredth of the platform's size; stiffness is that of the draws that can hold it."""
+    robot: Any = SimpleNamespace(size_m=0.5)
+    x, R = np.array([1.0, 2.0, 3.0]), np.eye(3)
+    commands: Any = SimpleNamespace(
+        zero_m=np.ones((4, 3)), offset_m=np.zeros((4, 3)), feasible=np.array([True, True, False, True]),
+        tension_N=np.array([[0.0, 5.0, -1.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]),
+    )  # fmt: skip
+    status = np.array([forward.FOUND, forward.FOUND, forward.NOT_CONVERGED, forward.NOT_HELD])
+    back: Any = SimpleNamespace(
+        found=status == forward.FOUND, status=status,
+        position_m=x + np.array([[1e-9, 0.0, 0.0], [0.0, 0.0, -3e-9], [9.0] * 3, [9.0] * 3]),
+    )  # fmt: skip
+
+    def solve(used: Any, wires: Any, zero: Any, offset: Any, start: Any, turn: Any) -> Any:
+        assert zero is commands.zero_m and offset is commands.offset_m and turn is R
+        assert start == pytest.approx(x + 0.005)
+        return back
+
+    def stiffness(used: Any, wires: Any, pose: Any, lengths: Any) -> Any:
+        assert np.array_equal(pose[0], np.tile(x, (4, 1))) and pose[1].shape == (4, 3, 3)
+        assert lengths == (commands.zero_m, commands.offset_m)
+        return np.array([10.0, 20.0, 99.0, 60.0])
+
+    monkeypatch.setattr(answer.forward, "solve", solve)
+    monkeypatch.setattr(answer.path, "lowest_stiffness", stiffness)
+    found = answer._round_trip(robot, None, commands, x, R)  # type: ignore[arg-type]
+    assert found["solved"] == 0.5 and found["largest_round_trip_error_m"] == pytest.approx(3e-9)
+    assert found["slack_wires"] == 2 and found["lowest_stiffness_N_m"]["mean"] == 30.0
+    assert found["statuses"] == {
+        "stable equilibrium": 2, "not converged": 1, forward.STATUS[forward.NO_EQUILIBRIUM]: 0,
+        forward.STATUS[forward.NOT_HELD]: 1, forward.STATUS[forward.FELL]: 0,
+    }  # fmt: skip
+    back.found = np.zeros(4, bool)
+    assert answer._round_trip(robot, None, commands, x, R)["largest_round_trip_error_m"] == 0.0  # type: ignore[arg-type]
+
+
+def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a millionth of the robot's size; where no stable pose is the commanded one, it is listed as unstable."""
+    robot, line, _ = hung
+    wires = draws.for_robot(robot, line)
+    x, R, near = robot.home_m, np.eye(3), 1e-6 * robot.span_m
+    rng = np.random.default_rng(0)
+    found = answer._all_equilibria(robot, wires, x, R, rng)
+    assert found["commanded_stable"] and found["starts"] == 65 and found["stable_found"] == len(found["poses"]) >= 1
+    assert [pose["commanded"] for pose in found["poses"]].count(True) == 1
+    assert all(pose["stable"] and pose["slack_wires"] == 0 for pose in found["poses"] if pose["commanded"])
+
+    def others(*given: Any, known: Any) -> forward.Equilibria:
+        assert known[0] is x and known[1] is R
+        away = np.array([[1.1 * near, 0.0, 0.0], [0.0, 0.9 * near, 0.0], [1.0, 0.0, 0.0]])[rows]
+        n, tension = len(away), np.array([[1.0, 0.0, -0.5, 2.0]] * 3)[rows]
+        return forward.Equilibria(
+            x + away, np.tile(R, (n, 1, 1)), tension, np.zeros(n, int), np.zeros(n, int), np.zeros(n)
+        )
+
+    monkeypatch.setattr(answer.forward, "equilibria", others)
+    rows = [0, 1, 2]
+    found = answer._all_equilibria(robot, wires, x, R, rng)
+    assert [pose["commanded"] for pose in found["poses"]] == [False, True, False] and found["stable_found"] == 3
+    assert [pose["slack_wires"] for pose in found["poses"]] == [2, 2, 2]
+    rows = [0, 2]
+    found = answer._all_equilibria(robot, wires, x, R, rng)
+    assert found["stable_found"] == 2 and len(found["poses"]) == 3
+    last = found["poses"][2]
+    assert last["position_m"] is x and last["commanded"] and not last["stable"] and last["slack_wires"] == 0
+    assert np.array_equal(last["rotation_vector_rad"], np.zeros(3))
+    for shift, stable in ((0.9, True), (1.1, False)):
+        here = SimpleNamespace(found=np.array([True]), position_m=x[None] - [0.0, 0.0, shift * near])
+        monkeypatch.setattr(answer.forward, "solve", lambda *given, here=here: here)
+        assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is stable
+    here = SimpleNamespace(found=np.array([False]), position_m=x[None])
+    monkeypatch.setattr(answer.forward, "solve", lambda *given: here)
+    assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is False
+    weak: Any = SimpleNamespace(feasible=np.array([False]), zero_m=[0], offset_m=[0])
+    monkeypatch.setattr(answer.inverse, "commands", lambda *given: weak)
+    assert answer._all_equilibria(robot, wires, x, R, rng) == {
+        "stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []
+    }  # fmt: skip
+
+
+def test_a_drift_is_told_in_millimetres_and_degrees_of_the_draws_that_are_found() -> None:
+    """Two draws that move along x and turn about y; one that is lost has no place."""
+    distance, turn = np.array([1e-3, 3e-3, 5.0]), np.array([0.01, 0.03, 1.0])
+    one = at(distance, turn)
+    held: Any = Course(one.times_s, one.position_m, one.rotation, np.ones((3, 2, 4)) * 7.0,
+                       np.array([[0, 0], [0, 0], [0, 1]]), None)  # type: ignore[arg-type]  # fmt: skip
+    found = answer._drift(held, np.zeros(3), np.eye(3))
+    assert found["solved"] == pytest.approx(2 / 3) and found["times_s"].tolist() == [0.0, 60.0]
+    assert found["displacement_mm"]["mean"].tolist() == [[0.0] * 3, [2.0, 0.0, 0.0]]
+    assert found["distance_mm"]["q50"].tolist() == [0.0, 2.0] and found["distance_mm"]["sd"][1] == pytest.approx(1.0)
+    for name in ("tilt_deg", "from_vertical_deg", "rotation_deg"):
+        assert found[name]["mean"].shape == (2,)
+    assert found["tension_N"]["mean"].tolist() == [[7.0] * 4] * 2
+
+
+def test_a_pose_that_no_tensions_hold_is_answered_with_the_reason(hung: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, line, request = hung
+    far = PoseRequest(np.array([50.0, 0.0, 1.0]), np.eye(3), request.times_s)
+    found = answer.answer(robot, line, far)
+    assert found.content["feasible"] is False and found.courses == {} and found.maps == ()
+    assert found.content["sentence"] == "No tensions within the bounds hold the platform at this pose."
+    assert found.content["pose"]["position_m"] is far.position_m and "inverse" not in found.content
+    assert found.content["tension_distribution"]["lowest_N"] == robot.rule.lowest_N
+    monkeypatch.setattr(answer.statics.Geometry, "clear", property(lambda shape: np.array([False])))
+    inside = answer.answer(robot, line, far).content["sentence"]
+    assert inside == "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
+
+
+def test_an_emptied_drum_is_named_with_its_wire(monkeypatch: pytest.MonkeyPatch) -> None:
+    known: Any = SimpleNamespace(wire_m=np.array([5.0, 7.5, 9.0]))
+    monkeypatch.setattr(answer.drums, "emptied", lambda drums, joint: [1])
+    assert answer._emptied(known, np.zeros((2, 3))) == [
+        "wire 2 is longer here than its drum's wire_length_m, 7.5 m"
+    ]  # fmt: skip

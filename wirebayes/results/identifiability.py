@@ -41,8 +41,7 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     """
     problem = fitted.problem
     prior, names = problem.prior, problem.names
-    flat = fitted.flat
-    theta = flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)]
+    theta = _thinned(fitted.flat)
     positive = np.array([name in prior.logarithmic for name in names])
     z = np.where(positive, np.log(np.where(positive, theta, 1.0)), theta)
     own_prior = log_priors(fitted, theta)
@@ -66,6 +65,11 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
         }
         out[name] = {**figures, "sentence": in_words(name, figures)}
     return out
+
+
+def _thinned(flat: Array) -> Array:
+    """At most `_DRAWS` rows, evenly spread."""
+    return np.asarray(flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)])
 
 
 def in_words(name: str, figures: IdentifiabilityFigures) -> str:
@@ -193,8 +197,7 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
     """
     problem = fitted.problem
     here = problem.samples[sample]
-    flat = fitted.flat
-    theta = flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)]
+    theta = _thinned(fitted.flat)
     # the prior to the power of a half: weights are its inverse root
     log_weight, k = _statistics.psislw(0.5 * log_priors(fitted, theta).sum(axis=1))
     weight = np.exp(log_weight - log_weight.max())

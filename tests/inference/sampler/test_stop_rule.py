@@ -288,3 +288,10 @@ def test_autocorrelation_and_r_hat_are_ratios_of_variances_with_their_divisors()
     within = np.mean([np.var(own[e], ddof=1) + np.mean([np.var(values[e, :, w, 0], ddof=1) for w in range(2)])
                       for e in range(3)])  # fmt: skip
     assert nested_r_hat(values) == pytest.approx([np.sqrt(1.0 + between / within)])
+
+
+def test_draws_that_are_not_enough_overlook_nothing() -> None:
+    """What was overlooked at an earlier look does not make a later one doubtful."""
+    for policy in ({"ess": 1e6}, {"ess": 1e6, "most_steps": 64}):
+        assert looked(draws(64), overlooked=9.0, **policy)[0].learned.overlooked == 0.0
+    assert looked(draws(64), overlooked=9.0)[0].learned.overlooked == 9.0
