@@ -7,7 +7,7 @@ import pytest
 
 from tests.statistical.targets import gaussian
 from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
-from wirebayes.inference.policy import Policy
+from wirebayes.inference.policy import Policy, describe
 from wirebayes.inference.sampler import burn_in, ensemble, kept, stop_rule
 from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.mixture import Mixture
@@ -295,3 +295,50 @@ def test_draws_that_are_not_enough_overlook_nothing() -> None:
     for policy in ({"ess": 1e6}, {"ess": 1e6, "most_steps": 64}):
         assert looked(draws(64), overlooked=9.0, **policy)[0].learned.overlooked == 0.0
     assert looked(draws(64), overlooked=9.0)[0].learned.overlooked == 9.0
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_a_run_goes_from_burn_in_to_kept_draws_until_it_is_finished(
+    stored: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Back to burn-in where the rule asks for it; every state is saved, and a stored one gone on from."""
+    policy = Policy(ensembles=2, walkers=2, ess=1000.0, rounds=2)
+    z = np.arange(24.0).reshape(3, 4, 2)
+    about = Diagnostics(np.array([2.0, 3.0]), np.array([500.0, 700.0]), np.array([1.0, 1.1]))
+    learned = Learned(None, None, 3, trusted=False)  # type: ignore[arg-type]
+    begun = BurnIn(None, learned, None, 5, 0)  # type: ignore[arg-type]
+    walking = Sampling(None, learned, None, 70, Kept((z,), (z[..., 0],), 40, 9, 12), about)  # type: ignore[arg-type]
+    done = replace(walking, finished=True, converged=True, why="enough", evaluations=90)
+    ways = {"burn": iter([replace(begun, round=1), walking, walking]), "keep": iter([replace(begun, round=2), done])}
+    saved: list[tuple[object, object, object]] = []
+    told: list[float] = []
+    fits: list[object] = []
+
+    def load(path: object, of_fit: object) -> object:
+        fits.append(of_fit)
+        return begun if stored else None
+
+    def init(*given: object) -> BurnIn:
+        assert not stored and given == (target, 7, policy, "found", "near", "rough")
+        return begun
+
+    monkeypatch.setattr(ensemble.resume, "load", load)
+    monkeypatch.setattr(ensemble.resume, "save", lambda state, path, of_fit: saved.append((state, path, of_fit)))
+    monkeypatch.setattr(burn_in, "init", init)
+    monkeypatch.setattr(burn_in, "step", lambda target, state, policy: next(ways["burn"]))
+    monkeypatch.setattr(kept, "step", lambda target, state, policy: next(ways["keep"]))
+    target = gaussian(2)
+    found = ensemble.sample(
+        target, 7, policy, checkpoint="file", progress=told.append, found="found", near="near", rough="rough"  # type: ignore[arg-type]
+    )  # fmt: skip
+    states = [begun, replace(begun, round=1), walking, replace(begun, round=2), walking, done]
+    of_fit = {"seed": 7, "policy": describe(policy), "parameters": ("x0", "x1")}
+    assert fits == [of_fit] and saved == [(state, "file", of_fit) for state in states]
+    assert told == pytest.approx([0.1, 0.6, 0.2, 0.6, 0.6])
+    assert (found.converged, found.why, found.evaluations, found.kept_evaluations) == (True, "enough", 90, 40)
+    assert found.acceptance == 0.75 and found.learned is False and found.modes == 3
+    assert np.array_equal(found.z, sampler_state.by_ensemble([z], policy)) and found.log_density.shape == (2, 3, 2)
+    assert (found.autocorrelation_steps, found.ess, found.r_hat) == (about.autocorrelation, about.ess, about.r_hat)
+    still = replace(done, kept=replace(done.kept, accepted=0, proposed=0))
+    monkeypatch.setattr(ensemble.resume, "load", lambda path, of_fit: still)
+    assert ensemble.sample(target, 7, policy).acceptance == 0.0
