@@ -21,7 +21,7 @@ TESTS = {
     "results": _files("results", "contraction identifiability outliers posterior_checks"),
     "prediction": _files("prediction", "held_out left_out left_out_density pit_band predictive table"),
     "comparison": ["tests/comparison"],
-    "discovery": _files("discovery", "explore global_test held_out is_close model_space name_evidence power refit "
+    "discovery": _files("discovery", "explore gate global_test held_out model_space name_evidence power refit "
                                      "sharing settings shrinking subsets thresholds verdict"),
     "robot/mechanics": _files("robot", "statics tensions pulleys"),
     "robot/motion": _files("robot", "forward"),

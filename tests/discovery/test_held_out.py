@@ -151,3 +151,24 @@ def test_draws_of_a_block_come_with_all_its_parameters(monkeypatch: pytest.Monke
     assert held_out._draws(block, np.random.default_rng(0), 7) == (  # type: ignore[arg-type]
         "whole problem", ("problem", "modes", 7)
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(("deviations", "share"), [(1.5, 1.0), (-1.5, 1.0), (1.8, 0.0), (-1.8, 0.0)])
+def test_what_is_not_known_of_the_creep_widens_the_bands(
+    deviations: float, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stiff wire of which only the first hold was read, and that crept unseen in a second one."""
+    wire = WIRE | {"k1": 4000.0, "B": 1.0, "sensor_sd": 0.05, "setting_sd": 0.1}
+    bench = Bench(displacements_mm=(2, 4, 6), unrecorded=frozenset({2}))
+    experiment = simulated_tests([bench], Truth(wire), seed=2)[0]
+    problem = build([experiment])
+    sample = problem.samples[0]
+    r, covariance, hold = normal(sample.protocol, wire, Model(), experiment.tension(), sample.resolution_N)
+    past = hold < 2
+    gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
+    left = covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]
+    readings = sample.readings.copy()
+    readings[2, :, 0] += gain @ r[past] - r[~past] + deviations * np.sqrt(np.diag(left))
+    own = problem.parameters(np.tile([wire[name] for name in problem.names], (4000, 1)), sample)
+    moved = replace(sample, readings=readings)
+    assert held_out._scored(moved, moved.model, own, 1, np.random.default_rng(0)).inside == share

@@ -81,6 +81,7 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     sampled, true = [], importance.sample
 
     def counted(*given: object) -> importance.Weighted:
+        assert np.sqrt(2.0 / given[-1]) == pytest.approx(0.07, abs=0.001)  # type: ignore[operator]  # error of a ratio
         found = true(*given)  # type: ignore[arg-type]
         sampled.append(len(found.settled))
         return found

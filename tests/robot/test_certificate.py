@@ -187,3 +187,21 @@ def test_a_box_that_keeps_growing_is_given_up(monkeypatch):
     sideways = lambda radius: radius * np.array([0.5, 0.5, 1e12])  # noqa: E731
     images = Image(monkeypatch, sideways)
     assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 1
+
+
+def test_a_box_holds_no_second_equilibrium_only_if_its_image_lies_within(monkeypatch):
+    """Not at its edge, and not as far as the robot's size: the last width that held is the answer."""
+    robot = schema.read("hangprinter-4")
+    for edge in (1.0, 1.5):
+        images = Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, 0.5, 0.5, edge)
+        proof = certify(robot, "hooke", None, None, None, "x", "R")
+        np.testing.assert_allclose([box[0] for box in images.boxes[4:]], 1e-7 * robot.span_m * 1.5 ** np.arange(3))
+        assert proof.unique_m == pytest.approx(1.5e-7 * robot.span_m)
+    none = Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, 1.0)
+    assert certify(robot, "hooke", None, None, None, "x", "R").unique_m < 1e-7 * robot.span_m and len(none.boxes) == 5
+    one_way = lambda radius: radius * np.array([0.5, 0.5, 1.0])  # noqa: E731
+    Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, one_way)
+    assert certify(robot, "hooke", None, None, None, "x", "R").unique_m < 1e-7 * robot.span_m
+    whole = Image(monkeypatch, 0.5)
+    assert 0.6 * robot.span_m < certify(robot, "hooke", None, None, None, "x", "R").unique_m < robot.span_m
+    assert max(box[0] for box in whole.boxes) < robot.span_m

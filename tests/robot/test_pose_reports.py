@@ -367,6 +367,11 @@ def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monk
     here = SimpleNamespace(found=np.array([False]), position_m=x[None])
     monkeypatch.setattr(answer.forward, "solve", lambda *given: here)
     assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is False
+    with monkeypatch.context() as patch:
+        held: Any = SimpleNamespace(feasible=np.array([True]), zero_m=[0], offset_m=[0])
+        patch.setattr(answer.inverse, "commands", lambda *given: held)
+        patch.setattr(answer.inverse, "tensions", lambda *given: np.array([[0.0, -1.0, 2.0, 3.0]]))
+        assert answer._all_equilibria(robot, wires, x, R, rng)["poses"][-1]["slack_wires"] == 2
     weak: Any = SimpleNamespace(feasible=np.array([False]), zero_m=[0], offset_m=[0])
     monkeypatch.setattr(answer.inverse, "commands", lambda *given: weak)
     assert answer._all_equilibria(robot, wires, x, R, rng) == {

@@ -300,3 +300,40 @@ def test_a_piece_is_proved_about_its_middle(hung: Any, monkeypatch: pytest.Monke
     assert one._reach(here, "k1", "strain", (low, high)) is None  # type: ignore[arg-type]
     monkeypatch.setattr(proofs._Way, "_solved", lambda self, *arguments: None)
     assert one._reach(here, "k1", "strain", (low, high)) is None  # type: ignore[arg-type]
+
+
+def test_on_the_way_nobody_asks_how_far_an_equilibrium_is_alone(hung: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which takes most of the time; the lengths are those that have crept so far, known exactly."""
+    robot, wires, course = hung
+    one = way(robot, wires, course)
+    asked: list[Any] = []
+
+    def certify(*given: Any, **known: Any) -> Any:
+        asked.append((given, known))
+        return SimpleNamespace(proved=len(asked) == 1, radius_m="radius")
+
+    monkeypatch.setattr(proofs, "certify", certify)
+    monkeypatch.setattr(proofs._Way, "_solved", lambda self, near, k1, strain: ("x", "R"))
+    k1, strain = np.full(4, 5000.0), np.array([0.0, 1e-3, 2e-3, 3e-3])
+    assert one._certain(("near", "R"), k1, strain) == ("x", "R", "radius")  # type: ignore[arg-type, comparison-overlap]
+    (used, law, stiff, (low, high), offset, *pose), known = asked[0]
+    assert used is robot and law == wires.law and stiff == (k1, k1) and offset is one.offset and pose == ["x", "R"]
+    assert low is high and low == pytest.approx(one.bare * (1.0 + strain)) and known == {"how_alone": False}
+    assert one._certain(("near", "R"), k1, strain) is None  # type: ignore[arg-type]
+    monkeypatch.setattr(proofs._Way, "_solved", lambda self, *given: None)
+    assert one._certain(("near", "R"), k1, strain) is None and len(asked) == 2  # type: ignore[arg-type]
+
+
+def test_a_pose_is_solved_with_the_lengths_that_have_crept(hung: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its rotation is one to the last digits; a pose that is not found is none."""
+    robot, wires, course = hung
+    one = way(robot, wires, course)
+    k1, strain = np.full(4, 5000.0), np.full(4, 1e-3)
+    found = one._solved((robot.home_m, np.eye(3)), k1, strain)
+    assert found is not None
+    every = Wires("hooke", "saturating", {"k1": k1[:, None]}, np.ones((4, 1)))
+    same = forward.solve(robot, every, (one.bare * 1.001)[None], one.offset, robot.home_m, np.eye(3))
+    assert found[0] == pytest.approx(same.position_m[0], abs=1e-12) and found[1] == pytest.approx(np.eye(3), abs=1e-15)
+    lost = SimpleNamespace(found=np.array([False]), position_m=same.position_m, rotation=same.rotation)
+    monkeypatch.setattr(proofs.forward, "solve", lambda *given: lost)
+    assert one._solved((robot.home_m, np.eye(3)), k1, strain) is None

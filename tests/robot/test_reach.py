@@ -1,4 +1,5 @@
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -253,3 +254,50 @@ def test_the_linear_answer_is_the_slope_of_the_pose():
     moved = np.concatenate([found.position_m - x, turn], axis=1)
     slope = 0.5 * (moved[: 2 * w] - moved[2 * w :])
     np.testing.assert_allclose(line.T, slope, atol=1e-3 * np.abs(slope).max())
+
+
+class Image:
+    """Images as they are written down, one after the other, of a linear answer that is; how large the boxes were."""
+
+    def __init__(self, monkeypatch, Y, *factors):
+        self.boxes, self.factors = [], list(factors)
+        system = SimpleNamespace(middle_slope=lambda: np.eye(3))
+        monkeypatch.setattr(module, "Balance", lambda *given: system)
+        monkeypatch.setattr(module, "_linear_answer", lambda *given: Y)
+        monkeypatch.setattr(module, "_image", self)
+
+    def __call__(self, middle, wide, C, Y, generators, along, beside):
+        self.along = along
+        self.boxes.append(beside.copy())
+        factor = self.factors.pop(0) if len(self.factors) > 1 else self.factors[0]
+        return factor * beside
+
+
+def asked(monkeypatch, *factors):
+    robot = schema.read("hangprinter-4")
+    Y = np.array([[0.1, -0.2, 0.3, 0.0], [0.0, 0.0, 0.0, 0.0], [1e-3, 1e-3, -1e-3, 1e-3]])
+    images = Image(monkeypatch, Y, *factors)
+    generators = np.zeros((4, 4)), np.zeros((4, 4))
+    got = reach(robot, "hooke", np.ones(4), np.ones(4), generators, np.zeros(4), np.zeros(3), np.eye(3))
+    return robot, Y, images, got
+
+
+def test_the_box_beside_the_line_grows_until_its_image_lies_within(monkeypatch):
+    """Sums are rounded outwards, so that no digit of what is proved is lost."""
+    robot, Y, images, got = asked(monkeypatch, 10.0, 1.0, 0.9)
+    first = 1e-10 * robot.span_m
+    np.testing.assert_allclose([box[0] for box in images.boxes], [first, 12.0 * first, 14.4 * first])
+    assert got.proved and got.line_m is Y
+    np.testing.assert_array_equal(got.beside_m, images.boxes[-1])
+    most = np.abs(Y).sum(1)
+    assert (images.along[[0, 2]] > most[[0, 2]]).all()
+    np.testing.assert_allclose(images.along, most, rtol=1e-11)
+    assert (got.radius_m > most + got.beside_m).all()
+    np.testing.assert_allclose(got.radius_m, most + got.beside_m, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("factor", "images"), [(1.0, 30), (1e5, 2), (np.array([0.5, 0.5, 1.0]), 30), (np.inf, 1)])
+def test_a_box_that_does_not_hold_its_image_is_given_up(factor, images, monkeypatch):
+    """After thirty images, or once it is as wide as the robot."""
+    _, _, seen, got = asked(monkeypatch, factor)
+    assert not got.proved and len(seen.boxes) == images

@@ -127,3 +127,25 @@ def test_bounds_that_no_tensions_reach_are_refused_and_those_they_touch_are_not(
     np.testing.assert_allclose(tensions.nearest(np.array([9.0, 1.0]), structure, load, 5.0, 9.0), [5.0, 5.0], atol=1e-6)
     assert tensions.nearest(np.array([9.0, 1.0]), structure, load, 5.1, 9.0) is None
     assert tensions.nearest(np.array([9.0, 1.0]), structure, load, 0.0, 4.9) is None
+
+
+@pytest.mark.parametrize(("way", "low", "high", "held"), [
+    (1.0, 2.0, 20.0, False), (1.0, 0.0, 8.5, False), (-1.0, 2.0, 9.6, True), (-1.0, 2.0, 7.9, False),
+    (-1.0, 2.1, 9.6, False),
+])  # fmt: skip
+def test_what_the_solver_returns_is_held_against_both_bounds(way, low, high, held, monkeypatch):
+    """From nine and one newton it moves a half along the null space, or one back, whatever the bounds are."""
+    structure, load, at = np.ones((1, 2)), np.array([10.0]), np.array([9.0, 1.0])
+    null = np.linalg.svd(structure)[2][1]
+    moved = np.array([0.5, -0.5]) if way > 0 else np.array([-1.0, 1.0])
+
+    def nnls(E, f, maxiter):
+        outside = max(low - at.min(), at.max() - high) / 10.0  # in units of the load
+        residual = np.array([-(null @ moved) / 10.0 / outside, 1.0])
+        return np.linalg.lstsq(E, residual + f, rcond=None)[0], 0.0
+
+    monkeypatch.setattr(tensions, "nnls", nnls)
+    tau = tensions.nearest(at, structure, load, low, high)
+    assert (tau is not None) is held
+    if held:
+        np.testing.assert_allclose(tau, at + moved)

@@ -1,13 +1,16 @@
-"""Whether a p-value is too close to its level to be on either side of it, against binomial sums."""
+"""More parts of the global test: a p-value on its level against binomial sums, gross errors among few readings."""
 
 from math import comb
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from wirebayes.discovery import global_test
+from wirebayes.discovery import global_test, gross_errors
 from wirebayes.discovery.global_test import is_close
+from wirebayes.discovery.screening import Candidate
+from wirebayes.io.paper import experiments
 
 
 def risk(larger: int, alpha: float, simulations: int) -> float:
@@ -34,3 +37,28 @@ def test_simulations_are_scanned_for_patterns_too(monkeypatch: pytest.MonkeyPatc
     rng = np.random.default_rng(0)
     found = global_test.simulated_with_patterns(block, ["probe"], 7, rng)  # type: ignore[list-item, arg-type]
     assert found == (block, ["probe"], 7, rng, "p columns")  # type: ignore[comparison-overlap]
+
+
+def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One in twenty of fifteen is none, but a single gross error is looked for in any test."""
+    one = experiments()[2].train(3)
+    assert gross_errors.readings_of([one]) < 20
+    asked: list[float] = []
+
+    def suspect(block: Any, rival: float) -> Any:
+        asked.append(rival)
+        return one.name, one.holds[0].number, 1, 9.0
+
+    monkeypatch.setattr(gross_errors, "suspect", suspect)
+    monkeypatch.setattr(global_test, "expand", lambda *given: None)
+    # a smooth curve explains 4, no effect explains anything
+    monkeypatch.setattr(
+        global_test, "scan", lambda x: SimpleNamespace(effects=np.array([[-7.0]]), flexible=np.array([4.0]))
+    )
+    block: Any = SimpleNamespace(experiments=(one,), target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(),
+                                 law="hooke", history="saturating", exponent=None)  # fmt: skip
+    monkeypatch.setattr(global_test, "fitted", lambda members, *given, **known: SimpleNamespace(experiments=members))
+    candidates = [Candidate(0, "a", (0,), True)]
+    found, gone = global_test._strike_gross_errors(block, [], candidates, 0, np.random.default_rng(0))
+    assert len(gone) == 1 and asked == [4.0]
+    assert gross_errors.readings_of(found.experiments) == gross_errors.readings_of([one]) - 1
