@@ -19,7 +19,7 @@ TESTS = {
     "model": ["tests/model"],
     "inference": ["tests/inference/sampler", *_files("inference", "importance")],
     "results": _files("results", "contraction identifiability outliers posterior_checks"),
-    "prediction": _files("prediction", "held_out left_out left_out_density pit_band predictive table"),
+    "prediction": _files("prediction", "held_out leave_one_hold_out left_out_density pit_band predictive table"),
     "comparison": ["tests/comparison"],
     "discovery": _files("discovery", "explore gate global_test held_out model_space name_evidence power refit "
                                      "sharing settings shrinking subsets thresholds verdict"),

@@ -269,3 +269,17 @@ def test_a_further_effect_is_refitted_and_added_where_that_is_worth_it(
     found = fits.fit()
     assert (("weighed", 6, 1) in fits.did) is weighed
     assert found.further is (fits.evidence if further else None)
+
+
+def test_the_unit_of_an_amplitude_is_its_width_beside_nothing_else() -> None:
+    """For every form of a name, on the blocks where it was refitted."""
+
+    def refit(key: str, blocks: tuple[int, ...], sd: float) -> Any:
+        return SimpleNamespace(effect=SimpleNamespace(key=key), blocks=blocks, sd=sd)
+
+    refits: Any = {
+        "slip": [refit("slip@3", (0,), 0.1), refit("slip@4", (1,), 0.2)],
+        "drift": [refit("drift", (0, 1), 0.3)],
+    }
+    found = NameEvidence({}, refits, {})
+    assert stepwise._units(found) == {("slip@3", (0,)): 0.1, ("slip@4", (1,)): 0.2, ("drift", (0, 1)): 0.3}

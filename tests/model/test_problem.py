@@ -223,3 +223,12 @@ def test_replicates_take_the_place_of_the_readings_row_by_row() -> None:
     bad[0, 0] = np.nan
     values = problem.log_likelihood(bad)
     assert values[0] == -np.inf and np.isfinite(values[1])
+
+
+def test_a_test_without_readings_has_the_resolution_that_is_stated() -> None:
+    """As a plan has it, and a bench before it is simulated; nothing is known of its tensions."""
+    empty = short()
+    nothing = tuple(replace(h, number=None, time_s=h.time_s[:0], tension_N=h.tension_N[:0]) for h in empty.holds)
+    for stated in (0.0, 0.01):
+        sample = build([replace(empty, holds=nothing, resolution_N=stated)]).samples[0]
+        assert sample.resolution_N == stated and sample.model.tension_ref_N == 1.0

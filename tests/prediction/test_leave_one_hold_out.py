@@ -1,44 +1,205 @@
-"""Leave one hold out by importance sampling against posteriors that never saw the hold."""
+"""Leaving holds out where the densities are written down: when to refit, which draws, and what an error is."""
 
+from types import SimpleNamespace
+
+import arviz_base
+import arviz_stats
 import numpy as np
 import pytest
+from scipy import stats
 
-from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
-from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, without_hold
-
-QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
-
-
-@pytest.fixture(scope="module")
-def fitted() -> Fit:
-    # with few draws, the shape of the importance ratios' tail is anybody's guess
-    return fit(build([experiments()[0]]), 2)
-
-
-@pytest.mark.statistical
-def test_importance_sampling_agrees_with_refitting_without_the_hold(fitted: Fit) -> None:
-    fast = smoothed_leave_one_hold_out(fitted, policy=QUICK)
-    exact = smoothed_leave_one_hold_out(fitted, policy=QUICK, exact=True)
-    assert exact.refitted.all() and not fast.refitted.all()
-    assert list(fast.hold) == [1, 2, 3, 4, *range(6, 14)]
-    easy = ~fast.refitted
-    # Monte-Carlo error of 500 effective draws at Pareto k up to 0.5
-    assert np.abs(fast.elpd - exact.elpd)[easy].max() < 0.25
-    # leaving a hold out costs: the density that has seen it is higher in sum
-    recorded = fitted.problem.samples[0].protocol.recorded
-    seen = np.log(np.exp(fitted.problem.leave_one_hold_out(fitted.flat)[0]).mean(axis=1))[recorded]
-    assert fast.total < seen.sum() - 1.0
+from wirebayes.model.problem import Problem, build
+from wirebayes.prediction import leave_one_hold_out as module
+from wirebayes.prediction.leave_one_hold_out import (
+    REFIT,
+    LeftOut,
+    difference,
+    log_mean,
+    smoothed_leave_one_hold_out,
+    standard_error,
+    thinned,
+    without_hold,
+)
 
 
-def test_a_hold_left_out_still_happened(fitted: Fit) -> None:
-    problem = fitted.problem
-    rows = fitted.flat[:50]
-    without = without_hold(problem, 0, 2)
-    assert not without.samples[0].protocol.mask[2].any()
-    assert np.array_equal(without.samples[0].protocol.duration_s, problem.samples[0].protocol.duration_s)
-    before, after = problem.hold_log_likelihood(rows)[0], without.hold_log_likelihood(rows)[0]
-    # p(all) = p(all but the hold) p(hold | all but it): the chain rule, computed in two independent ways
-    assert np.allclose(before.sum(axis=0) - after.sum(axis=0), problem.leave_one_hold_out(rows)[0][2], atol=1e-6)
+@pytest.mark.parametrize(("tail", "sampled"), [(0.49, False), (0.5, False), (0.51, True), (np.nan, True)])
+def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
+    tail: float, sampled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Above Pareto k of 0.5, or where it is not defined; what was not sampled counts as converged."""
+    rng = np.random.default_rng(0)
+    log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, without])])
+    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, tail)))
+    known = np.log(stats.hmean(np.exp(log_p), axis=1))  # weights 1/p: the harmonic mean
+
+    def ratios(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        assert holds == [(0, j) for j in range(4)] and len(draws) == 500
+        return np.array([1.0, 2.0, 3.0, 4.0]), np.array([True, True, False, True])
+
+    monkeypatch.setattr(module, "log_densities", ratios)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    shares: list[float] = []
+    found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
+    assert list(found.refitted) == [sampled] * 4 and found.converged is not sampled and shares == [1.0]
+    assert found.elpd == pytest.approx([1.0, 2.0, 3.0, 4.0] if sampled else known)
+
+
+def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bridge between its draws and those of the full posterior; one that did not converge is said."""
+    log_p = np.random.default_rng(0).normal(size=(4, 500))
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
+    asked: list[int] = []
+
+    def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
+        asked.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
+        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=len(asked) != 2))
+
+    monkeypatch.setattr(module, "fit", fit_without)
+    monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    shares: list[float] = []
+    found = smoothed_leave_one_hold_out(stub, exact=True, progress=shares.append)  # type: ignore[arg-type]
+    assert asked == [0, 1, 2, 3] and shares == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert found.elpd.tolist() == [2.0] * 4 and found.refitted.all() and not found.converged
+
+
+def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.zeros((4, 500))])
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert found.elpd.tolist() == [0.0] * 4 and found.pareto_k.tolist() == [0.0] * 4 and not found.refitted.any()
+
+
+def test_a_hold_is_left_out_of_its_own_sample_alone() -> None:
+    problem = build(experiments()[:3])
+    for sample in range(3):
+        without = without_hold(problem, sample, 1)
+        assert len(without.samples) == 3 and not without.samples[sample].protocol.mask[1].any()
+        assert all(without.samples[i] is problem.samples[i] for i in range(3) if i != sample)
+
+
+def test_where_the_model_cannot_be_computed_a_hold_has_no_density(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build([experiments()[1].train(4)])
+    whole, without = np.array([1.0, np.nan, -np.inf]), np.zeros((4, 3))
+    monkeypatch.setattr(Problem, "without_each_hold", lambda self, theta: (whole, [without]))
+    assert problem.leave_one_hold_out(np.empty(0))[0].tolist() == [[1.0, -np.inf, -np.inf]] * 4
+
+
+def test_thinned_rows_reach_from_the_first_to_the_last() -> None:
+    rows = np.arange(9001.0)[:, None]
+    few = thinned(rows, 10)
+    assert few[:, 0].tolist() == [round(9000 * i / 9) for i in range(10)]
+    assert len(thinned(rows)) == 4000 and thinned(rows[:7]).tolist() == rows[:7].tolist()
+
+
+def test_one_hold_has_no_standard_error() -> None:
+    assert np.isnan(standard_error(np.array([3.0])))
+    assert standard_error(np.array([1.0, 3.0])) == pytest.approx(2.0)  # sd √2, times √2
+
+
+def test_importance_weights_are_smoothed_as_arviz_smooths_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ArviZ's own leave-one-out on the same log densities; raw weights are off by more than the tolerance."""
+    rng = np.random.default_rng(5)
+    log_p = -0.5 * (np.array([0.5, 1.0, 2.0, 2.5])[:, None] + rng.normal(scale=0.35, size=(4, 4000))) ** 2
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((4000, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert not found.refitted.any()
+    one = {"posterior": {"x": np.zeros((1, 4000))}, "log_likelihood": {"y": log_p.T[None]}}
+    reference = arviz_stats.loo(arviz_base.from_dict(one), pointwise=True, reff=1.0)
+    np.testing.assert_allclose(found.elpd, reference.elpd_i, atol=1e-9)
+    np.testing.assert_allclose(found.pareto_k, reference.pareto_k, atol=1e-9)
+    raw = np.log(4000) - np.log(np.exp(-log_p).sum(axis=1))
+    assert np.abs(raw - found.elpd).max() > 1e-5
+
+
+@pytest.mark.parametrize(("centre", "width"), [(0.0, 1.0), (3.0, 0.3)])
+def test_log_mean_is_the_normalising_constant_of_a_normal(centre: float, width: float) -> None:
+    """A normal bump far out in a standard normal: its mean is known, and few draws of the standard normal see it."""
+    rng = np.random.default_rng(3)
+    variance = 1.0 / (1.0 + width**-2)
+
+    def log_p(x: np.ndarray) -> np.ndarray:
+        return -0.5 * ((x - centre) / width) ** 2
+
+    weighted = variance * centre / width**2 + np.sqrt(variance) * rng.normal(size=(400, 3000))
+    estimates = [log_mean(log_p(rng.normal(size=4000)), log_p(draws)) for draws in weighted]
+    truth = 0.5 * np.log(width**2 / (1.0 + width**2)) - 0.5 * centre**2 / (1.0 + width**2)
+    # the estimate is unbiased in the mean itself; 5 standard errors of 400 runs
+    shares = np.exp(np.array(estimates) - truth)
+    assert abs(shares.mean() - 1.0) < 5.0 * shares.std() / 20.0 + 0.01
+    plain = [np.log(np.exp(log_p(rng.normal(size=4000))).mean()) for _ in range(400)]
+    assert np.std(estimates) < (0.7 * np.std(plain) if centre else 0.01)
+
+
+def test_log_mean_bears_draws_where_the_density_is_zero() -> None:
+    rng = np.random.default_rng(4)
+    log_p = np.where(rng.uniform(size=20000) < 0.25, 0.0, -np.inf)
+    assert log_mean(log_p, np.zeros(5000)) == pytest.approx(np.log(0.25), abs=0.05)
+
+
+def test_difference_and_its_standard_error() -> None:
+    hold = np.array([1, 2, 3, 4])
+    names, none = ("a",) * 4, np.zeros(4)
+    one = LeftOut(names, hold, np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
+    other = LeftOut(names, hold, np.array([2.0, 2.0, 2.0, 2.0]), none, none > 0)
+    total, se = difference(one, other)
+    assert total == 4.0
+    assert se == pytest.approx(2 * np.std([1, 0, 3, 0], ddof=1))
+    assert one.total == 12.0 and one.se == pytest.approx(2 * np.std([3, 2, 5, 2], ddof=1)) and one.converged
+    for foreign in (LeftOut(names, hold + 1, none, none, none > 0), LeftOut(("b",) * 4, hold, none, none, none > 0)):
+        with pytest.raises(ValueError, match="same holds"):
+            difference(one, foreign)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_bridge_between_two_lots_of_draws_balances_them(seed: int) -> None:
+    """With n draws of the one and m of the other, the root of sum 1/(1 + m/n r/p) = sum 1/(1 + n/m p/r) is r."""
+    rng = np.random.default_rng(seed)
+    one, other = rng.normal(size=300), 0.5 + rng.normal(size=200)
+    r = np.exp(log_mean(one, other))
+    from_one = (1.0 / (1.0 + 200.0 / 300.0 * np.exp(one) / r) * np.exp(one)).mean()
+    from_other = (1.0 / (1.0 + 200.0 / 300.0 * np.exp(other) / r)).mean()
+    assert from_one / from_other == pytest.approx(r, rel=1e-9)
+    # far from zero, and of densities that are all the same
+    assert log_mean(one - 2000.0, other - 2000.0) == pytest.approx(np.log(r) - 2000.0, rel=1e-12)
+    assert log_mean(np.full(300, -7.0), np.full(200, -7.0)) == pytest.approx(-7.0)
+
+
+def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One for each hold, or one for all that are sampled together; zero where none is given."""
+    problem = build([experiments()[1].train(4)])
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
+    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, 0.9)))
+    monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
+    asked: list[tuple[int, object]] = []
+
+    def together(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        asked.append((seed, None))
+        return np.zeros(4), np.ones(4, bool)
+
+    def alone(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
+        asked.append((seed, policy))
+        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=True))
+
+    monkeypatch.setattr(module, "log_densities", together)
+    monkeypatch.setattr(module, "fit", alone)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    for given in ({}, {"seed": 0}, {"seed": 1}):
+        smoothed_leave_one_hold_out(stub, **given)  # type: ignore[arg-type]
+    seeds = [seed for seed, _ in asked]
+    assert seeds[0] == seeds[1] != seeds[2]
+    asked.clear()
+    for given in ({}, {"seed": 0}):
+        smoothed_leave_one_hold_out(stub, exact=True, **given)  # type: ignore[arg-type]
+    assert asked[:4] == asked[4:] and len({seed for seed, _ in asked}) == 4
+    # a quarter of a fit's draws, from fewer walkers
+    assert all(policy is REFIT for _, policy in asked) and REFIT.ess == Policy().ess / 4.0
+    assert (REFIT.walkers, REFIT.round_draws) == (Policy().walkers / 2, Policy().round_draws / 2)

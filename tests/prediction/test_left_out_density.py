@@ -113,6 +113,25 @@ def test_what_is_given_up_is_sampled_with_the_full_posterior_alone(
     assert pools == [3, 2, 2] and settled.all() and elpd == pytest.approx(Normals.elpd[:2], abs=0.15)
 
 
+def test_what_is_given_up_is_begun_near_the_posterior_without_its_hold(
+    pools: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From as many draws of it as there are of the full one; only what was settled with the full one is."""
+    asked: list[object] = []
+
+    def found(densities: object, z: object, order: object, rng: object, ess: float, near: object = None) -> object:
+        asked.append(near)
+        settled = [True, False, True, False] if near is None else [len(asked) == 2, True]
+        drawn = lambda density, n, rng: (density, n)  # noqa: E731
+        integral = np.array([1.0, 2.0, 3.0, 4.0]) if near is None else np.array([10.0, 4.0])
+        return SimpleNamespace(log_integral=integral, settled=np.array(settled), drawn=drawn)
+
+    monkeypatch.setattr(importance, "from_draws", found)
+    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+    assert asked == [None, (1, 4000), (3, 4000)]
+    assert elpd.tolist() == [6.0, -2.0, 6.0] and settled.tolist() == [True, True, False]
+
+
 def test_what_never_settles_is_said(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importance, "tail", lambda log_weight: 0.8)
     monkeypatch.setattr(importance, "_ROUNDS", 2)

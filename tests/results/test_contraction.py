@@ -25,3 +25,13 @@ def test_contraction_is_the_share_of_variance_taken_away_of_the_logarithm_if_pos
 )
 def test_who_determines_a_quantity(value: float, word: str) -> None:
     assert source(value) == word
+
+
+def test_a_quantity_that_may_be_zero_is_compared_as_it_is() -> None:
+    """In the posterior or in the prior; no logarithm is taken then."""
+    before, after = np.array([1.0, 2.0, 3.0, 6.0]), np.array([2.0, 3.0, 4.0])
+    positive = 1.0 - np.var(np.log(after), ddof=1) / np.var(np.log(before), ddof=1)
+    assert contraction(after, before) == pytest.approx(positive)
+    for zero in (0.0, -1.0):
+        for a, b in ((np.append(after, zero), before), (after, np.append(before, zero))):
+            assert contraction(a, b) == pytest.approx(1.0 - np.var(a, ddof=1) / np.var(b, ddof=1))

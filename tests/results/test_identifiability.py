@@ -248,7 +248,9 @@ def test_half_the_prior_s_weight_takes_half_of_its_precision_away(monkeypatch: p
     with pytest.raises(AssertionError):
         extrapolation(model, 2.0)
     samples[0].protocol.length_mm = 1500.0
-    assert extrapolation(model, 2.0).time_s[[0, -1]].tolist() == [10.0, 86_400.0]
+    hours = extrapolation(model, 2.0).time_s / 3600.0
+    assert hours[-6:].tolist() == [1 / 3, 1.0, 2.0, 4.0, 8.0, 24.0] and hours[0] == 10 / 3600.0
+    assert (np.diff(np.log(hours)) > 0.6).all() and (np.diff(np.log(hours)) < 1.2).all()  # evenly, about twice as long
 
 
 def test_an_extrapolation_as_plain_values_has_the_figures_under_their_names() -> None:

@@ -125,3 +125,14 @@ def test_an_interval_that_shrank_by_less_than_a_tenth_taught_nothing(simulated, 
     assert ("say nothing of the wire" in posterior_checks.unchanged_prior(own, prior)) is named
     constant = {"k1": np.ones(9)}
     assert posterior_checks.unchanged_prior({"k1": even[:1] + 0 * even}, constant) == ""  # nothing was to be learned
+
+
+def test_intervals_reach_from_the_5_to_the_95_percent_point():
+    """Seven draws of a hundred lie far below, or above, the others: the interval is no narrower than the prior's."""
+    even = np.linspace(0.0, 1.0, 1001)
+    far = np.where(even < 0.07, -9.0, 0.5 + 0.1 * even)
+    for own in (far, -far):
+        assert "say nothing of the wire" in posterior_checks.unchanged_prior({"k1": own}, {"k1": even})
+        assert (
+            posterior_checks.unchanged_prior({"k1": np.where(even < 0.04, own, 0.5 + 0.1 * even)}, {"k1": even}) == ""
+        )

@@ -301,3 +301,26 @@ def test_a_box_that_does_not_hold_its_image_is_given_up(factor, images, monkeypa
     """After thirty images, or once it is as wide as the robot."""
     _, _, seen, got = asked(monkeypatch, factor)
     assert not got.proved and len(seen.boxes) == images
+
+
+def test_all_poses_of_a_box_are_those_on_the_line_and_beside_it(monkeypatch):
+    """Rounded outwards; what lies beside the line is a part of them."""
+    robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke")
+    generators = apart(1e-6 * k1, 1e-7 * zero)
+    middle = Balance(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
+    wide = Balance(robot, "hooke", module._bounds(k1, generators[0]), module._bounds(zero, generators[1]), offset, x, R)
+    C = np.linalg.inv(middle.middle_slope())
+    Y = module._linear_answer(middle, C, generators)
+    along, beside = np.abs(Y).sum(1), np.array([1e-7, 2e-7, 3e-7])
+    seen, balls = [], module._balls
+
+    def watched(balance, radii):
+        seen.append(np.array(radii))
+        return balls(balance, radii)
+
+    monkeypatch.setattr(module, "_balls", watched)
+    image = module._image(middle, wide, C, Y, generators, along, beside)
+    assert (seen[0] > along + beside).all() and (image < beside).all() and (image > 0).all()
+    np.testing.assert_allclose(seen, [along + beside, beside], rtol=1e-11)
+    wider = module._image(middle, wide, C, Y, generators, along, 100.0 * beside)
+    assert (wider > image).all()  # a wider box bends more

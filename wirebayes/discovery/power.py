@@ -155,9 +155,12 @@ def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> lis
     return list(names)
 
 
+_ANY = stats.norm(0.0, 0.1)  # the prior of a probe, which is never asked: only its signature is
+
+
 class _SensorGain(Effect):
     name, place, scope = "gain of the force sensor", "reading", "instrument"
-    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.1)),)
+    amplitudes = (Amplitude("a", "-", 0.0, _ANY),)
     sentence = "The force sensor's gain is off."
 
     def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
@@ -166,7 +169,7 @@ class _SensorGain(Effect):
 
 class _ForceOffset(Effect):
     name, place, scope = "constant force offset", "reading", "instrument"
-    amplitudes = (Amplitude("a", "N", 0.0, stats.norm(0.0, 0.1)),)
+    amplitudes = (Amplitude("a", "N", 0.0, _ANY),)
     sentence = "The force sensor's zero is off."
 
     def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
@@ -175,7 +178,7 @@ class _ForceOffset(Effect):
 
 class _DisplacementScale(Effect):
     name, place, scope = "scale of the displacement", "position", "instrument"
-    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.1)),)
+    amplitudes = (Amplitude("a", "-", 0.0, _ANY),)
     sentence = "The displacement's scale is off."
 
     def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
@@ -184,7 +187,7 @@ class _DisplacementScale(Effect):
 
 class _Compliance(Effect):
     name, place, scope = "compliance of the fixture", "strain", "instrument"
-    amplitudes = (Amplitude("c", "mm/N", 0.0, stats.norm(0.0, 0.1)),)
+    amplitudes = (Amplitude("c", "mm/N", 0.0, _ANY),)
     sentence = "The bench gives way."
 
     def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:

@@ -120,6 +120,7 @@ def test_the_last_step_ends_it_and_names_what_is_missing() -> None:
     ],
 )
 def test_places_that_the_proposal_overlooks(nats: float, again: int, finished: bool, converged: bool) -> None:
+    assert np.exp(OUTWEIGHS) == pytest.approx(sampler_state.POOL / 2) == 32.0  # half a pool of typical places
     state, _ = looked(draws(64), overlooked=nats, again=again)
     assert (state.finished, state.converged) == (finished, converged)
     assert ("makes too little of some places" in state.why) is (finished and not converged)
