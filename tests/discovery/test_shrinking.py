@@ -110,7 +110,7 @@ class Model(SimpleNamespace):
 
 def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, holds: int = 9) -> list[Any]:
     """Reports of two experiments where a model's squared error says which one it is, and on what."""
-    error = {"plain": 50.0, "a": 40.0, "ab": 30.0, "plain~": 20.0, "a~": 15.0, "ab~": 10.0}
+    error = {"plain": 50.0, "a": 40.0, "ab": 30.0, "abc": 25.0, "plain~": 20.0, "a~": 15.0, "ab~": 10.0, "abc~": 5.0}
     pair = tuple(replace(e, holds=e.recorded_holds[:holds]) for e in experiments()[1:3])
     models = [Model(name=name, experiments=pair, effects=(), law="", history="") for name in ("plain", *stages)]
 
@@ -137,20 +137,39 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
 
 @pytest.mark.parametrize(
     ("stages", "remains", "final", "flexible"),
-    [(["a", "ab"], False, 30.0, 20.0), (["a", "ab"], True, 10.0, 20.0), ([], True, 20.0, 20.0), ([], False, 50.0, 0.0)],
+    [
+        (["a", "ab"], False, 30.0, 20.0),
+        (["a", "ab"], True, 10.0, 20.0),
+        ([], True, 20.0, 20.0),
+        ([], False, 50.0, 0.0),
+        (["a"], False, 40.0, 20.0),
+        (["a"], True, 15.0, 20.0),
+        (["a", "ab", "abc"], False, 25.0, 20.0),
+        (["a", "ab", "abc"], True, 5.0, 20.0),
+    ],
 )
 def test_every_model_is_scored_under_its_own_name(
     stages: list[str], remains: bool, final: float, flexible: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for i, report in enumerate(scored(monkeypatch, stages, remains)):
         squares = {m["model"]: round(m["rmse_N"] ** 2, 9) for m in report.steps}
-        assert squares == {"plain": 50.0 + i} | {"a": 40.0 + i, "ab": 30.0 + i} if stages else {"plain": 50.0 + i}
+        alone = {"plain": 50.0, "a": 40.0, "ab": 30.0, "abc": 25.0}
+        assert squares == {name: alone[name] + i for name in ("plain", *stages)}
         assert report.held_out["final"]["rmse_N"] ** 2 == pytest.approx(final + i)
         if flexible:
             assert report.held_out["flexible"]["rmse_N"] ** 2 == pytest.approx(flexible + i)
             assert report.held_out["shrinks"]
         else:  # nothing was added, so nothing shrinks
             assert report.held_out["flexible"] is None and not report.held_out["shrinks"]
+
+
+def test_one_experiment_with_too_few_holds_is_enough_to_hold_none_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = experiments()[1], experiments()[2].train(3)
+    block: Any = Model(name="plain", experiments=pair, effects=(), law="", history="")
+    monkeypatch.setattr(shrinking, "_predicted", lambda *given: pytest.fail("predicted"))
+    found = shrinking.shrinking(block, [], [], True, np.random.default_rng(0), map)
+    assert [(f.held_out["holds"], f.held_out["gap_closed"]) for f in found] == [([], None)] * 2
+    assert [m["rmse_N"] for m in found[0].steps] == [None] and found[0].held_out is not found[1].held_out
 
 
 def test_too_few_holds_are_not_held_out(monkeypatch: pytest.MonkeyPatch) -> None:

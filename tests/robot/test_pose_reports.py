@@ -433,3 +433,36 @@ def test_a_calibration_is_tried_on_three_hundred_draws_from_its_end_to_a_day() -
     since = controllers._SINCE_S
     assert since[0] == 0.0 and since[1] == 1.0 and since[-1] == pytest.approx(1e5)
     assert np.diff(np.log10(since[1:])) == pytest.approx([1 / 8] * 40) and controllers.HISTORIES_S == (0.0, 3600.0)
+
+
+def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of its longest time, of all draws' lengths, of what sags, and of drums in the draws that hold the pose."""
+    asked: list[Any] = []
+
+    def tested(robot: Any, line: Any, tension: Any, longest_s: float, zero: Any) -> list[str]:
+        asked.append((tension.tolist(), longest_s, zero.tolist()))
+        return ["line"]
+
+    def sagging(robot: Any, position: Any, turn: Any, tension: Any) -> list[str]:
+        asked.append((position, tension.tolist()))
+        return ["sag"]
+
+    def emptied(known: Any, joint: Any) -> list[int]:
+        asked.append(joint.tolist())
+        return [0]
+
+    monkeypatch.setattr(answer.draws, "warnings", tested)
+    monkeypatch.setattr(answer.sag, "warnings", sagging)
+    monkeypatch.setattr(answer.drums, "emptied", emptied)
+    request = PoseRequest(np.zeros(3), np.eye(3), np.array([0.0, 10.0, 90.0]))
+    commands: Any = SimpleNamespace(
+        zero_m=np.ones((2, 1)), joint_m=np.array([[1.0], [2.0]]), feasible=np.array([False, True])
+    )
+    tension = np.array([[5.0]])
+    for known, words in ((None, ["line", "sag"]), (SimpleNamespace(wire_m=np.array([4.0])), ["line", "sag", None])):
+        asked.clear()
+        robot: Any = SimpleNamespace(drums=known)
+        found = answer._untested(robot, None, request, commands, tension)  # type: ignore[arg-type]
+        assert found[:2] == words[:2] and len(found) == len(words)
+        assert asked[:2] == [([[5.0]], 90.0, [[1.0], [1.0]]), (request.position_m, [5.0])]
+        assert asked[2:] == ([] if known is None else [[[2.0]]])

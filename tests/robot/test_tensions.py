@@ -149,3 +149,19 @@ def test_what_the_solver_returns_is_held_against_both_bounds(way, low, high, hel
     assert (tau is not None) is held
     if held:
         np.testing.assert_allclose(tau, at + moved)
+
+
+@pytest.mark.parametrize(("miss", "held"), [(0.9e-8, True), (1.1e-8, False)])
+@pytest.mark.parametrize(("at", "largest"), [([9.0, 1.0], 10.0), ([109.0, -99.0], 108.0)])
+def test_what_the_solver_returns_may_miss_a_bound_by_rounding(at, largest, miss, held, monkeypatch):
+    """By a hundred-millionth of the largest tension, or of the load where that is more; at either bound."""
+    structure, load, at = np.ones((1, 2)), np.array([10.0]), np.array(at)
+    end, null = at + [-1.0, 1.0], np.linalg.svd(structure)[2][1]
+    for low, high in ((-1e6, end[0] - miss * largest), (end[1] + miss * largest, 1e6)):
+        outside = max(low - at.min(), at.max() - high)
+
+        def nnls(E, f, maxiter, outside=outside):
+            return np.linalg.lstsq(E, np.array([-(null @ (end - at)) / outside, 1.0]) + f, rcond=None)[0], 0.0
+
+        monkeypatch.setattr(tensions, "nnls", nnls)
+        assert (tensions.nearest(at, structure, load, low, high) is not None) is held
