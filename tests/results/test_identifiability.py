@@ -169,6 +169,7 @@ def test_the_prior_s_part_in_an_extrapolation_turns_at_a_tenth(share: float, k: 
 def test_an_extrapolation_is_one_beyond_the_longest_hold() -> None:
     assert far_out(longest_s=3600.0).warning == "" == far_out(longest_s=7200.0).warning
     assert "1 h is 6 times the longest hold (600 s)" in far_out().warning
+    assert "1 h is 1.03 times the longest hold (3500 s)" in far_out(longest_s=3500.0).warning
     assert far_out(longest_s=0.0).warning != ""  # no hold lasted at all
 
 

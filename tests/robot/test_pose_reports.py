@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim, control, drift, forward
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.drift import Course, Falls
@@ -119,14 +120,17 @@ def test_a_time_within_tolerance_is_the_last_one_where_it_holds_the_probability(
     assert tolerances == {"tolerance_mm": 2.0, "tolerance_deg": pytest.approx(0.5)}
 
 
+HERE, TURNED = np.array([0.7, -1.2, 2.5]), matrix(np.array([0.2, -0.3, 0.9]))  # what is commanded
+
+
 def at(distance_m: Any, tilt_rad: Any, times_s: Any = (0.0, 60.0)) -> Any:
-    """A hold of as many draws as there are distances, at the last of the times."""
+    """A hold of as many draws as there are distances, at the last of the times; before, as it is commanded."""
     n, away = len(distance_m), np.zeros((len(distance_m), len(times_s), 3))
     away[:, -1, 0] = distance_m
     turn = np.tile(np.eye(3), (n, len(times_s), 1, 1))
     c, s = np.cos(tilt_rad), np.sin(tilt_rad)
     turn[:, -1] = np.moveaxis(np.array([[c, 0 * c, s], [0 * c, 0 * c + 1, 0 * c], [-s, 0 * c, c]]), -1, 0)
-    return SimpleNamespace(position_m=away, rotation=turn, times_s=np.array(times_s))
+    return SimpleNamespace(position_m=HERE + away, rotation=TURNED @ turn, times_s=np.array(times_s))
 
 
 def test_the_paper_s_figures_hold_in_the_draws_that_keep_both() -> None:
@@ -134,7 +138,7 @@ def test_the_paper_s_figures_hold_in_the_draws_that_keep_both() -> None:
     alike = at(d * np.array([0.9, 0.5, 0.9, 1.1, NAN]), t * np.array([0.9, 0.5, 1.1, 0.5, NAN]))
     other = at(np.array([0.1 * d] * 4), np.zeros(4), (0.0, 30.0))
     request: Any = None
-    found = answer._claim({0.0: alike, 0.05: other}, np.zeros(3), np.eye(3), request)
+    found = answer._claim({0.0: alike, 0.05: other}, HERE, TURNED, request)
     assert found["holds"] == [{"specimen_spread": 0.0, "probability": 0.4}, {"specimen_spread": 0.05,
                                                                              "probability": None}]  # fmt: skip
     # section 4 of the paper: 0.3 mm and 0.055° within a minute
@@ -239,7 +243,7 @@ def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, 
     size = 1e-2 * (10.0 + np.log(line.parameters["B"]))
     size[held:] = NAN
     courses = {s: at(size * (1.0 + s), np.zeros(40), (0.0, 30.0, 60.0)) for s in (0.0, 0.1)}
-    found = answer._shares(line, courses, np.zeros(3), np.eye(3))
+    found = answer._shares(line, courses, HERE, TURNED)
     assert (found["time_s"], found["output"]) == (60.0, "distance")
     if not shared:
         assert "Fewer than 30 draws" in found["sentence"] and "shared_draw" not in found
@@ -248,7 +252,7 @@ def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, 
     sd = 1e3 * np.std(size[:held])
     assert [row["sd_mm"] for row in found["sd_mm"]] == pytest.approx([sd, 1.1 * sd])
     lost = {0.0: courses[0.0], 0.1: at(np.full(40, NAN), np.zeros(40))}
-    assert answer._shares(line, lost, np.zeros(3), np.eye(3))["sd_mm"][1]["sd_mm"] is None
+    assert answer._shares(line, lost, HERE, TURNED)["sd_mm"][1]["sd_mm"] is None
 
 
 def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:
@@ -383,14 +387,19 @@ def test_a_drift_is_told_in_millimetres_and_degrees_of_the_draws_that_are_found(
     """Two draws that move along x and turn about y; one that is lost has no place."""
     distance, turn = np.array([1e-3, 3e-3, 5.0]), np.array([0.01, 0.03, 1.0])
     one = at(distance, turn)
+    one.rotation[2, 1] = NAN
     held: Any = Course(one.times_s, one.position_m, one.rotation, np.ones((3, 2, 4)) * 7.0,
                        np.array([[0, 0], [0, 0], [0, 1]]), None)  # type: ignore[arg-type]  # fmt: skip
-    found = answer._drift(held, np.zeros(3), np.eye(3))
+    found = answer._drift(held, HERE, TURNED)
     assert found["solved"] == pytest.approx(2 / 3) and found["times_s"].tolist() == [0.0, 60.0]
-    assert found["displacement_mm"]["mean"].tolist() == [[0.0] * 3, [2.0, 0.0, 0.0]]
-    assert found["distance_mm"]["q50"].tolist() == [0.0, 2.0] and found["distance_mm"]["sd"][1] == pytest.approx(1.0)
-    for name in ("tilt_deg", "from_vertical_deg", "rotation_deg"):
-        assert found[name]["mean"].shape == (2,)
+    np.testing.assert_allclose(found["displacement_mm"]["mean"], [[0.0] * 3, [2.0, 0.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(found["distance_mm"]["q50"], [0.0, 2.0], atol=1e-9)
+    assert found["distance_mm"]["sd"][1] == pytest.approx(1.0)
+    vertical = np.degrees(np.arccos(one.rotation[:2, 1, 2, 2]))
+    turned = np.degrees(0.02)
+    for name, degrees in (("tilt_deg", turned), ("rotation_deg", turned), ("from_vertical_deg", vertical.mean())):
+        assert found[name]["mean"][1] == pytest.approx(degrees, rel=1e-6)
+    assert found["tilt_deg"]["mean"][0] == pytest.approx(0.0, abs=1e-6)
     assert found["tension_N"]["mean"].tolist() == [[7.0] * 4] * 2
 
 

@@ -47,6 +47,10 @@ def test_the_start_has_no_walker_where_the_density_is_zero() -> None:
     z, value = burn_in._finite_draws(target, NORMAL, 501, np.random.RandomState(0))
     assert z.shape == (501, D) and (z[:, 0] > 0).all()
     assert np.array_equal(value, half(z))
+    # where all draws will do, none is thrown away
+    whole = gaussian(D)
+    z, value = burn_in._finite_draws(whole, NORMAL, 501, np.random.RandomState(0))  # type: ignore[arg-type]
+    assert np.array_equal(z, NORMAL.rvs(501, np.random.RandomState(0))) and whole.evaluations == len(value) == 501
 
 
 @pytest.mark.parametrize(("shift", "witness"), [(0.0, None), (0.0, 0.0), (9.0, 9.0)])
