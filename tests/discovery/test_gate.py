@@ -62,3 +62,15 @@ def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) 
     found, gone = global_test._strike_gross_errors(block, [], candidates, 0, np.random.default_rng(0))
     assert len(gone) == 1 and asked == [4.0]
     assert gross_errors.readings_of(found.experiments) == gross_errors.readings_of([one]) - 1
+
+
+@pytest.mark.parametrize(("linear", "further"), [(0.002, {}), (0.003, {"a": 3.0})])
+def test_of_many_simulations_two_in_a_thousand_are_plain_to_see(
+    linear: float, further: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many there are; above that larger effects are tried."""
+    from tests.discovery import test_global_test
+
+    monkeypatch.setattr(test_global_test, "SIMULATIONS", 999)
+    found, _ = test_global_test.examined(monkeypatch, linear=linear, larger=0.9)
+    assert found.further == further and found.test.p == (0.9 if further else linear)

@@ -193,3 +193,16 @@ def test_a_set_that_holds_exactly_enough_is_enough() -> None:
     assert smallest_set({"b": 0.25, "a": 0.5, "c": 0.25}, 0.75) == ["a", "b"]
     assert smallest_set({"a": 0.5, "b": 0.5}, 0.5) == ["a"] and smallest_set({}) == []
     assert smallest_set({"a": 0.5, "b": 0.3}) == ["a", "b"]
+
+
+@pytest.mark.parametrize("far", [60.0, 1e4])
+def test_far_beyond_doubt_all_of_what_is_left_counts_for_one_side(far: float) -> None:
+    """For the remainder beside the name where the smooth curve needs it, or for a remainder alone where it does not."""
+    from wirebayes.discovery.verdict import _more_beside
+
+    sets = [a_set("", 0.0), a_set("b", 3.0), a_set("a", 10.0)]
+    needed = _more_beside(sets, np.array([-40.0, 1.0, -40.0 + far]), 2, far)
+    assert needed == pytest.approx([-40.0, 1.0, np.logaddexp(-40.0 + far, far)])
+    idle = _more_beside(sets, np.array([-40.0, 1.0, -40.0 - far]), 2, 5.0)
+    assert idle[0] == pytest.approx(np.logaddexp(-40.0, 5.0)) and idle[1] == 1.0
+    assert idle[2] == pytest.approx(np.logaddexp(-40.0 - far, 5.0 - 50.0))

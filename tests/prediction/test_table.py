@@ -98,6 +98,10 @@ def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_h
     monkeypatch.setattr(module, "predict", predict)
     mixture_table([(share, request) for share in shares])  # type: ignore[misc]
     assert [len(rows) for rows in asked] == used
+    table(request)  # type: ignore[arg-type]
+    table(request, 0, 70)  # type: ignore[arg-type]
+    assert [len(rows) for rows in asked[-2:]] == [4000, 70]
+    del asked[-2:]
     for rows in asked:
         assert (rows[0], rows[-1]) == (0.0, 8999.0) and np.ptp(np.diff(rows)) <= 1.0
 

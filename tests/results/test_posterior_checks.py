@@ -136,3 +136,33 @@ def test_intervals_reach_from_the_5_to_the_95_percent_point():
         assert (
             posterior_checks.unchanged_prior({"k1": np.where(even < 0.04, own, 0.5 + 0.1 * even)}, {"k1": even}) == ""
         )
+
+
+def test_an_error_must_be_large_in_nineteen_of_twenty_draws(simulated):
+    """Of the setting and of the sensor; six draws of a hundred below the limit are enough to doubt it."""
+    sample, signal = simulated.problem.samples[0], np.ptp(simulated.problem.samples[0].readings)
+    for few, warned in ((4, True), (6, False)):
+        some = np.arange(100) < few
+        loose = {"setting_sd": np.where(some, 0.1, 0.6)}
+        noisy = {"sensor_sd": np.where(some, 0.1, 0.3) * signal}
+        assert bool(posterior_checks.loose_steps(loose, sample)) is warned
+        assert ("in all" in posterior_checks.noise(noisy, sample)) is warned
+    bare = replace(sample, resolution_N=0.0)
+    largest = np.abs(sample.readings).max()
+    for few, warned in ((4, True), (6, False)):  # and small in as many to be called none
+        quiet = {"sensor_sd": np.where(np.arange(100) < few, 1.0, 0.1) * 2 * FINEST * largest}
+        assert ("no noise" in posterior_checks.noise(quiet, bare)) is warned
+
+
+def test_steps_are_the_typical_ones_of_those_that_move(simulated):
+    """Their median, whatever the direction; holds at one place are no steps."""
+    protocol = replace(
+        simulated.problem.samples[0].protocol, displacement_mm=np.array([0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 9.0])
+    )
+    sample = replace(simulated.problem.samples[0], protocol=protocol)
+    for sd, warned in ((0.99, False), (1.01, True)):
+        found = posterior_checks.loose_steps({"setting_sd": np.full(9, sd)}, sample)
+        assert bool(found) is warned and ("steps by 2 mm" in found) is warned
+    still = replace(sample, protocol=replace(protocol, displacement_mm=np.full(7, 3.0)))
+    assert posterior_checks.loose_steps({"setting_sd": np.full(9, 5.0)}, still) == ""
+    assert posterior_checks.loose_steps({}, sample) == ""  # hold by hold there is no such error

@@ -421,3 +421,10 @@ def test_starts_lie_among_the_exits_and_below_and_the_known_pose_is_one_of_them(
             one, other = (forward.Equilibria(*(getattr(found, f)[[j]] for f in forward.Equilibria.__annotations__))
                           for j in (i, k))  # fmt: skip
             assert _distance(robot, one, other.position_m, other.rotation)[0] > near
+
+
+def test_every_status_has_a_number_of_its_own_and_words():
+    """None of them the mark of a case that is still being solved."""
+    numbers = forward.FOUND, forward.NOT_CONVERGED, forward.NO_EQUILIBRIUM, forward.NOT_HELD, forward.FELL
+    assert numbers == (0, 1, 2, 3, 4) and forward._GOING_ON not in numbers
+    assert list(forward.STATUS) == list(numbers) and len(set(forward.STATUS.values())) == 5
