@@ -25,8 +25,10 @@ def held(squares: float, elpd: Any = (0.0, 0.0), floor: float = 1.0, inside: flo
     [
         (4.1, 1.0, 0.0, True),
         (3.9, 1.0, 0.0, False),  # a difference below four may be chance
+        (4.0, 1.0, 0.0, False),  # and one of four
         (6.1, 3.0, 0.0, True),
         (5.9, 3.0, 0.0, False),  # two standard errors
+        (6.0, 3.0, 0.0, False),
         (9.0, 1.0, 9.0, True),  # as good as a smooth curve
         (9.0, 1.0, 9.1, False),
     ],

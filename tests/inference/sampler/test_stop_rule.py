@@ -296,6 +296,21 @@ def test_draws_that_are_not_enough_overlook_nothing() -> None:
     for policy in ({"ess": 1e6}, {"ess": 1e6, "most_steps": 64}):
         assert looked(draws(64), overlooked=9.0, **policy)[0].learned.overlooked == 0.0
     assert looked(draws(64), overlooked=9.0)[0].learned.overlooked == 9.0
+    # nor does a proposal that was given up
+    given_up, _ = looked(draws(64))
+    assert given_up.converged and not given_up.learned.trusted and given_up.learned.overlooked == 0.0
+
+
+def test_a_positive_parameter_that_rounds_to_zero_has_a_logarithm() -> None:
+    """Far below all others, but a number: a draw in a thousand does not make all of them worthless."""
+    z = by_ensemble(draws(200))
+    z[0, 0, 0, 0] = -1e4
+    target = gaussian(D)
+    target.coordinates.log_columns[:] = True
+    target.coordinates.to_natural = np.exp
+    assert target.coordinates.to_natural(z)[0, 0, 0, 0] == 0.0
+    found = stop_rule._diagnosed(target, z)  # type: ignore[arg-type]
+    assert np.isfinite(found.ess).all() and np.isfinite(found.r_hat).all()
 
 
 @pytest.mark.parametrize("stored", [False, True])
