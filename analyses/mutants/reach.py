@@ -25,7 +25,7 @@ TESTS = {
                                      "sharing settings shrinking subsets thresholds verdict"),
     "robot/mechanics": _files("robot", "statics tensions pulleys"),
     "robot/motion": _files("robot", "forward"),
-    "robot/pose": _files("robot", "pose_reports answer drums"),
+    "robot/pose": _files("robot", "pose_reports answer controllers drums"),
     "robot/proof": _files("robot", "certificate proofs reach pulleys"),
 }  # fmt: skip
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant

@@ -1,6 +1,6 @@
 """Sets of effects with and without a remainder: the prior's arithmetic, and what the sums mean."""
 
-from itertools import combinations
+from itertools import combinations, product
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +10,7 @@ import pytest
 from wirebayes.discovery.model_space import EffectSet, log_prior, log_weights, posterior, smallest_set
 from wirebayes.discovery.settings import LEAST_ALTERNATIVE
 from wirebayes.discovery.stepwise import Accepted
+from wirebayes.discovery.subsets import over_subsets
 from wirebayes.discovery.verdict import Decision, alternatives, verdict_of
 
 ONE = np.ones(1)
@@ -206,3 +207,38 @@ def test_far_beyond_doubt_all_of_what_is_left_counts_for_one_side(far: float) ->
     idle = _more_beside(sets, np.array([-40.0, 1.0, -40.0 - far]), 2, 5.0)
     assert idle[0] == pytest.approx(np.logaddexp(-40.0, 5.0)) and idle[1] == 1.0
     assert idle[2] == pytest.approx(np.logaddexp(-40.0 - far, 5.0 - 50.0))
+
+
+def test_sums_over_the_sets_are_those_over_all_that_may_be_true_in_a_material() -> None:
+    """Effects act each on its own, a remainder is there or not; with nothing of both nothing is missing."""
+    rng = np.random.default_rng(0)
+    names = ("a", "b", "c")
+    sets = [EffectSet((), 0.0, {}, np.array([0.5, -1.0]))]
+    for chosen in (("a",), ("b", "a"), ("c", "b", "a"), ("c",)):
+        presence = {name: rng.uniform(size=2) for name in chosen}
+        sets.append(EffectSet(chosen, 0.0, presence, None if chosen == ("c",) else rng.normal(size=2)))
+    without, beside = np.log(rng.uniform(size=(2, 5)))
+    found = posterior(sets, without, beside, blocks=2)
+    total = np.exp(without).sum() + np.exp(beside).sum()
+    for b in range(2):
+        nothing = remainder = 0.0
+        inclusion, first = dict.fromkeys(names, 0.0), dict.fromkeys((*names, "unknown"), 0.0)
+        for s, bare, more in zip(sets, np.exp(without) / total, np.exp(beside) / total, strict=True):
+            remains = 1.0 if s.remainder is None else over_subsets(s.remainder)[1][b]
+            for rest, weight in ((False, bare), (False, more * (1.0 - remains)), (True, more * remains)):
+                for acting in product((False, True), repeat=len(s.names)):
+                    chances = [s.presence[n][b] if on else 1.0 - s.presence[n][b]
+                               for n, on in zip(s.names, acting, strict=True)]  # fmt: skip
+                    chance = weight * float(np.prod(chances))
+                    there = [n for n, on in zip(s.names, acting, strict=True) if on]
+                    nothing += chance * (not there and not rest)
+                    remainder += chance * rest
+                    for n in there:
+                        inclusion[n] += chance
+                    if there or rest:
+                        first[there[0] if there else "unknown"] += chance
+        assert found.nothing[b] == pytest.approx(nothing) and found.remainder[b] == pytest.approx(remainder)
+        assert {n: found.inclusion[n][b] for n in names} == pytest.approx(inclusion)
+        missing = sum(first.values())
+        assert missing == pytest.approx(1.0 - nothing)
+        assert found.shares[b] == pytest.approx({n: share / missing for n, share in first.items()})

@@ -187,3 +187,10 @@ def test_the_threshold_is_student_s_t_for_all_comparisons_of_a_material():
     for specimens, parameters in ((6, 1), (12, 8)):
         level = 1.0 - 0.05 / (2 * specimens * parameters)
         assert threshold(specimens, parameters) == pytest.approx(stats.t(1.0 + 0.37 * specimens).ppf(level))
+
+
+def test_a_spread_counts_down_to_a_billionth():
+    """Specimens that agree to a millionth are judged by that; what has no spread at all is a billionth wide."""
+    values = 1e-6 * np.array([-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 40.0])
+    assert robust_z(values, np.full(7, 1e-9)) == pytest.approx(values / (1.4826 * 2e-6), rel=1e-5)
+    assert robust_z(values * 0.0 + np.array([0, 0, 0, 0, 0, 0, 1e-3]), np.zeros(7))[-1] == pytest.approx(1e6)

@@ -424,26 +424,6 @@ def test_an_emptied_drum_is_named_with_its_wire(monkeypatch: pytest.MonkeyPatch)
     ]  # fmt: skip
 
 
-def test_a_calibration_is_tried_on_three_hundred_draws_from_its_end_to_a_day() -> None:
-    """Evenly spread draws, the first and the last among them; times from zero on, eight a decade."""
-    chosen: list[np.ndarray] = []
-
-    def part(rows: np.ndarray) -> None:
-        chosen.append(rows)
-        raise InterruptedError
-
-    request = PoseRequest(np.zeros(3), np.eye(3), TIMES)
-    for count in (1000, 7):
-        line: Any = SimpleNamespace(count=count, part=part)
-        with pytest.raises(InterruptedError):
-            controllers.between_calibrations(None, line, request, np.random.default_rng(0))  # type: ignore[arg-type]
-    assert len(chosen[0]) == 300 and (chosen[0][0], chosen[0][-1]) == (0, 999) and set(np.diff(chosen[0])) == {3, 4}
-    assert chosen[1].tolist() == list(range(7))
-    since = controllers._SINCE_S
-    assert since[0] == 0.0 and since[1] == 1.0 and since[-1] == pytest.approx(1e5)
-    assert np.diff(np.log10(since[1:])) == pytest.approx([1 / 8] * 40) and controllers.HISTORIES_S == (0.0, 3600.0)
-
-
 def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of its longest time, of all draws' lengths, of what sags, and of drums in the draws that hold the pose."""
     asked: list[Any] = []

@@ -366,7 +366,7 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
     scale = start.factors @ np.swapaxes(start.factors, 1, 2)
     assert scale[1] == pytest.approx(2.0 * scale[0]) and scale[0] == pytest.approx(1.7 * np.eye(D))
     assert plain.learned.proposal is start and plain.learned.acceptance == 0.0 and plain.learned.modes == 2
-    assert plain.learned.witness is None and plain.evaluations == target.evaluations / 2 > 0
+    assert plain.learned.witness is None and plain.evaluations == learned.evaluations == target.evaluations / 2 > 0
     assert len(plain.walkers.positions) == 2 * 10 and plain.round == 0  # a quarter of the walkers
     assert learned.learned.proposal == "proposal" and learned.learned.acceptance == 1.0 and learned.seen is None
     assert taught == [(rough, rough, proposal.ROUGH_SHARES)]
