@@ -213,7 +213,7 @@ def _weighted(
     log_density, log_proposal = densities(z), current.log_density(z)
     log_weight = log_density - log_proposal[:, None]
     enough = effective(log_weight) >= ess
-    trusted = [bool(e) and tail(w) <= _LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
+    trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
     return Weighted(z, log_density, log_proposal, np.array(trusted))
 
 
@@ -276,7 +276,7 @@ def _learned(
 _STARTS = 6  # of climbs on the first density, besides the highest draw
 _STEPS = 40  # to a mode; the proposal learns the rest
 _WIDER = 1.7  # times the covariance at a mode
-_LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
+LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
 _FIRST, _LEARNING = 1024, 2048  # draws of the first round and of others that only teach
 _ROUNDS = 14  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
 _PATIENCE = 4  # rounds in which all densities are learned, whatever they need

@@ -1,14 +1,19 @@
-"""Posterior draws in a fraction of a second, for decisions that are made many times: a short run of the same sampler.
+"""Posterior draws in a fraction of a second, for decisions that are made many times.
 
+They come from importance sampling about the modes; where its weights cannot be trusted, from a short run of the sampler.
 For numbers that are reported, sample with `wirebayes.inference.fit`, which requires convergence.
 """
 
 import numpy as np
+from scipy.special import logsumexp
 
+from wirebayes.inference.importance import LARGEST_K, effective, tail
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler import mixture
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
 
 # 4096 draws, no test of tails: enough for means and widths, a fraction of a second
@@ -16,7 +21,7 @@ _SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, b
 
 
 def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:
-    """Posterior draws by a short run of the sampler from known modes.
+    """Posterior draws from known modes.
 
     Parameters
     ----------
@@ -25,13 +30,46 @@ def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int
         The modes of `target`; no search is made.
     rng : numpy.random.Generator
     n : int
-        Number of draws, picked from the run without replacement.
+        Number of draws.
 
     Returns
     -------
     (n, d) array
         Natural parameters.
     """
-    chains = sample(target, int(rng.integers(2**63)), _SHORT, found=found)
-    z = chains.z.reshape(-1, chains.z.shape[-1])
-    return target.coordinates.to_natural(z[rng.choice(len(z), n, replace=False)])
+    z = _weighted(target, found, rng, n)
+    if z is None:
+        chains = sample(target, int(rng.integers(2**63)), _SHORT, found=found)
+        z = chains.z.reshape(-1, chains.z.shape[-1])
+        z = z[rng.choice(len(z), n, replace=False)]
+    return target.coordinates.to_natural(z)
+
+
+def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int) -> Array | None:
+    """(n, d) sampled coordinates by importance sampling, or nothing where the weights of all rounds are too uneven.
+
+    A mixture is learned from all draws so far, and all of them are weighted against all mixtures together.
+    """
+    proposals = [mixture.from_modes(found.z, _WIDER * found.covariance, found.log_evidence)]
+    z, height = np.empty((0, found.z.shape[1])), np.empty(0)
+    for _ in range(_ROUNDS):
+        new = proposals[-1].rvs(_EACH, rng)
+        z, height = np.concatenate([z, new]), np.append(height, target(new))
+        drawn_from = logsumexp([proposal.log_density(z) for proposal in proposals], axis=0)
+        log_weight = height - drawn_from
+        if effective(log_weight[:, None])[0] >= _ENOUGH and tail(log_weight) <= LARGEST_K:
+            return z[truncated_rows(log_weight, n, rng)]
+        points = z[truncated_rows(_HOT * height - drawn_from, _LEARNED, rng)]
+        try:
+            proposals.append(mixture.fit(points, rng, most=_COMPONENTS))
+        except np.linalg.LinAlgError:
+            break
+    return None
+
+
+_WIDER = 2.0  # times the covariance at a mode
+_EACH, _ROUNDS = 2500, 8  # draws a round: eight of them take less than the sampler's burn-in
+_ENOUGH = 1500.0  # effective draws
+_HOT = 0.5  # power of the density that proposals are learned from, so that their tails are not too thin
+_LEARNED = 2500  # points
+_COMPONENTS = 6
