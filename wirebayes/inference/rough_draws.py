@@ -1,7 +1,7 @@
 """Posterior draws in a fraction of a second, for decisions that are made many times.
 
-They come from importance sampling about the modes; where its weights cannot be trusted, from a short run of the sampler.
-For numbers that are reported, sample with `wirebayes.inference.fit`, which requires convergence.
+They come from importance sampling about the modes, and where its weights cannot be trusted, from a short run of the
+sampler. For numbers that are reported, sample with `wirebayes.inference.fit`, which requires convergence.
 """
 
 import numpy as np
@@ -72,4 +72,4 @@ _EACH, _ROUNDS = 2500, 8  # draws a round: eight of them take less than the samp
 _ENOUGH = 1500.0  # effective draws
 _HOT = 0.5  # power of the density that proposals are learned from, so that their tails are not too thin
 _LEARNED = 2500  # points
-_COMPONENTS = 6
+_COMPONENTS = 6  # of a proposal: enough for two hills with long tails
