@@ -351,3 +351,13 @@ def test_stacking_by_one_step_of_its_iteration() -> None:
         (share / share.sum(axis=1, keepdims=True)).mean(axis=0)
     )
     assert stacking(np.log(density), iterations=0) == pytest.approx([0.5, 0.5])
+
+
+def test_a_model_that_has_no_such_score_is_not_compared_by_it() -> None:
+    """Neither way round: held out freely, given the first reading, or not held out at all."""
+    whole, bare = held([1.0, 2.0], [3.0, 4.0]), held(None, [3.0, 4.0]) | {"given_first": None}
+    for one, other in ((whole, bare), (bare, whole), (whole, None), (None, whole), (bare, bare)):
+        models = [row(BASE, [10.0, 10.0], held_out=other), row("other", [11.0, 11.0], held_out=one)]
+        (found,) = (r for r in side_by_side(models, BASE)["models"] if r["name"] == "other")  # type: ignore[arg-type]
+        assert found["held_out_difference"] is None and found["given_first_difference"] is None
+        assert found["difference"]["elpd"] == 2.0

@@ -74,3 +74,18 @@ def test_of_many_simulations_two_in_a_thousand_are_plain_to_see(
     monkeypatch.setattr(test_global_test, "SIMULATIONS", 999)
     found, _ = test_global_test.examined(monkeypatch, linear=linear, larger=0.9)
     assert found.further == further and found.test.p == (0.9 if further else linear)
+
+
+def test_where_no_effect_acts_a_gross_error_is_held_against_the_smooth_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However little that explains; effects of other blocks do not count."""
+    asked: list[float] = []
+    monkeypatch.setattr(gross_errors, "suspect", lambda block, rival: asked.append(rival))
+    monkeypatch.setattr(global_test, "expand", lambda *given: None)
+    found = SimpleNamespace(effects=np.array([[9.0]]), flexible=np.array([0.25]))
+    monkeypatch.setattr(global_test, "scan", lambda x: found)
+    one = experiments()[2].train(3)
+    block: Any = SimpleNamespace(experiments=(one,), target=None, modes=SimpleNamespace(z=np.zeros((1, 1))))
+    for flexible, rival in ((0.25, 0.25), (-3.0, 0.0)):
+        found.flexible[0] = flexible
+        same, gone = global_test._strike_gross_errors(block, [], [Candidate(0, "a", (1,), True)], 0, None)  # type: ignore[arg-type]
+        assert same is block and gone == [] and asked[-1] == rival

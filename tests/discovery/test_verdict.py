@@ -312,3 +312,14 @@ def test_sets_that_are_one_model_in_this_material_add_up_and_the_final_one_may_b
     other: Any = SimpleNamespace(effects=[SimpleNamespace(key="z")])
     found = verdict.alternatives(decision, known, 1, other, "named")
     assert found[0].block is other and found[0].probability == 0.0 and not found[0].remains
+
+
+def test_of_sets_that_were_fitted_the_most_probable_one_stands_for_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a chain of refits is all that is known of that; in whatever order they come."""
+    for values in ({"a": 20.0, "b": 21.0, "c": 19.0}, {"c": 19.0, "a": 20.0, "b": 21.0}):
+        sets = explored(values)
+        del sets.fitted[frozenset("b")]
+        assert names(decided(monkeypatch, sets, {}, {})) == "a"
+    sets.fitted.clear()
+    found = decided(monkeypatch, sets, {}, {})
+    assert found.best is None and found.posterior.best.names == ("b",)
