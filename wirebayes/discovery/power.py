@@ -155,7 +155,7 @@ def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> lis
     return list(names)
 
 
-_ANY = stats.norm(0.0, 0.1)  # the prior of a probe, which is never asked: only its signature is
+_ANY = stats.norm(0.0, 0.1)  # the prior of a probe, of which only the signature is used
 
 
 class _SensorGain(Effect):

@@ -5,7 +5,6 @@ sampler. For numbers that are reported, sample with `wirebayes.inference.fit`, w
 """
 
 import numpy as np
-from scipy.special import logsumexp
 
 from wirebayes.inference.importance import LARGEST_K, effective, tail
 from wirebayes.inference.modes import Optimum
@@ -52,10 +51,13 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
     """
     proposals = [mixture.from_modes(found.z, _WIDER * found.covariance, found.log_evidence)]
     z, height = np.empty((0, found.z.shape[1])), np.empty(0)
+    by_proposal = np.empty((0, 0))  # log density of each proposal at each draw
     for _ in range(_ROUNDS):
         new = proposals[-1].rvs(_EACH, rng)
+        by_proposal = np.vstack([by_proposal, proposals[-1].log_density(z)])
+        by_proposal = np.hstack([by_proposal, [proposal.log_density(new) for proposal in proposals]])
         z, height = np.concatenate([z, new]), np.append(height, target(new))
-        drawn_from = logsumexp([proposal.log_density(z) for proposal in proposals], axis=0)
+        drawn_from = mixture.log_sum(by_proposal)
         log_weight = height - drawn_from
         if effective(log_weight[:, None])[0] >= _ENOUGH and tail(log_weight) <= LARGEST_K:
             return z[truncated_rows(log_weight, n, rng)]

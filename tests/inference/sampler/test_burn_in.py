@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -219,19 +220,14 @@ def test_a_walk_looks_further_every_time() -> None:
 
 
 def test_a_walk_in_burn_in_has_small_pools_of_one_ensemble(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[object, ...]] = []
-    true = burn_in.move_of
-
-    def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> object:
-        asked.append((ensembles, steps, frozen))
-        return true(learned, ensembles, steps, frozen=frozen)
-
+    move_of = Mock(wraps=burn_in.move_of)
     monkeypatch.setattr(burn_in, "move_of", move_of)
     target, policy = gaussian(D), Policy(ensembles=2, walkers=16, round_draws=256)
     z = target.mean + 0.1 * np.random.default_rng(0).normal(size=(32, D))
     state = replace(burning(), walkers=Walkers(z, target(z), np.random.RandomState(1).get_state()))
     burn_in._walked(target, state, policy)  # type: ignore[arg-type]
     burn_in._frozen(target, state.knowing(acceptance=1.0), policy, (z, target(z), target(z)), 5)  # type: ignore[arg-type]
+    asked = [(*call.args[1:], call.kwargs["frozen"]) for call in move_of.call_args_list]
     assert asked == [(1, 256 // burn_in._walking(target, policy), False), (2, 5, True)]  # type: ignore[arg-type]
 
 

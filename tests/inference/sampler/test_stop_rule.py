@@ -1,6 +1,7 @@
 """The stop rule on draws whose memory and agreement are known: what must be refused is, and says why."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -188,13 +189,7 @@ def test_draws_count_as_burn_in_once_or_for_what_was_overlooked(
 
 def test_a_block_is_kept_with_its_densities_and_what_it_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     """By large pools, for the proposal is frozen."""
-    asked: list[tuple[object, ...]] = []
-    true = kept.move_of
-
-    def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> object:
-        asked.append((ensembles, steps, frozen))
-        return true(learned, ensembles, steps, frozen=frozen)
-
+    move_of = Mock(wraps=kept.move_of)
     monkeypatch.setattr(kept, "move_of", move_of)
     target = gaussian(D)
     policy = Policy(ensembles=ENSEMBLES, walkers=WALKERS, block=16)
@@ -213,6 +208,7 @@ def test_a_block_is_kept_with_its_densities_and_what_it_cost(monkeypatch: pytest
         assert found.accepted == (np.diff(whole, axis=0) != 0).any(axis=2).sum()
         assert state.evaluations == 1000 + found.evaluations
         assert target.evaluations - before >= 16 * ENSEMBLES * WALKERS
+    asked = [(*call.args[1:], call.kwargs["frozen"]) for call in move_of.call_args_list]
     assert asked == [(ENSEMBLES, 16, True)] * 2
 
 
