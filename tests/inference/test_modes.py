@@ -1,8 +1,16 @@
-"""Rows far from one another, where there are enough of them."""
+"""Climbs: steps by residuals and by differences, whole and shortened, and where they end; rows far from one another."""
 
 import numpy as np
+import pytest
 
+from tests.statistical.targets import Silent
+from wirebayes.effects import named
+from wirebayes.inference.modes import climb
 from wirebayes.inference.sampler.mixture import spread_rows
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.model.linear_amplitudes import integrated
+from wirebayes.model.problem import build, with_readings
+from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 
 def test_rows_are_spread_and_never_repeated():
@@ -10,3 +18,109 @@ def test_rows_are_spread_and_never_repeated():
     for wanted, found in ((2, 2), (3, 3), (5, 3)):
         rows = spread_rows(x, wanted, np.random.default_rng(wanted))
         assert len(rows) == found == len(np.unique(x[rows], axis=0))
+
+
+def simulated(*effects, likelihood="chain"):
+    made = draw([Bench()], Truth({"k1": 900.0, "B": 0.4, "U": 0.7, "k2": 0.03, "N": 0.6}), seed=4)
+    problem = build([Bench().experiment()], [named(e) for e in effects], likelihood=likelihood)
+    return LogPosterior(integrated(with_readings(problem, [s.readings for s in made.problem.samples])))
+
+
+@pytest.mark.parametrize(
+    "effects, likelihood", [((), "chain"), ((), "hold"), (("toe",), "chain"), (("sensor_drift",), "chain")]
+)
+def test_residuals_and_differences_lead_to_the_same_place(effects, likelihood):
+    """From the same starts, one of them far out; where both end, value and curvature agree."""
+    target = simulated(*effects, likelihood=likelihood)
+    density, residuals = target.rowwise()
+    begin = target.coordinates.to_sampled(target.problem.prior.rvs(400, np.random.default_rng(1)))
+    value = density(begin, np.arange(len(begin)))
+    assert residuals(begin, np.arange(len(begin)))[0] == pytest.approx(value, rel=1e-9)
+    highest = np.argsort(-value)[[0, 1, 100]]
+    found, cost = [], []
+    for how in (residuals, None):
+        before = target.evaluations
+        found.append(climb(density, begin[highest], how, iterations=200))
+        cost.append(target.evaluations - before)
+    best, other = (f.z[np.argmax(f.log_density)] for f in found)
+    assert found[0].converged.any() and density(best[None], [0]) == pytest.approx(density(other[None], [0]), abs=1e-3)
+    if np.abs(best - other).max() < 1e-2:
+        ends = [f.curvature[np.argmax(f.log_density)] for f in found]
+        assert np.diag(ends[0]) == pytest.approx(np.diag(ends[1]), rel=0.05)
+    assert cost[0] < cost[1]
+
+
+def test_every_row_climbs_with_its_own_readings():
+    target = simulated()
+    [measured] = [s.readings for s in target.problem.samples]
+    readings = np.concatenate([measured, 1.1 * measured], axis=-1)
+    density, residuals = target.rowwise([readings])
+    start = np.repeat(target.coordinates.to_sampled(target.problem.prior.rvs(1, np.random.default_rng(0))), 2, axis=0)
+    together = climb(density, start, residuals, tolerance=1e-9)
+    for row in range(2):
+        alone = climb(*_only(target, readings[..., [row]], start[[row]]), tolerance=1e-9)
+        assert together.log_density[row] == pytest.approx(alone.log_density[0], abs=1e-5)
+    assert together.log_density[0] != pytest.approx(together.log_density[1], abs=0.1)
+
+
+def _only(target, readings, start):
+    density, residuals = target.rowwise([readings])
+    return density, start, residuals
+
+
+def misled(factor):
+    """-x²/2, whose residuals promise a step that many times too long."""
+
+    def density(x, rows):
+        return -0.5 * (x**2).sum(axis=1)
+
+    return density, lambda x, rows: (density(x, rows), x.T / np.sqrt(factor))
+
+
+@pytest.mark.parametrize("factor, after", [(1.0, 0.0), (1.7, -0.7), (1.8, 0.1), (5.0, 0.0)])
+def test_a_whole_step_is_taken_that_gains_a_quarter_of_its_promise(factor, after):
+    """The gain over the promise is 2 - factor; else the best of several parts of the step is taken."""
+    density, residuals = misled(factor)
+    found = climb(density, np.array([[0.3]]), residuals, iterations=2, curvature_at_end=False)
+    assert found.z[0, 0] == pytest.approx(0.3 * after, abs=1e-6)
+
+
+def test_a_step_out_of_the_support_is_shortened_and_a_start_outside_is_left():
+    def density(x, rows):
+        return np.where(np.abs(x[:, 0]) < 1.0, np.log(np.maximum(1.0 - x[:, 0] ** 2, 1e-300)), -np.inf)
+
+    start = np.array([[0.9], [1.5]])
+    found = climb(density, start, lambda x, rows: (density(x, rows), 0.1 * x.T), tolerance=1e-8, iterations=500)
+    assert found.z[:, 0] == pytest.approx([0.0, 1.5], abs=1e-3)
+    assert found.converged.tolist() == [True, False] and np.isfinite(found.log_density).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("tolerance, converged", [(0.011, True), (0.009, False)])
+def test_a_climb_ends_where_half_the_squared_decrement_is_below_the_tolerance(tolerance, converged):
+    density, residuals = misled(1.0)
+    start = np.array([[np.sqrt(0.02)]])
+    found = climb(density, start, residuals, iterations=1, tolerance=tolerance)
+    assert found.converged[0] == converged and found.z[0, 0] == start[0, 0]
+
+
+def test_the_curvature_at_the_end_is_that_of_the_density_whatever_the_residuals_say():
+    density, residuals = misled(1.5)
+    start = np.array([[0.5, -0.2]])
+    assert climb(density, start, residuals).curvature[0] == pytest.approx(np.eye(2), abs=1e-5)
+    rough = climb(density, start, residuals, curvature_at_end=False).curvature[0]
+    assert rough == pytest.approx(np.eye(2) / 1.5, abs=1e-5)
+
+
+@pytest.mark.parametrize("effects", [(), ("toe", "thermal_expansion", "memory", "second_relaxation")])
+def test_the_residuals_of_the_prior_have_its_curvature(effects):
+    """At the middle of the prior, where no residual is left to bend."""
+    built = build([Bench().experiment()], [named(e) for e in effects])
+    target = LogPosterior(Silent(built.samples, built.prior, built.likelihood))
+    density, residuals = target.rowwise()
+    middle = np.array([[d.median() for d in built.prior.distributions.values()]])
+    z = target.coordinates.to_sampled(middle)
+    found = climb(density, z, residuals, tolerance=1e-10)
+    assert found.converged[0] and np.abs(found.z - z).max() < 1e-3
+    slopes = [residuals(z + m, [0])[1] - residuals(z - m, [0])[1] for m in 1e-5 * np.eye(z.shape[1])]
+    slopes = np.hstack(slopes) / 2e-5
+    assert slopes.T @ slopes == pytest.approx(found.curvature[0], rel=2e-3, abs=2e-3)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.statistical.targets import Silent
 from wirebayes.effects import named
 from wirebayes.inference.transform import LogPosterior, Transformation
 from wirebayes.model.pooling import pooled
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.staircase import simulate
 
@@ -125,10 +126,6 @@ def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates():
 
 
 def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread():
-    class Silent(Problem):
-        def log_likelihood(self, theta, readings=None):
-            return np.zeros(len(theta))
-
     problem = PROBLEMS["pooled"]
     silent, names = Silent(problem.samples, problem.prior, problem.likelihood), problem.names
     theta = problem.prior.rvs(500, np.random.default_rng(3))

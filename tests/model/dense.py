@@ -40,3 +40,20 @@ def conditional(r, covariance, own):
     """log p(r[own] | the others)."""
     rest = ~own
     return log_density(r, covariance) - (log_density(r[rest], covariance[np.ix_(rest, rest)]) if rest.any() else 0.0)
+
+
+def information(normal_at, d, step=1e-5):
+    """(d, d) expected information of d parameters; `normal_at` moves (d,) gives residuals and covariance there."""
+    moves = step * np.eye(d)
+    pairs = [(normal_at(move), normal_at(-move)) for move in moves]
+    slopes = [[(one - other) / (2.0 * step) for one, other in zip(*pair, strict=True)] for pair in pairs]
+    inverse = np.linalg.inv(normal_at(np.zeros(d))[1])
+    return np.array(
+        [[r @ inverse @ other + 0.5 * np.trace(inverse @ v @ inverse @ w) for other, w in slopes] for r, v in slopes]
+    )
+
+
+def relative_spectrum(found, expected):
+    """Eigenvalues of one positive matrix in units of another."""
+    root = np.linalg.cholesky(expected)
+    return np.linalg.eigvalsh(np.linalg.solve(root, np.linalg.solve(root, found).T))

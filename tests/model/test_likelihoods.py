@@ -5,7 +5,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tests.model.dense import columns, conditional, jacobian, log_density, normal
+from tests.model.dense import (
+    columns,
+    conditional,
+    information,
+    jacobian,
+    log_density,
+    normal,
+    relative_spectrum,
+)
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import named
 from wirebayes.model import likelihoods
@@ -82,6 +90,37 @@ def test_effects_that_carry_a_state_of_their_own_are_close_to_the_dense_normal(k
         depth.append(log_density(r, covariance))
     print(f"{key}: log-likelihood differs by {np.abs(gaps).max():.3f} at most, its own sd is {np.std(depth):.2f}")
     assert np.abs(gaps).max() < 0.25 * np.std(depth)
+
+
+def test_residuals_give_the_log_likelihood_and_its_expected_information():
+    """J'J on average over data sets of the model: nearly exact but for the two errors, where half as much is allowed."""
+    theta, step = PLAIN | ERRORS, 1e-5
+    names = list(theta)
+
+    def at(move):
+        return {name: theta[name] + by * (abs(theta[name]) or 1.0) for name, by in zip(names, move, strict=True)}
+
+    def standardised(move, y):
+        own = at(move)
+        variance, setting = np.array([own["sensor_sd"] ** 2]), np.array([own["setting_sd"]])
+        line = linearise(LOADING, columns(own))
+        return likelihoods.standardised(line, y[..., None], LOADING.mask, variance, setting)
+
+    found = []
+    for seed in range(100):
+        y = measured(LOADING, theta, seed=seed)
+        assert standardised(np.zeros(len(names)), y)[0] == pytest.approx(
+            filtered(LOADING, theta, y).log_likelihood.sum()
+        )
+        slopes = [standardised(m, y)[1] - standardised(-m, y)[1] for m in step * np.eye(len(names))]
+        slopes = np.hstack(slopes) / (2.0 * step)
+        found.append(slopes.T @ slopes)
+    expected = information(lambda move: normal(LOADING, at(move), Model(), measured(LOADING, theta))[:2], len(names))
+    found = np.mean(found, axis=0)
+    print(names, np.diag(found) / np.diag(expected), relative_spectrum(found, expected))
+    assert np.diag(found)[:6] == pytest.approx(np.diag(expected)[:6], rel=0.02)
+    spectrum = relative_spectrum(found, expected)
+    assert spectrum[0] > 0.7 and spectrum[-1] < 1.7
 
 
 def test_dropping_the_carried_creep_is_noticed():

@@ -47,6 +47,35 @@ def test_the_density_is_the_normal_one_with_the_amplitudes_covariance(name):
         assert found[i] == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
+def test_residuals_give_the_log_likelihood_and_its_expected_information_without_the_amplitudes():
+    inner = integrated(problem_of("roc-line-1m"))
+    theta, step = likely(inner, 1)[0], 1e-5
+    [sample], [shapes] = inner.samples, inner.shapes
+    added = shapes[sample.protocol.mask] * inner.sd
+
+    def normal_at(move):
+        own = {k: v[0] for k, v in inner.parameters((theta * (1.0 + move))[None], sample).items()}
+        r, covariance, _ = dense.normal(
+            sample.protocol, own, sample.model, sample.readings[..., 0], sample.resolution_N
+        )
+        return r, covariance + added @ added.T
+
+    model, covariance = normal_at(np.zeros(len(theta)))
+    noise = np.linalg.cholesky(covariance) @ np.random.default_rng(0).normal(size=(len(model), 200))
+    readings = np.repeat(sample.readings, 200, axis=-1)
+    readings[sample.protocol.mask] += noise - model[:, None]  # data sets of the model
+    moves = step * np.concatenate([np.eye(len(theta)), -np.eye(len(theta))])
+    residuals = [inner.standardised(np.tile(theta * (1.0 + m), (200, 1)), [readings])[1] for m in moves]
+    slopes = (np.array(residuals[: len(theta)]) - np.array(residuals[len(theta) :])) / (2.0 * step)
+    spectrum = dense.relative_spectrum(
+        np.einsum("imn,jmn->ij", slopes, slopes) / 200, dense.information(normal_at, len(theta))
+    )
+    print(spectrum)
+    assert spectrum[0] > 0.7 and spectrum[-1] < 1.7
+    value = inner.standardised(theta[None])[0]
+    assert value == pytest.approx(inner.log_likelihood(theta[None]), rel=1e-12)
+
+
 @pytest.mark.parametrize("effects", [(), ("toe",)])
 def test_bayes_rule_holds_at_every_completed_draw(effects):
     whole = problem_of("roc-line-1m", *effects)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.inference.fit import fit
-from wirebayes.inference.modes import climb, rowwise
+from wirebayes.inference.modes import climb
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import build, with_readings
@@ -45,7 +45,7 @@ def planned_over_sampled(bench):
     theta = np.array([[CENTRE[name] for name in problem.names]])
     y = readings(problem, theta, problem.samples[0], np.random.default_rng(3))
     target = LogPosterior(problem)
-    found = climb(rowwise(target, [y]), target.coordinates.to_sampled(theta), iterations=40, tolerance=1e-3)
+    found = climb(target.rowwise([y])[0], target.coordinates.to_sampled(theta), iterations=40, tolerance=1e-3)
     draws, weight = widths._weighted(target, found.z, found.covariance, y, np.random.default_rng(4))
     ours = np.array([widths._row_widths(column[None], weight)[0, 1] for column in draws.T])
     policy = Policy(ensembles=2, walkers=64, ess=800, rounds=3, most_rounds=5, round_draws=2048, most_steps=200)

@@ -151,6 +151,9 @@ class Between(Problem):
             value = without[0][0] + self.power * (whole - without[0][0])
         return np.where(np.isfinite(value), value, -np.inf)
 
+    def standardised(self, theta: np.ndarray, readings: object = None) -> tuple[np.ndarray, np.ndarray]:
+        return self.log_likelihood(theta), super().standardised(theta)[1]
+
 
 @pytest.mark.slow
 @pytest.mark.statistical

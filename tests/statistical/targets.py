@@ -6,6 +6,8 @@ import numpy as np
 from scipy import stats
 from scipy.special import logsumexp
 
+from wirebayes.model.problem import Problem
+
 D = 8
 
 
@@ -26,6 +28,19 @@ class Analytic:
     def __call__(self, z, readings=None):
         self.evaluations += len(z)
         return np.atleast_1d(self.log_density(z))  # scipy makes a number of one row
+
+    def rowwise(self, readings=None):
+        return lambda points, rows: self(points), None
+
+
+class Silent(Problem):
+    """No reading says anything."""
+
+    def log_likelihood(self, theta, readings=None):
+        return np.zeros(len(theta))
+
+    def standardised(self, theta, readings=None):
+        return np.zeros(len(theta)), np.zeros((0, len(theta)))
 
 
 def gaussian(d=D):

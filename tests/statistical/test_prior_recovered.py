@@ -4,23 +4,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.statistical.targets import Silent
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.transform import Transformation
 from wirebayes.model.pooling import pooled
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 pytestmark = pytest.mark.statistical
 POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0)
-
-
-class Silent(Problem):
-    """No reading says anything."""
-
-    def log_likelihood(self, theta, readings=None):
-        return np.zeros(len(theta))
 
 
 def silent(effects=(), likelihood="chain"):

@@ -15,7 +15,7 @@ from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, 
 from wirebayes.discovery.refit import occam
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.inference.modes import climb, rowwise
+from wirebayes.inference.modes import climb
 from wirebayes.model.problem import LENGTH_EXPONENT
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.typing import Array
@@ -168,7 +168,8 @@ def replicated(
     theta = block.target.coordinates.to_natural(z)
     problem = block.target.problem
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
-    found = climb(rowwise(block.target, y), z, iterations=25, tolerance=1e-2, curvature_at_end=False)
+    density, residuals = block.target.rowwise(y)
+    found = climb(density, z, residuals, iterations=25, tolerance=1e-2, curvature_at_end=False)
     shapes = forms(block.target, block.modes.z[:1], trials)
     parts = []
     for begin in range(0, n, _ROWS):

@@ -187,7 +187,11 @@ class Pinned:
         def density(points: Array, rows: Array) -> Array:
             return self.target(self._insert(points, amplitude[rows])) - _LOG_FLAT
 
-        return climb(density, start, iterations=40, tolerance=1e-2)
+        def residuals(points: Array, rows: Array) -> tuple[Array, Array]:
+            value, every = self.target.standardised(self._insert(points, amplitude[rows]))
+            return value - _LOG_FLAT, every
+
+        return climb(density, start, residuals, iterations=40, tolerance=1e-2)
 
     def natural(self, z: Array, amplitude: Array) -> Array:
         """(n, d) parameters of all columns."""

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.mixture import spread_rows
-from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.transform import Density, LogPosterior, Residuals
 from wirebayes.resampling import next_power, systematic_rows
 from wirebayes.typing import Array
 
-Density = Callable[[Array, Array], Array]
 _LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
 _LOOKED = 400  # places at which it is tested whether a mode explains them
 # where on the line to a mode the density is evaluated: a valley between two hills seldom avoids all three
@@ -26,7 +25,11 @@ _LEAST_SAG = 1.0  # nats
 _LOOKS = 12  # at most, for modes that explain places left over
 _MANY = 2  # new modes in one look: there may be more
 _ONE_MODE = 4.0  # squared standard deviations
-# of a Newton step, tried in one batch: whole, down to a thousandth where the curvature misleads
+_ENOUGH = 0.25  # of what a whole step promises to gain: with less, parts of it are tried
+_LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
+_NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
+_NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard deviation
+# of a step, tried in one batch: whole, down to a thousandth where the curvature misleads
 _LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
 
 
@@ -69,9 +72,19 @@ class Optimum:
         return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
 
 
+@dataclass(frozen=True)
+class _Local:
+    """A density at places: its value (n,), gradient (n, d), and curvature (n, d, d), minus the Hessian or nearly so."""
+
+    value: Array
+    gradient: Array
+    curvature: Array
+
+
 def climb(
     density: Density,
     start: Array,
+    residuals: Residuals | None = None,
     *,
     iterations: int = 60,
     tolerance: float = 1e-5,
@@ -80,66 +93,83 @@ def climb(
 ) -> Optimum:
     """Maximise a log density from every row of `start`.
 
+    The steps are Newton's. With `residuals` the curvature is the expected information (Fisher scoring), which d + 1
+    evaluations give and which also points uphill where the density is not concave; without, differences give the
+    Hessian, which takes d² / 2.
+
     Parameters
     ----------
     density : function of ((m, d) points, (m,) row numbers) to (m,) values
         The row numbers say which start a point belongs to.
     start : (n, d) array
+    residuals : function of ((m, d) points, (m,) row numbers) to (m,) values and (k, m) residuals, optional
+        The density with what its curvature is made of, as `LogPosterior.standardised` returns them.
     iterations : int
     tolerance : float
         Stop a row when half its squared Newton decrement is below this.
     until : function of (m, d) points to (m,) bool
         Give up the rows, after a step, for which it says so; their log density becomes -inf.
     curvature_at_end : bool
-        Where only the places matter, the curvature may stay that of the last step: it takes half the evaluations.
+        Where only the places matter, the curvature may stay that of the last step: the Hessian takes half the
+        evaluations.
 
     Returns
     -------
     Optimum
     """
-    z = start.copy()
-    n, d = z.shape
-    value = density(z, np.arange(n))
-    curvature = np.broadcast_to(np.eye(d), (n, d, d)).copy()
-    step_size = np.full((n, d), 1e-3)
-    done = ~np.isfinite(value)
-    converged = np.zeros(n, bool)
+    n, d = start.shape
+    look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
+    z, value = start.copy(), np.full(n, -np.inf)
+    curvature = np.broadcast_to(_NARROW**-2 * np.eye(d), (n, d, d)).copy()
+    # Where to look next: at the end of a whole step, in the hope that it is taken, or, after a shorter one, at `z`.
+    ahead, promised, arrived = start.copy(), np.zeros(n), np.ones(n, bool)
+    done, converged = np.zeros(n, bool), np.zeros(n, bool)
     for _ in range(iterations):
         rows = np.flatnonzero(~done)
         if not len(rows):
             break
-        gradient, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=1)
-        eigen, vectors = _positive(-hessian)
-        along = np.einsum("nij,ni->nj", vectors, gradient)
-        curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
-        decrement = 0.5 * (along**2 / eigen).sum(axis=1)
-        step_size[rows] = np.clip(0.1 / np.sqrt(np.maximum(np.einsum("nii->ni", curvature[rows]), 1.0)), 1e-6, 0.05)
-        finished = decrement < tolerance
-        converged[rows[finished]] = True
-        done[rows[finished]] = True
-        go = ~finished
-        rows, along, eigen, vectors = rows[go], along[go], eigen[go], vectors[go]
-        if not len(rows):
-            break
-        # The direction always climbs; try several lengths at once and keep the best, no line search in Python.
+        local = look(ahead[rows], rows, curvature[rows])
+        least = np.where(arrived[rows], -np.inf, value[rows] + _ENOUGH * promised[rows])
+        kept = np.isfinite(local.value) & (local.value > least)
+        done[rows[arrived[rows] & ~kept]] = True
+        short = rows[~kept & ~arrived[rows]]
+        if len(short):
+            z[short], value[short], better = _shortened(density, z[short], value[short], ahead[short], short)
+            ahead[short], arrived[short], done[short] = z[short], True, ~better
+        here = rows[kept]
+        z[here], value[here] = ahead[here], local.value[kept]
+        eigen, vectors = _positive(local.curvature[kept])
+        curvature[here] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
+        along = np.einsum("nij,ni->nj", vectors, local.gradient[kept])
+        promised[here] = 0.5 * (along**2 / eigen).sum(axis=1)
+        converged[here] = done[here] = promised[here] < tolerance
         direction = np.einsum("nij,nj->ni", vectors, along / eigen)
-        direction *= np.minimum(1.0, 2.0 / np.abs(direction).max(axis=1, keepdims=True))
-        trial = z[rows, None] + _LENGTHS[:, None] * direction[:, None, :]
-        tried = density(trial.reshape(-1, d), np.repeat(rows, len(_LENGTHS))).reshape(len(rows), -1)
-        best = np.argmax(tried, axis=1)
-        gained = tried[np.arange(len(rows)), best]
-        better = gained > value[rows]
-        z[rows[better]] = trial[np.arange(len(rows)), best][better]
-        value[rows[better]] = gained[better]
-        done[rows[~better]] = True
-        left = rows[until(z[rows])]
+        ahead[here] = z[here] + direction * np.minimum(1.0, _LONGEST / np.abs(direction).max(axis=1, keepdims=True))
+        arrived[here] = False
+        left = rows[~done[rows]]
+        left = left[until(z[left])]
         done[left], value[left] = True, -np.inf
     rows = np.flatnonzero(np.isfinite(value))
     if len(rows) and curvature_at_end:
-        _, hessian = _derivatives(density, z[rows], rows, value[rows], step_size[rows], sides=2)
+        _, hessian = _derivatives(density, z[rows], rows, value[rows], _steps(curvature[rows]), sides=2)
         eigen, vectors = _positive(-hessian)
         curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
     return Optimum(z, value, curvature, converged)
+
+
+def _shortened(
+    density: Density, z: Array, value: Array, ahead: Array, rows: NDArray[np.int64]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The best of several parts of the way ahead, its value, and whether it is any better than where the step began."""
+    trial = z[:, None] + _LENGTHS[:, None] * (ahead - z)[:, None, :]
+    tried = density(trial.reshape(-1, z.shape[1]), np.repeat(rows, len(_LENGTHS))).reshape(len(rows), -1)
+    every, best = np.arange(len(rows)), np.argmax(tried, axis=1)
+    better = tried[every, best] > value
+    return (
+        np.where(better[:, None], trial[every, best], z),
+        np.where(better, tried[every, best], value),
+        better,
+    )
 
 
 def _positive(matrices: Array) -> tuple[Array, Array]:
@@ -147,6 +177,38 @@ def _positive(matrices: Array) -> tuple[Array, Array]:
     eigen, vectors = np.linalg.eigh(matrices)
     scale = np.maximum(np.abs(eigen).max(axis=1, keepdims=True), 1e-8)
     return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
+
+
+def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], before: Array) -> _Local:
+    """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
+    n, d = z.shape
+    points = z[:, None] + np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
+    values, each = residuals(points.reshape(-1, d), np.repeat(rows, d + 1))
+    values, each = values.reshape(n, d + 1), each.reshape(-1, n, d + 1)
+    with np.errstate(all="ignore"):
+        slopes = np.moveaxis(each[..., 1:] - each[..., :1], 0, 1) / _NEAR
+        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+        curvature = np.swapaxes(slopes, 1, 2) @ slopes
+        # a difference to one side, put right by the curvature
+        gradient = (values[:, 1:] - values[:, :1]) / _NEAR + 0.5 * _NEAR * np.einsum("nii->ni", curvature)
+    return _Local(values[:, 0], np.where(np.isfinite(gradient), gradient, 0.0), curvature)
+
+
+def _by_differences(density: Density, z: Array, rows: NDArray[np.int64], before: Array) -> _Local:
+    """Curvature and gradient from differences of values alone, as far apart as the curvature `before` suggests."""
+    value = density(z, rows)
+    inside = np.isfinite(value)
+    gradient, hessian = np.zeros(z.shape), np.broadcast_to(np.eye(z.shape[1]), before.shape).copy()
+    if inside.any():
+        gradient[inside], hessian[inside] = _derivatives(
+            density, z[inside], rows[inside], value[inside], _steps(before[inside]), sides=1
+        )
+    return _Local(value, gradient, -hessian)
+
+
+def _steps(curvature: Array) -> Array:
+    """(n, d) steps of differences: a tenth of a standard deviation, as curvatures (n, d, d) say."""
+    return np.clip(0.1 / np.sqrt(np.maximum(np.einsum("nii->ni", curvature), 1.0)), 1e-6, 0.05)
 
 
 def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array, sides: int) -> tuple[Array, Array]:
@@ -242,7 +304,8 @@ def search(
     width = passed.std(axis=0)
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
     start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
-    found = distinct([climb(lambda points, rows: target(points), start)])
+    density, residuals = target.rowwise()
+    found = distinct([climb(density, start, residuals)])
     looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     for _ in range(_LOOKS):
@@ -253,7 +316,7 @@ def search(
         share = sag[strange] / sag[strange].sum()
         chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
         known, before = partial(_near, modes=found.z, curvature=found.curvature), len(found.z)
-        found = distinct([found, climb(lambda points, rows: target(points), passed[chosen], until=known)])
+        found = distinct([found, climb(density, passed[chosen], residuals, until=known)])
         if len(found.z) < before + _MANY:
             break
     return Search(found, warm, cold, cold_height)
@@ -327,8 +390,3 @@ def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generat
         way.append(z)
         height.append(value)
     return np.concatenate(way), np.concatenate(height)
-
-
-def rowwise(target: LogPosterior, readings: Sequence[Array]) -> Density:
-    """A density whose row r sees the r-th of the replicated readings, per sample (H, R, n)."""
-    return lambda points, rows: target(points, [y[..., rows] for y in readings])

@@ -16,6 +16,7 @@ The proposal learns the remaining curvature and funnels (`wirebayes.inference.sa
 columns are ordered: errors before what they widen, the shape of the creep before its amount and the stiffness.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,9 +28,12 @@ from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
 
+Density = Callable[[Array, Array], Array]
+Residuals = Callable[[Array, Array], tuple[Array, Array]]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
 _STEEPEST = 1.6  # a larger U of a pool is of no ridge that data see; to follow it would only bend the prior's tail
+_ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
 
 
@@ -86,6 +90,10 @@ class Transformation:
         for i, distribution in free:
             if i not in self.edges:
                 self.scale[i] = _spread(distribution)
+        self.log_spread = np.ones(len(names))
+        for i in np.flatnonzero(self.log_columns):
+            low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
+            self.log_spread[i] = 0.5 * np.log(high / low)
         self.specimens = specimens(problem)
         first = () if self.specimens is None else self.specimens.spreads
         steepest = np.inf if self.specimens is None else _STEEPEST
@@ -150,6 +158,23 @@ class Transformation:
             total = total + self.specimens.log_jacobian(theta)
         return np.asarray(total)
 
+    def prior_residuals(self, theta: Array, z: Array) -> Array:
+        """(d, n) distances from the middle of the prior in its standard deviations, but for a constant each.
+
+        Parameters
+        ----------
+        theta, z : (n, d) arrays
+            Natural parameters and their coordinates.
+        """
+        # other coordinates than logarithms have a standard deviation of one already
+        out = np.where(self.log_columns, np.log(np.where(self.log_columns, theta, 1.0)), z) / self.log_spread
+        if self.specimens is not None:
+            own, lines, spreads = (
+                theta[:, i] for i in (self.specimens.own, self.specimens.lines, self.specimens.spreads)
+            )
+            out[:, self.specimens.own] = np.log(own / lines) / spreads
+        return np.asarray(out.T)
+
     def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:
         return theta[:, ridge.where[name]] if name in ridge.where else ridge.fixed[name]
 
@@ -213,6 +238,43 @@ class LogPosterior:
         pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
         return np.concatenate(
             [self._values(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
+        )
+
+    def standardised(self, z: Array, readings: Any = None) -> tuple[Array, Array]:
+        """(n,) log density, and (m, n) residuals whose derivatives J give its curvature nearly, as JᵀJ.
+
+        Those of the likelihood (`wirebayes.model.problem.Problem.standardised`), and those of the prior.
+        """
+        self.evaluations += len(z)
+        pieces = [slice(i, i + self._rows) for i in range(0, max(len(z), 1), self._rows)]
+        parts = []
+        for p in pieces:
+            theta = self.coordinates.to_natural(z[p])
+            with np.errstate(all="ignore"):
+                prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta)
+                residuals = self.coordinates.prior_residuals(theta, z[p])
+            picked = None if readings is None else [y[..., p] for y in readings]
+            value, left = self.problem.standardised(theta, picked)
+            value = np.where(np.isfinite(prior), prior + value, -np.inf)
+            parts.append((value, np.concatenate([left, residuals])))
+        values, residuals = zip(*parts, strict=True)
+        return np.concatenate(values), np.concatenate(residuals, axis=1)
+
+    def rowwise(self, readings: Sequence[Array] | None = None) -> tuple[Density, Residuals]:
+        """The density, and the same with its residuals, of points and row numbers, as a climb takes them.
+
+        Parameters
+        ----------
+        readings : sequence of (H, R, n) arrays, optional
+            In place of the measured ones, a sample each: row r sees the r-th of n.
+        """
+
+        def seen(rows: Array) -> list[Array] | None:
+            return None if readings is None else [y[..., rows] for y in readings]
+
+        return (
+            lambda points, rows: self(points, seen(rows)),
+            lambda points, rows: self.standardised(points, seen(rows)),
         )
 
     def _values(self, z: Array, readings: Any) -> Array:

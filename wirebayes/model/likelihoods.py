@@ -5,6 +5,7 @@ readings by all setting errors. One hold passes a single number on to the next, 
 factors hold by hold in linear time: a Kalman filter whose state is that number.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,11 +61,45 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     noise = _Noise.of(variance, setting_sd)
     for j in range(holds):
         if mask[j].any():
-            out[j], mean[j + 1], var[j + 1] = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise)
+            out[j], mean[j + 1], var[j + 1], _ = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise)
         else:
-            a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-            mean[j + 1], var[j + 1] = a * mean[j], a * a * var[j] + c * c * noise.setting_var
+            mean[j + 1], var[j + 1] = _unread(line, j, mean[j], var[j], noise)
     return Filtered(out, mean, var)
+
+
+def standardised(
+    line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array
+) -> tuple[Array, Array]:
+    """Log-likelihood, and residuals whose derivatives J give its curvature nearly: the expected information is J'J.
+
+    In each hold the residuals in sensor errors with the creep and the setting error at their best, those two in their
+    standard deviations (together their squares are the quadratic form), and the logarithms of the standard deviations,
+    whose derivatives are what the determinant adds to the information.
+
+    Parameters
+    ----------
+    line, readings, mask, variance, setting_sd
+        As for `chain`.
+
+    Returns
+    -------
+    (n,) and (m, n) arrays
+    """
+    n = line.tension.shape[2]
+    noise, total, out = _Noise.of(variance, setting_sd), np.zeros(n), []
+    mean, var = np.zeros(n), np.zeros(n)
+    for j in range(len(mask)):
+        if mask[j].any():
+            value, mean_after, var_after, (left, pull_c, pull_s, cc, ss) = _hold(
+                line, j, readings[j], mask[j], mean, var, noise
+            )
+            best = np.sqrt(var) * pull_c, np.sqrt(noise.setting_var) * pull_s
+            spread = np.sqrt(len(left)) * noise.log_variance, np.log1p(var * cc), np.log1p(noise.setting_var * ss)
+            out += [left * np.sqrt(noise.weight), *(b[None] for b in best), *(0.5 * s[None] for s in spread)]
+            total, mean, var = total + value, mean_after, var_after
+        else:
+            mean, var = _unread(line, j, mean, var, noise)
+    return total, np.concatenate(out)
 
 
 def held_out(
@@ -104,12 +139,20 @@ class _Noise:
         return cls(1.0 / variance, np.log(variance) + _LOG_2PI, setting_sd * setting_sd)
 
 
+def _unread(line: Linearised, j: int, m: Array, p: Array, noise: _Noise) -> tuple[Array, Array]:
+    """Mean and variance of the creep that a hold without readings carries on."""
+    a, c = line.carry_by_creep[j], line.carry_by_setting[j]
+    return a * m, a * a * p + c * c * noise.setting_var
+
+
 def _hold(
     line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, tuple[Array, ...]]:
     """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`.
 
-    Returns the log density of the readings, and the mean and the variance of the creep that it carries on.
+    Returns the log density of the readings, the mean and the variance of the creep that it carries on, and what the
+    density is made of: the residuals left (R, n), the pulls of the readings on creep and setting error, and the
+    information (n,) on either.
     """
     weight, setting_var = noise.weight, noise.setting_var
     keep = slice(None) if mask.all() else mask
@@ -127,7 +170,7 @@ def _hold(
     log_density = -0.5 * (square + r.shape[0] * noise.log_variance + np.log(det))
     a, c = line.carry_by_creep[j], line.carry_by_setting[j]
     mean = a * (m + post_c) + c * post_s
-    return log_density, mean, a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
+    return log_density, mean, a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss, (left, pull_c, pull_s, cc, ss)
 
 
 def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> tuple[Array, ...]:
@@ -312,6 +355,44 @@ def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array
     """
     holds, _, n = np.broadcast_shapes(readings.shape, (1, 1, len(variance)))
     out = np.zeros((holds, n))
+    for j, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
+        square = (np.einsum("rn,rn->n", left, left) + best * best) / variance
+        value = -0.5 * (square + len(left) * (np.log(variance) + _LOG_2PI) + np.log1p(aa))
+        out[j] = np.where(valid, value, 0.0)
+    return out
+
+
+def standardised_hold_by_hold(
+    protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array
+) -> tuple[Array, Array]:
+    """Log-likelihood of `hold_by_hold`, and residuals whose derivatives J give its curvature nearly, as J'J.
+
+    Parameters
+    ----------
+    protocol, theta, model, readings, variance
+        As for `hold_by_hold`.
+
+    Returns
+    -------
+    (n,) and (m, n) arrays
+    """
+    total, out, sd = np.zeros(len(variance)), [np.zeros((0, len(variance)))], np.sqrt(variance)
+    for _, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
+        every = np.vstack([left, best[None]]) / sd
+        log_sd = 0.5 * np.sqrt(len(left)) * np.log(variance)
+        value = -0.5 * ((every**2).sum(axis=0) + len(left) * (np.log(variance) + _LOG_2PI) + np.log1p(aa))
+        total = total + np.where(valid, value, 0.0)
+        out.append(np.where(valid, np.vstack([every, log_sd[None]]), 0.0))
+    return total, np.concatenate(out)
+
+
+def _single_holds(
+    protocol: Protocol, theta: Theta, model: Model, readings: Array
+) -> Iterator[tuple[int, Array, Array, Array, Array]]:
+    """Of each hold with several readings: where its length is known, residuals and first reading's error at their best.
+
+    The last is the squared ratio of slopes, summed over the readings.
+    """
     for j, fitted in enumerate(hold_courses(protocol, theta, model, readings[:, 0])):
         if fitted is None:
             continue
@@ -322,11 +403,8 @@ def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array
         ratio = slope[keep] / np.where(valid, slope[0], 1.0)
         r = readings[j][keep] - tension[keep]
         aa = np.einsum("rn,rn->n", ratio, ratio)
-        ar = np.einsum("rn,rn->n", ratio, r)
-        square = (np.einsum("rn,rn->n", r, r) - ar * ar / (1.0 + aa)) / variance
-        value = -0.5 * (square + len(keep) * (np.log(variance) + _LOG_2PI) + np.log1p(aa))
-        out[j] = np.where(valid, value, 0.0)
-    return out
+        best = np.einsum("rn,rn->n", ratio, r) / (1.0 + aa)
+        yield j, valid, r - ratio * best, best, aa
 
 
 def hold_courses(

@@ -5,6 +5,7 @@ other parameters, with the amplitudes integrated out, and each of its draws is c
 together, a draw of the whole posterior.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
-from wirebayes.wire.staircase import simulate
+from wirebayes.wire.staircase import Linearised, simulate
 
 _ROWS = 2048  # draws completed at once
 # relative; far more than rounding errors of parameters that fit, far less than a log-likelihood has to resolve
@@ -45,22 +46,42 @@ class MarginalisedProblem(Problem):
     def log_likelihood(self, theta: Array, readings: Any = None) -> Array:
         """(n,) log-likelihood of the other parameters; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
-            total, square, value, _, along = self._seen(theta, readings)
-            explained = (along**2 / value).sum(axis=1)
-            # At absurd parameters rounding may make more of the readings than there is to explain.
-            regular = (value[:, 0] > 1.0 - _ROUNDING) & (explained <= (1.0 + _ROUNDING) * square)
-            total = total + 0.5 * (explained - np.log(value).sum(axis=1) - ((self.mean / self.sd) ** 2).sum())
+            return self._log_likelihood(self._seen(self._lines(theta), readings))
+
+    def standardised(self, theta: Array, readings: Any = None) -> tuple[Array, Array]:
+        """(n,) log-likelihood of the other parameters, and (m, n) residuals with the amplitudes at their best."""
+        residuals = []
+        with np.errstate(all="ignore"):
+            lines = self._lines(theta)
+            seen = self._seen(lines, readings)
+            _, _, value, vectors, along = seen
+            best = np.einsum("nij,nj->in", vectors, along / value)
+            for i, (sample, (line, variance, setting_sd)) in enumerate(zip(self.samples, lines, strict=True)):
+                y = sample.readings if readings is None else readings[i]
+                left = y - np.einsum("hrk,kn->hrn", self.shapes[i] * self.sd, best)
+                residuals.append(likelihoods.standardised(line, left, sample.protocol.mask, variance, setting_sd)[1])
+            return self._log_likelihood(seen), np.concatenate([*residuals, best, 0.5 * np.log(value.T)])
+
+    def _lines(self, theta: Array) -> list[tuple[Linearised, Array, Array]]:
+        return [self.linearised(theta, sample) for sample in self.samples]
+
+    def _log_likelihood(self, seen: tuple[Array, ...]) -> Array:
+        total, square, value, _, along = seen
+        explained = (along**2 / value).sum(axis=1)
+        # At absurd parameters rounding may make more of the readings than there is to explain.
+        regular = (value[:, 0] > 1.0 - _ROUNDING) & (explained <= (1.0 + _ROUNDING) * square)
+        total = total + 0.5 * (explained - np.log(value).sum(axis=1) - ((self.mean / self.sd) ** 2).sum())
         return np.where(regular & np.isfinite(total), total, -np.inf)
 
     def drawn(self, theta: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
-        _, _, value, vectors, along = self._seen(theta, None)
+        _, _, value, vectors, along = self._seen(self._lines(theta), None)
         normal = rng.normal(size=along.shape)
         amplitudes = np.einsum("nij,nj->ni", vectors, along / value + normal / np.sqrt(value)) * self.sd
         log_density = 0.5 * (np.log(value) - normal**2 - np.log(2.0 * np.pi)).sum(axis=1)
         return amplitudes, log_density - np.log(self.sd).sum()
 
-    def _seen(self, theta: Array, readings: Any) -> tuple[Array, ...]:
+    def _seen(self, lines: Sequence[tuple[Linearised, Array, Array]], readings: Any) -> tuple[Array, ...]:
         """What the readings say of the amplitudes, in standard deviations of their priors.
 
         The log-likelihood of none (n,); no less than what there is to explain (n,), prior included; and of the
@@ -74,7 +95,7 @@ class MarginalisedProblem(Problem):
         pull: Any = self.mean / self.sd
         for i, sample in enumerate(self.samples):
             y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
-            line, variance, setting_sd = self.linearised(theta, sample)
+            line, variance, setting_sd = lines[i]
             filtered = likelihoods.chain(line, y, mask, variance, setting_sd)
             gram, along = likelihoods.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
             height = filtered.log_likelihood.sum(axis=0)

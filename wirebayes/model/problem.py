@@ -108,11 +108,7 @@ class Problem:
             y = sample.readings if readings is None else readings[i]
             variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
             if self.likelihood == "hold":
-                out.append(
-                    likelihoods.hold_by_hold(
-                        sample.protocol, own | {"preload": 0.0 * own["k1"]}, sample.model, y, variance
-                    )
-                )
+                out.append(likelihoods.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
                 line = linearise(sample.protocol, own, sample.model)
                 out.append(likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
@@ -123,6 +119,27 @@ class Problem:
         with np.errstate(all="ignore"):
             total: Array = sum(holds.sum(axis=0) for holds in self.hold_log_likelihood(theta, readings))
         return np.where(np.isfinite(total), total, -np.inf)
+
+    def standardised(self, theta: Array, readings: Sequence[Array] | None = None) -> tuple[Array, Array]:
+        """(n,) log-likelihood, and (m, n) residuals whose derivatives J give its curvature nearly, as JᵀJ.
+
+        See `wirebayes.model.likelihoods.standardised`; `readings` as for `hold_log_likelihood`.
+        """
+        values, residuals = [], []
+        with np.errstate(all="ignore"):
+            for i, sample in enumerate(self.samples):
+                y = sample.readings if readings is None else readings[i]
+                if self.likelihood == "hold":
+                    own = self.parameters(theta, sample)
+                    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+                    found = likelihoods.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
+                else:
+                    line, variance, setting_sd = self.linearised(theta, sample)
+                    found = likelihoods.standardised(line, y, sample.protocol.mask, variance, setting_sd)
+                values.append(found[0])
+                residuals.append(found[1])
+            total = np.sum(values, axis=0)
+        return np.where(np.isfinite(total), total, -np.inf), np.concatenate(residuals)
 
     def without_each_hold(self, theta: Array) -> tuple[Array, list[Array]]:
         """(n,) log-likelihood, and per sample the (H, n) of the readings of all holds, of all samples, but one."""

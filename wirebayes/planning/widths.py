@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.inference.modes import Density, climb, rowwise
-from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.modes import climb
+from wirebayes.inference.transform import Density, LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import frozen
 from wirebayes.json_files.plan import ExpectedWidth
@@ -142,7 +142,8 @@ def expected_widths(
     usable = np.isfinite(y[sample.protocol.mask]).all(axis=0) & np.isfinite(problem.prior.log_density()(truth))
     start = target.coordinates.to_sampled(truth[usable])
     y = y[..., usable]
-    found = climb(rowwise(target, [y]), start, iterations=40, tolerance=1e-3)
+    density, residuals = target.rowwise([y])
+    found = climb(density, start, residuals, iterations=40, tolerance=1e-3)
     good = np.flatnonzero(np.isfinite(found.log_density))
     longest = float(sample.protocol.duration_s.max())
     tension = typical_tension(test) if tension_N is None else tension_N
@@ -178,7 +179,7 @@ def _weighted(
     The first draws are spread as the curvature at the mode says, those of each further round as the weighted draws
     before them lie.
     """
-    density = rowwise(target, [y])
+    density, _ = target.rowwise([y])
     centre = z
     for count in _DRAWS:
         points, weight = _round(target, density, centre, _WIDER**2 * covariance, count, rng)
