@@ -190,3 +190,13 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
     found = refit._climbed(blocks, 100.0, np.array([5.0, 6.0]), starts)
     assert found.value.tolist() == [1.0 + 10.0 - 100.0, -np.inf]
     assert [ends[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-3])
+def test_the_width_bears_what_climbs_leave_over(jitter: float) -> None:
+    """Amplitudes crowded about the top, a thousandth of a nat between climbs; what lies lower than a nat is skewed."""
+    grid = np.array([-4.0, -1.2, -0.5, -0.05, -0.02, 0.0, 0.03, 0.06, 0.6, 1.3, 5.0])
+    value = -0.5 * grid**2 + jitter * np.array([0, 0, 0, 1, -1, 1, -1, 1, 0, 0, 0])
+    value[[0, -1]] += 3.0
+    assert refit._width(grid, value, 5, 1.0) == pytest.approx(1.0, rel=0.03)
+    assert refit._width(grid[:6], value[:6], 5, 7.0) == 7.0  # at the end of the grid nothing is known

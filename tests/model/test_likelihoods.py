@@ -93,7 +93,7 @@ def test_effects_that_carry_a_state_of_their_own_are_close_to_the_dense_normal(k
 
 
 def test_residuals_give_the_log_likelihood_and_its_expected_information():
-    """J'J on average over data sets of the model: nearly exact but for the two errors, where half as much is allowed."""
+    """On average over data sets of the model: exact but for the two errors, where half as much is allowed."""
     theta, step = PLAIN | ERRORS, 1e-5
     names = list(theta)
 

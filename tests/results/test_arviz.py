@@ -217,7 +217,8 @@ def test_loo_is_leaving_one_hold_out(
         before = az.loo(data, pointwise=True, reff=1.0)
     # two versions of Pareto smoothing fit the tail a little differently
     assert pointwise_of(theirs) == pytest.approx(ours.elpd, abs=0.02)
-    assert (np.abs(pointwise_of(before) - ours.elpd).max() > 0.06) == (kind != "hold")
+    apart, smoothing = (np.abs(pointwise_of(loo) - ours.elpd).max() for loo in (before, theirs))
+    assert (apart > 2.0 * smoothing) == (kind != "hold")
 
 
 def drawn(data: Any, names: list[str]) -> None:

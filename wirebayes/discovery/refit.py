@@ -17,6 +17,7 @@ from wirebayes.wire.effect import Effect
 # δ; end of the amplitudes' uniform prior. Hardly matters: twice as much takes ln 2 from every name alike
 LARGEST = 40.0
 _OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all
+_TOP = 1.0  # nats; neighbours alone may lie so close that their values' last digits decide
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice
 _DELTAS = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
 
@@ -165,11 +166,14 @@ def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:
 
 
 def _width(grid: Array, value: Array, best: int, fallback: float) -> float:
-    """Standard deviation of the amplitude, from the curvature of the evidence at its top."""
+    """Standard deviation of the amplitude: a parabola through the neighbours of the top and whatever is near it."""
     if 0 < best < len(grid) - 1:
-        x, y = (grid[best - 1 : best + 2] - grid[best]) / fallback, value[best - 1 : best + 2]
+        near = (value > value[best] - _TOP) & np.isfinite(value)
+        near[best - 1 : best + 2] = True
+        x, y = (grid[near] - grid[best]) / fallback, value[near] - value[best]
         if np.isfinite(y).all():
-            bend = 2.0 * ((y[2] - y[1]) / x[2] + (y[1] - y[0]) / x[0]) / (x[2] - x[0])
+            scale = np.abs(x).max()
+            bend = 2.0 * np.polyfit(x / scale, y, 2)[0] / scale**2
             if bend < 0:
                 return float(fallback / np.sqrt(-bend))
     return fallback

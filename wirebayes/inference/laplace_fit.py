@@ -191,7 +191,7 @@ class Pinned:
             value, every = self.target.standardised(self._insert(points, amplitude[rows]))
             return value - _LOG_FLAT, every
 
-        return climb(density, start, residuals, iterations=40, tolerance=1e-2)
+        return climb(density, start, residuals, iterations=40, tolerance=1e-3)
 
     def natural(self, z: Array, amplitude: Array) -> Array:
         """(n, d) parameters of all columns."""
