@@ -91,7 +91,7 @@ class Transformation:
             if i not in self.edges:
                 self.scale[i] = _spread(distribution)
         self.log_spread = np.ones(len(names))
-        for i in np.flatnonzero(self.log_columns):
+        for i in np.flatnonzero(self.log_columns).tolist():
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
             self.log_spread[i] = 0.5 * np.log(high / low)
         self.specimens = specimens(problem)

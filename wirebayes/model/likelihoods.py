@@ -7,6 +7,7 @@ factors hold by hold in linear time: a Kalman filter whose state is that number.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,7 +62,8 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     noise = _Noise.of(variance, setting_sd)
     for j in range(holds):
         if mask[j].any():
-            out[j], mean[j + 1], var[j + 1], _ = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise)
+            found = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise)
+            out[j], mean[j + 1], var[j + 1] = found.log_density, found.mean, found.var
         else:
             mean[j + 1], var[j + 1] = _unread(line, j, mean[j], var[j], noise)
     return Filtered(out, mean, var)
@@ -90,13 +92,12 @@ def standardised(
     mean, var = np.zeros(n), np.zeros(n)
     for j in range(len(mask)):
         if mask[j].any():
-            value, mean_after, var_after, (left, pull_c, pull_s, cc, ss) = _hold(
-                line, j, readings[j], mask[j], mean, var, noise
-            )
-            best = np.sqrt(var) * pull_c, np.sqrt(noise.setting_var) * pull_s
-            spread = np.sqrt(len(left)) * noise.log_variance, np.log1p(var * cc), np.log1p(noise.setting_var * ss)
-            out += [left * np.sqrt(noise.weight), *(b[None] for b in best), *(0.5 * s[None] for s in spread)]
-            total, mean, var = total + value, mean_after, var_after
+            here = _hold(line, j, readings[j], mask[j], mean, var, noise)
+            best = np.sqrt(var) * here.pull_c, np.sqrt(noise.setting_var) * here.pull_s
+            known = var * here.cc, noise.setting_var * here.ss
+            log_sd = np.sqrt(len(here.left)) * noise.log_variance, *(np.log1p(k) for k in known)
+            out += [here.left * np.sqrt(noise.weight), *(b[None] for b in best), *(0.5 * s[None] for s in log_sd)]
+            total, mean, var = total + here.log_density, here.mean, here.var
         else:
             mean, var = _unread(line, j, mean, var, noise)
     return total, np.concatenate(out)
@@ -123,7 +124,7 @@ def held_out(
     """
     noise, (mean, var) = _Noise.of(variance, setting_sd), (filtered.carried_mean, filtered.carried_var)
     holds = np.flatnonzero(mask.any(axis=1)).tolist()
-    return np.array([_hold(line, j, readings[j], mask[j], mean[j], var[j], noise)[0] for j in holds])
+    return np.array([_hold(line, j, readings[j], mask[j], mean[j], var[j], noise).log_density for j in holds])
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,15 +146,25 @@ def _unread(line: Linearised, j: int, m: Array, p: Array, noise: _Noise) -> tupl
     return a * m, a * a * p + c * c * noise.setting_var
 
 
-def _hold(
-    line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise
-) -> tuple[Array, Array, Array, tuple[Array, ...]]:
-    """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`.
+class _Read(NamedTuple):
+    """What the readings of one hold say.
 
-    Returns the log density of the readings, the mean and the variance of the creep that it carries on, and what the
-    density is made of: the residuals left (R, n), the pulls of the readings on creep and setting error, and the
-    information (n,) on either.
+    The log density (n,) of the readings; mean and variance (n,) of the creep carried on; what the readings leave over
+    (R, n); by how much they pull at the creep carried in and at the setting error, and what they know of either (n,).
     """
+
+    log_density: Array
+    mean: Array
+    var: Array
+    left: Array
+    pull_c: Array
+    pull_s: Array
+    cc: Array
+    ss: Array
+
+
+def _hold(line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise) -> _Read:
+    """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`."""
     weight, setting_var = noise.weight, noise.setting_var
     keep = slice(None) if mask.all() else mask
     by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
@@ -170,7 +181,8 @@ def _hold(
     log_density = -0.5 * (square + r.shape[0] * noise.log_variance + np.log(det))
     a, c = line.carry_by_creep[j], line.carry_by_setting[j]
     mean = a * (m + post_c) + c * post_s
-    return log_density, mean, a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss, (left, pull_c, pull_s, cc, ss)
+    var = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
+    return _Read(log_density, mean, var, left, pull_c, pull_s, cc, ss)
 
 
 def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> tuple[Array, ...]:
