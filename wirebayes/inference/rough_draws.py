@@ -70,8 +70,8 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
 
 
 _WIDER = 2.0  # times the covariance at a mode
-_EACH, _ROUNDS = 2500, 8  # draws a round: eight of them take less than the sampler's burn-in
+_EACH, _ROUNDS = 2500, 12  # draws a round: twelve of them take less than a short run
 _ENOUGH = 1500.0  # effective draws
-_HOT = 0.5  # power of the density that proposals are learned from, so that their tails are not too thin
-_LEARNED = 2500  # points
-_COMPONENTS = 6  # of a proposal: enough for two hills with long tails
+_HOT = 0.75  # power of the density that proposals are learned from, so that their tails are not too thin
+_LEARNED = 1500  # points
+_COMPONENTS = 3  # of a proposal; all rounds together have many more
