@@ -77,12 +77,43 @@ def misled(factor):
     return density, lambda x, rows: (density(x, rows), x.T / np.sqrt(factor))
 
 
-@pytest.mark.parametrize("factor, after", [(1.0, 0.0), (1.7, -0.7), (1.8, 0.1), (5.0, 0.0)])
-def test_a_whole_step_is_taken_that_gains_a_quarter_of_its_promise(factor, after):
-    """The gain over the promise is 2 - factor; else the best of several parts of the step is taken."""
+@pytest.mark.parametrize("factor, after", [(1.0, 0.0), (1.7, -0.7), (1.8, 1.0 - 1.8 / 2.8), (5.0, 1.0 - 5.0 / 6.0)])
+def test_a_step_is_taken_that_gains_a_quarter_of_its_promise(factor, after):
+    """The gain over the promise is 2 - factor; else the best of several damped steps is taken, here the first."""
     density, residuals = misled(factor)
     found = climb(density, np.array([[0.3]]), residuals, iterations=2, curvature_at_end=False)
     assert found.z[0, 0] == pytest.approx(0.3 * after, abs=1e-6)
+
+
+def test_damping_outlasts_the_step_that_needed_it_and_then_fades():
+    """The place of a damped step is looked at anew; the next step is damped as well, the one after it no longer."""
+    density, residuals = misled(1.8)
+    several = []
+
+    def counted(x, rows):
+        several.append(len(x))
+        return density(x, rows)
+
+    places = []
+    for iterations in range(1, 6):
+        several.clear()
+        found = climb(counted, np.array([[0.3]]), residuals, iterations=iterations, curvature_at_end=False)
+        places.append((found.z[0, 0] / 0.3, len(several)))
+    left = 1.0 - 1.8 / 2.8
+    for (found, cost), (place, times) in zip(places, [(1, 0), (left, 1), (left, 1), (left**2, 1), (left**3, 2)]):
+        assert found == pytest.approx(place, abs=1e-6) and cost == times
+
+
+@pytest.mark.parametrize("behind, given_up", [(19.5, False), (20.5, True)])
+def test_a_row_is_given_up_that_lies_behind_by_more_than_it_may_gain(behind, given_up):
+    """The other row is at the top; this one promises a nat, ten of which, and ten more, may be missing."""
+    start = np.array([[0.0], [np.sqrt(2.0)]])
+
+    def density(x, rows):
+        return -0.5 * (x**2).sum(axis=1) - np.where(rows == 1, behind - 1.0, 0.0)
+
+    found = climb(density, start, lambda x, rows: (density(x, rows), x.T), reach=10.0)
+    assert np.isinf(found.log_density[1]) == given_up and found.converged[1] != given_up
 
 
 def test_a_step_out_of_the_support_is_shortened_and_a_start_outside_is_left():

@@ -29,8 +29,11 @@ _ENOUGH = 0.25  # of what a whole step promises to gain: with less, parts of it 
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
 _NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
 _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard deviation
-# of a step, tried in one batch: whole, down to a thousandth where the curvature misleads
-_LENGTHS = np.array([1.0, 0.5, 0.2, 0.05, 0.01, 1e-3])
+# added to the curvature, tried in one batch where a step gains too little
+_DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
+_PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
+_REACH = 30.0  # nats below the best mode that no mode counts
+_RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of it kept after a step that was good; none below
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ def climb(
     iterations: int = 60,
     tolerance: float = 1e-5,
     until: Callable[[Array], NDArray[np.bool_]] = lambda z: np.zeros(len(z), bool),
+    reach: float = np.inf,
     curvature_at_end: bool = True,
 ) -> Optimum:
     """Maximise a log density from every row of `start`.
@@ -109,6 +113,8 @@ def climb(
         Stop a row when half its squared Newton decrement is below this.
     until : function of (m, d) points to (m,) bool
         Give up the rows, after a step, for which it says so; their log density becomes -inf.
+    reach : float
+        Give up, likewise, the rows that are lower than the best by more than this and ten times what they may gain.
     curvature_at_end : bool
         Where only the places matter, the curvature may stay that of the last step: the Hessian takes half the
         evaluations.
@@ -120,56 +126,61 @@ def climb(
     n, d = start.shape
     look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
     z, value = start.copy(), np.full(n, -np.inf)
-    curvature = np.broadcast_to(_NARROW**-2 * np.eye(d), (n, d, d)).copy()
-    # Where to look next: at the end of a whole step, in the hope that it is taken, or, after a shorter one, at `z`.
+    slope, eigen, vectors = np.zeros((n, d)), np.full((n, d), _NARROW**-2), np.tile(np.eye(d), (n, 1, 1))
+    # Where to look next: at the end of a step, in the hope that it is taken, or, after another one, at `z`.
     ahead, promised, arrived = start.copy(), np.zeros(n), np.ones(n, bool)
-    done, converged = np.zeros(n, bool), np.zeros(n, bool)
+    damping, done, converged = np.zeros(n), np.zeros(n, bool), np.zeros(n, bool)
     for _ in range(iterations):
         rows = np.flatnonzero(~done)
         if not len(rows):
             break
-        local = look(ahead[rows], rows, curvature[rows])
+        local = look(ahead[rows], rows, _composed(eigen[rows], vectors[rows]))
         least = np.where(arrived[rows], -np.inf, value[rows] + _ENOUGH * promised[rows])
         kept = np.isfinite(local.value) & (local.value > least)
         done[rows[arrived[rows] & ~kept]] = True
-        short = rows[~kept & ~arrived[rows]]
-        if len(short):
-            z[short], value[short], better = _shortened(density, z[short], value[short], ahead[short], short)
-            ahead[short], arrived[short], done[short] = z[short], True, ~better
+        failed = rows[~kept & ~arrived[rows]]
+        if len(failed):
+            steps = _step(slope[failed], eigen[failed], vectors[failed], _DAMPINGS)
+            trial = z[failed, None] + steps
+            tried = density(trial.reshape(-1, d), np.repeat(failed, len(_DAMPINGS))).reshape(len(failed), -1)
+            best = np.argmax(tried, axis=1)
+            better = np.take_along_axis(tried, best[:, None], axis=1)[:, 0] > value[failed]
+            done[failed] = ~better
+            moved, by = failed[better], best[better]
+            z[moved], value[moved] = trial[better, by], tried[better, by]
+            ahead[moved], arrived[moved], damping[moved] = z[moved], True, _DAMPINGS[by]
         here = rows[kept]
         z[here], value[here] = ahead[here], local.value[kept]
-        eigen, vectors = _positive(local.curvature[kept])
-        curvature[here] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
-        along = np.einsum("nij,ni->nj", vectors, local.gradient[kept])
-        promised[here] = 0.5 * (along**2 / eigen).sum(axis=1)
-        converged[here] = done[here] = promised[here] < tolerance
-        direction = np.einsum("nij,nj->ni", vectors, along / eigen)
-        ahead[here] = z[here] + direction * np.minimum(1.0, _LONGEST / np.abs(direction).max(axis=1, keepdims=True))
+        eigen[here], vectors[here] = _positive(local.curvature[kept])
+        slope[here] = np.einsum("nij,ni->nj", vectors[here], local.gradient[kept])
+        converged[here] = done[here] = 0.5 * (slope[here] ** 2 / eigen[here]).sum(axis=1) < tolerance
+        damping[here] = np.where(arrived[here], damping[here], damping[here] * _RELAX)
+        damping[here[damping[here] < _LEAST_DAMPING]] = 0.0
+        promised[here] = 0.5 * (slope[here] ** 2 / (eigen[here] + damping[here, None])).sum(axis=1)
+        ahead[here] = z[here] + _step(slope[here], eigen[here], vectors[here], damping[here, None])[:, 0]
         arrived[here] = False
         left = rows[~done[rows]]
-        left = left[until(z[left])]
+        hopeless = value[left] + _PATIENCE * promised[left] < value.max() - reach
+        left = left[hopeless | until(z[left])]
         done[left], value[left] = True, -np.inf
+    curvature = _composed(eigen, vectors)
     rows = np.flatnonzero(np.isfinite(value))
     if len(rows) and curvature_at_end:
         _, hessian = _derivatives(density, z[rows], rows, value[rows], _steps(curvature[rows]), sides=2)
-        eigen, vectors = _positive(-hessian)
-        curvature[rows] = np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
+        curvature[rows] = _composed(*_positive(-hessian))
     return Optimum(z, value, curvature, converged)
 
 
-def _shortened(
-    density: Density, z: Array, value: Array, ahead: Array, rows: NDArray[np.int64]
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """The best of several parts of the way ahead, its value, and whether it is any better than where the step began."""
-    trial = z[:, None] + _LENGTHS[:, None] * (ahead - z)[:, None, :]
-    tried = density(trial.reshape(-1, z.shape[1]), np.repeat(rows, len(_LENGTHS))).reshape(len(rows), -1)
-    every, best = np.arange(len(rows)), np.argmax(tried, axis=1)
-    better = tried[every, best] > value
-    return (
-        np.where(better[:, None], trial[every, best], z),
-        np.where(better, tried[every, best], value),
-        better,
-    )
+def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:
+    """(n, k, d) steps with k dampings (n, k) or (k,): the more damped, the less far along what is little curved."""
+    damping = np.broadcast_to(damping, (len(slope), np.shape(damping)[-1]))
+    step = np.einsum("nij,nkj->nki", vectors, slope[:, None] / (eigen[:, None] + damping[..., None]))
+    return step * np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=2, keepdims=True), 1e-300))
+
+
+def _composed(eigen: Array, vectors: Array) -> Array:
+    """(n, d, d) symmetric matrices of their eigenvalues and vectors."""
+    return np.einsum("nij,nj,nkj->nik", vectors, eigen, vectors)
 
 
 def _positive(matrices: Array) -> tuple[Array, Array]:
@@ -305,7 +316,7 @@ def search(
     spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
     start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
     density, residuals = target.rowwise()
-    found = distinct([climb(density, start, residuals)])
+    found = distinct([climb(density, start, residuals, reach=_REACH)])
     looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     for _ in range(_LOOKS):
@@ -316,7 +327,7 @@ def search(
         share = sag[strange] / sag[strange].sum()
         chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
         known, before = partial(_near, modes=found.z, curvature=found.curvature), len(found.z)
-        found = distinct([found, climb(density, passed[chosen], residuals, until=known)])
+        found = distinct([found, climb(density, passed[chosen], residuals, until=known, reach=_REACH)])
         if len(found.z) < before + _MANY:
             break
     return Search(found, warm, cold, cold_height)
@@ -353,7 +364,7 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
     order = np.argsort(-every.log_density)
     keep: list[int] = []
     for i in order:
-        if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - 30.0:
+        if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - _REACH:
             continue
         if not _near(every.z[[i]], every.z[keep], every.curvature[keep])[0]:
             keep.append(int(i))
