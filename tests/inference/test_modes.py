@@ -100,7 +100,9 @@ def test_damping_outlasts_the_step_that_needed_it_and_then_fades():
         found = climb(counted, np.array([[0.3]]), residuals, iterations=iterations, curvature_at_end=False)
         places.append((found.z[0, 0] / 0.3, len(several)))
     left = 1.0 - 1.8 / 2.8
-    for (found, cost), (place, times) in zip(places, [(1, 0), (left, 1), (left, 1), (left**2, 1), (left**3, 2)]):
+    for (found, cost), (place, times) in zip(
+        places, [(1, 0), (left, 1), (left, 1), (left**2, 1), (left**3, 2)], strict=True
+    ):
         assert found == pytest.approx(place, abs=1e-6) and cost == times
 
 
