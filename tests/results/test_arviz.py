@@ -215,10 +215,10 @@ def test_loo_is_leaving_one_hold_out(
         factors = [values[sample.protocol.recorded] for values, sample in all_holds]
         data.log_likelihood["tension_N"].values = np.concatenate(factors).T.reshape(data.log_likelihood.tension_N.shape)
         before = az.loo(data, pointwise=True, reff=1.0)
-    # two versions of Pareto smoothing fit the tail a little differently
-    assert pointwise_of(theirs) == pytest.approx(ours.elpd, abs=0.02)
-    apart, smoothing = (np.abs(pointwise_of(loo) - ours.elpd).max() for loo in (before, theirs))
-    assert (apart > 2.0 * smoothing) == (kind != "hold")
+    # two versions of Pareto smoothing fit the tail a little differently, and a heavy one more so
+    between = np.abs(pointwise_of(theirs) - ours.elpd)
+    assert (between < np.where(ours.pareto_k < 0.7, 0.02, 0.1)).all()
+    assert (pointwise_of(before) == pytest.approx(pointwise_of(theirs), abs=1e-3)) == (kind == "hold")
 
 
 def drawn(data: Any, names: list[str]) -> None:
