@@ -1,6 +1,7 @@
 """wirebayes itself, plain emcee and dynesty: samplers that want values alone."""
 
 import time
+from contextlib import ExitStack
 from unittest.mock import patch
 
 import emcee
@@ -9,7 +10,7 @@ import numpy as np
 from analyses.benchmarks.measure import Costs, judged, looked_at
 from wirebayes.inference.modes import modes
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import ensemble, kept
+from wirebayes.inference.sampler import ensemble, kept, stop_rule
 from wirebayes.inference.transform import LogPosterior
 
 
@@ -25,8 +26,10 @@ def ours(problem, seed, seconds, wanted=20_000):
         return timed
 
     # kept draws and the stop rule apart from search and burn-in, in the one run that counts
-    timed = {name: watched(getattr(kept, name)) for name in ("more", "looked")}
-    with patch.multiple(kept, **timed), costs.part("burn"):
+    parts = ((kept, "more"), (stop_rule, "apply"))
+    with ExitStack() as patches, costs.part("burn"):
+        for module, name in parts:
+            patches.enter_context(patch.object(module, name, watched(getattr(module, name))))
         chains = ensemble.sample(target, seed, Policy(ess=wanted))
     for book in (costs.cpu, costs.wall):
         book["burn"] -= book["sample"]
