@@ -25,15 +25,15 @@ _LEAST_SAG = 1.0  # nats
 _LOOKS = 12  # at most, for modes that explain places left over
 _MANY = 2  # new modes in one look: there may be more
 _ONE_MODE = 4.0  # squared standard deviations
-_ENOUGH = 0.25  # of what a whole step promises to gain: with less, parts of it are tried
+_ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tried
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
 _NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
 _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard deviation
-# added to the curvature, tried in one batch where a step gains too little
+# added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
 _REACH = 30.0  # nats below the best mode that no mode counts
-_RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of it kept after a step that was good; none below
+_RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
 
 @dataclass(frozen=True)
@@ -97,9 +97,10 @@ def climb(
 ) -> Optimum:
     """Maximise a log density from every row of `start`.
 
-    The steps are Newton's. With `residuals` the curvature is the expected information (Fisher scoring), which d + 1
-    evaluations give and which also points uphill where the density is not concave; without, differences give the
-    Hessian, which takes d² / 2.
+    The steps are Newton's, damped where they gain too little (Levenberg and Marquardt): on a bent ridge a damped step
+    stays near the ridge, a shortened one does not. With `residuals` the curvature is the expected information (Fisher
+    scoring), which d + 1 evaluations give and which also points uphill where the density is not concave; without,
+    differences give the Hessian, which takes d² / 2.
 
     Parameters
     ----------
@@ -116,8 +117,7 @@ def climb(
     reach : float
         Give up, likewise, the rows that are lower than the best by more than this and ten times what they may gain.
     curvature_at_end : bool
-        Where only the places matter, the curvature may stay that of the last step: the Hessian takes half the
-        evaluations.
+        Where only the places matter, the curvature may stay that of the last step: the Hessian takes d² evaluations.
 
     Returns
     -------
