@@ -153,7 +153,7 @@ def _typical_step(protocol: Protocol) -> float:
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
 
 
-_REACH = 12.0  # nats below the best amplitude, which no curvature makes up for
+_HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up for
 
 
 class Pinned:
@@ -194,7 +194,7 @@ class Pinned:
             value, every = self.target.standardised(self._insert(points, amplitude[rows]))
             return value - _LOG_FLAT, every
 
-        return climb(density, start, residuals, iterations=40, tolerance=1e-3, reach=_REACH)
+        return climb(density, start, residuals, iterations=40, tolerance=1e-3, reach=_HOPELESS)
 
     def natural(self, z: Array, amplitude: Array) -> Array:
         """(n, d) parameters of all columns."""

@@ -28,6 +28,7 @@ from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
 
+# of points (m, d) and row numbers (m,): log densities (m,), and the same with their residuals (k, m)
 Density = Callable[[Array, Array], Array]
 Residuals = Callable[[Array, Array], tuple[Array, Array]]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
