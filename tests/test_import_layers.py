@@ -19,7 +19,7 @@ LAYERS: list[set[str]] = [
     {"results"},
     {"prediction"},
     {"comparison", "discovery"},
-    {"planning"},
+    {"planning", "preloaded"},
     {"report"},
     {"reproduce"},
     {"workflows"},

@@ -1,5 +1,7 @@
 """Work spread over processes: in order, for any amount of it, with effects that only a user's file has."""
 
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -28,3 +30,35 @@ def test_processes_know_a_users_own_effects() -> None:
 def test_an_error_in_a_process_arrives() -> None:
     with workers(2) as parallel_map, pytest.raises(ZeroDivisionError):
         list(parallel_map(divmod, [1, 1], [1, 0]))
+
+
+def _run(script: str, folder: Path) -> str:
+    """What a script prints that runs in a folder of its user."""
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, timeout=300)
+    assert not done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes are not forked")
+def test_processes_find_their_modules_loaded(tmp_path: Path) -> None:
+    loaded = "'wirebayes.discovery.model_check' in __import__('sys').modules"
+    script = f"""
+from wirebayes.workers import load_early, workers
+{{}}
+with workers(2) as parallel_map:
+    print(*parallel_map(eval, ["{loaded}"]))
+"""
+    assert _run(script.format("load_early()"), tmp_path) == "True"
+    assert _run(script.format(""), tmp_path) == "False"
+
+
+def test_a_users_files_are_not_taken_for_pythons(tmp_path: Path) -> None:
+    (tmp_path / "random.py").write_text("raise RuntimeError('this is not the module you look for')")
+    script = """
+import sys
+sys.path = [place for place in sys.path if place]  # as in a command that was installed
+from wirebayes.workers import workers
+with workers(2) as parallel_map:
+    print(*parallel_map(abs, [-1, -2]))
+"""
+    assert _run(script, tmp_path) == "1 2"

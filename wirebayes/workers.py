@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 ParallelMap = Callable[..., Iterable[Any]]  # as the built-in `map`
 _PATIENCE_S = 10.0  # for a scheduler and its first worker to answer: a cluster's network takes a second at most
+_FORKS = sys.platform == "linux"  # elsewhere system libraries do not survive a fork, or there is none
+_TRACKER = "ignore:resource_tracker"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -28,6 +30,38 @@ def one_thread_each() -> None:
 def cores() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def load_early() -> None:
+    """Begin to load what processes will need, while this one still loads its own: for commands that will start some.
+
+    On Linux processes are forked from one, which loads their modules once for all of them (`wirebayes.preloaded`);
+    elsewhere each loads its own when it starts, and nothing happens here.
+    """
+    if _FORKS:
+        _prepared(["wirebayes.preloaded"])
+
+
+def _prepared(preload: list[str]) -> None:
+    """Start what processes are started by, if it does not run yet."""
+    one_thread_each()
+    # Python's tracker of semaphores removes those of a process that is gone; that it had to is nobody's business.
+    ignored = os.environ.get("PYTHONWARNINGS", "")
+    if _TRACKER not in ignored:
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [ignored, _TRACKER]))
+    if not _FORKS:
+        return
+    from multiprocessing import forkserver
+
+    safe = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"  # a user's random.py in this folder is not Python's
+    try:
+        with held_back():
+            forkserver.set_forkserver_preload(preload)
+            forkserver.ensure_running()
+    finally:
+        if safe is None:
+            del os.environ["PYTHONSAFEPATH"]
 
 
 @contextmanager
@@ -76,12 +110,10 @@ def processes(most: int | None = None, prepare: Callable[[], object] | None = No
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
 
-    one_thread_each()
-    # Python's tracker of semaphores removes those of a process that is gone; that it had to is nobody's business.
-    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"]))
     n = cores() if most is None else max(1, min(cores(), most))
     before = active_children()
-    pool = ProcessPoolExecutor(n, get_context("spawn"), _prepare, (prepare,))
+    _prepared([])
+    pool = ProcessPoolExecutor(n, get_context("forkserver" if _FORKS else "spawn"), _prepare, (prepare,))
     try:
         with held_back():
             for _ in range(n):

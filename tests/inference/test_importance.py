@@ -191,7 +191,7 @@ def test_a_tail_that_is_nowhere_is_no_number_and_the_lighter_estimate_counts(mon
         asked.append((values.tolist(), r_eff))
         return None, answers[r_eff]
 
-    monkeypatch.setattr(importance, "_statistics", SimpleNamespace(psislw=psislw))
+    monkeypatch.setattr(importance, "array_statistics", lambda: SimpleNamespace(psislw=psislw))
     for first, second, found in ((0.9, 0.4, 0.4), (0.4, 0.9, 0.4), (np.nan, 0.8, 0.8), (0.8, np.nan, 0.8)):
         answers.update({1.0: first, 9.0: second})
         assert tail(np.array([1.0, -np.inf, 3.0])) == found

@@ -33,7 +33,7 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, without])])
-    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, tail)))
+    monkeypatch.setattr(module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, tail)))
     known = np.log(stats.hmean(np.exp(log_p), axis=1))  # weights 1/p: the harmonic mean
 
     def ratios(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +178,7 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
     """One for each hold, or one for all that are sampled together; zero where none is given."""
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
-    monkeypatch.setattr(module, "_statistics", SimpleNamespace(psislw=lambda values: (-values, 0.9)))
+    monkeypatch.setattr(module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, 0.9)))
     monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
     asked: list[tuple[int, object]] = []
 

@@ -412,3 +412,19 @@ def test_bars_of_intervals_stand_where_the_numbers_are():
     axes = intervals([row | {"likelihood": kind} for kind in ("chain", "hold")], "wire").axes[0]
     bars = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) == 2 and line.get_linewidth() > 3]
     assert [list(np.asarray(bar)) for bar in bars] == [[2.0, 3.0], [0.5, 10.0], [2.0, 3.0]]
+
+
+def test_ticks_of_pairs_are_few_round_and_within_their_cells() -> None:
+    from wirebayes.report.figures import _few_ticks
+
+    places, labels = _few_ticks(np.linspace(-0.31, 0.31, 1000), False)
+    assert labels == ["−0.2", "0", "0.2"]
+    np.testing.assert_allclose(np.diff(places), places[1] - places[0])
+    assert places[1] == pytest.approx(0.5)
+    assert _few_ticks(np.linspace(-0.5, 0.5, 1000), True)[1] == ["0.5", "1", "2"]
+    assert _few_ticks(np.linspace(-2.0, 2.0, 1000), True)[1] == ["0.1", "1", "10"]
+    for decades in (0.7, 1.3, 4.0, 9.0, 40.0):
+        places, labels = _few_ticks(np.linspace(-decades / 2, decades / 2, 1000), True)
+        assert 1 <= len(labels) <= 4
+        assert (places > 0.04).all()
+        assert (places < 0.96).all()

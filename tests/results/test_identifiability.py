@@ -209,7 +209,8 @@ def test_sensitivity_is_the_distance_over_powers_a_tenth_apart(monkeypatch: pyte
         return 0.25
 
     component = np.array([0.1, -0.2, 0.3])
-    monkeypatch.setattr(module, "_statistics", SimpleNamespace(power_scale_lw=weights, power_scale_sense=distance))
+    statistics = SimpleNamespace(power_scale_lw=weights, power_scale_sense=distance)
+    monkeypatch.setattr(module, "array_statistics", lambda: statistics)
     assert sensitivity(np.array([1.0, 2.0, 4.0]), component) == 0.25
     assert asked == pytest.approx([1.0 / 1.1, 1.1])
 

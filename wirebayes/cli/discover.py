@@ -31,6 +31,9 @@ def discover(
     quiet: Quiet = False,
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
+    from wirebayes.workers import load_early
+
+    load_early()
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.discover import discover as run

@@ -47,6 +47,10 @@ def fit(
     quiet: Quiet = False,
 ) -> None:
     """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
+    from wirebayes.workers import load_early
+
+    if check:
+        load_early()
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.fit import fit as run

@@ -14,21 +14,18 @@ A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importan
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.modes import climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
-
-_statistics: Any = array_stats
 
 
 @dataclass(frozen=True)
@@ -253,7 +250,7 @@ def tail(log_weight: Array) -> float:
     if not len(values):
         return np.nan
     with np.errstate(all="ignore"):
-        return float(np.fmin(*(_statistics.psislw(values, r_eff=share)[1] for share in (1.0, 9.0))))
+        return float(np.fmin(*(array_statistics().psislw(values, r_eff=share)[1] for share in (1.0, 9.0))))
 
 
 def _learned(

@@ -9,14 +9,13 @@ their densities are ratios of integrals, found by importance sampling from a pro
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit, logsumexp
 
+from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.model.problem import Problem
@@ -29,7 +28,6 @@ LARGEST_K = 0.5
 # a quarter of a fit's draws: elpd differences count from 4, and a hold's density is known to a tenth here
 REFIT = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=1200)
 _DRAWS = 4000  # the error of a hold's elpd by their number is then some hundredths, of differences that count from 4
-_statistics: Any = array_stats
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,7 @@ def smoothed_leave_one_hold_out(
     for i, (s, j) in enumerate(where):
         log_p = conditional[s][j]
         # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
-        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else _statistics.psislw(log_p)
+        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else array_statistics().psislw(log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K), True
     poor = np.flatnonzero(refitted).tolist()

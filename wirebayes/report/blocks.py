@@ -14,7 +14,6 @@ import matplotlib
 import numpy as np
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from wirebayes.io.run_folder import plain, write_bytes
 from wirebayes.json_files.scene import SceneJson
@@ -170,12 +169,13 @@ _READ_AS_THEY_ARE = " !$'()*+,-./:;=?@[]^_`{|}~"
 
 def svg(figure: Figure) -> bytes:
     """A figure as SVG, the same bytes every time: letters as text, dense layers as images, no more digits than show."""
-    for line in figure.findobj(Line2D):
-        if np.size(line.get_xdata(orig=False)) > _DENSE:
-            line.set_rasterized(True)
-    for cloud in figure.findobj(PathCollection):
-        if len(np.asarray(cloud.get_offsets())) > _DENSE:
-            cloud.set_rasterized(True)
+    for axes in figure.axes:
+        for line in axes.lines:
+            if np.size(line.get_xdata(orig=False)) > _DENSE:
+                line.set_rasterized(True)
+        for cloud in axes.collections:
+            if isinstance(cloud, PathCollection) and len(np.asarray(cloud.get_offsets())) > _DENSE:
+                cloud.set_rasterized(True)
     stream = io.BytesIO()
     style: Any = {"svg.hashsalt": "wirebayes", "svg.fonttype": "none"}
     with matplotlib.rc_context(style):

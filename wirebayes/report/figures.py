@@ -1,11 +1,13 @@
 """Pictures of tests and posteriors, each a small panel that stays readable on a phone."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy.ndimage import gaussian_filter
 
@@ -165,6 +167,8 @@ def marginals(
         if np.ptp(values) == 0:
             continue  # fixed by the user's prior
         figure, axes = panel(named(name, effects), "density", size=(3.4, 2.4))
+        figure.set_layout_engine(None)  # its labels have the same size always: nothing to measure
+        figure.subplots_adjust(left=0.1, right=0.96, bottom=0.22, top=0.97)
         low, high = np.quantile(values, [0.0005, 0.9995])
         positive = values.min() > 0 and np.quantile(values, 0.95) > 4 * np.quantile(values, 0.05)
         bins = np.geomspace(max(low, 1e-12), high, 60) if positive else np.linspace(low, high, 60)
@@ -205,35 +209,37 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure 
     count = len(free)
     if count < 2:
         return None
-    figure = Figure(figsize=(1.15 * count + 0.8, 1.1 * count + 0.6), layout="constrained")
-    grid: Any = figure.subplots(count, count, sharex="col", squeeze=False)
+    # One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw.
+    left, below = 0.75, 0.7
+    width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
+    figure = Figure(figsize=(width, height))
+    axes: Any = figure.add_axes((left / width, below / height, 1.1 * count / width, 1.05 * count / height))
+    axes.set_axis_off()
+    axes.set_xlim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
+    axes.set_ylim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
     scaled = {name: _straight(values) for name, values in free.items()}
-    for i, (row, (y, is_log_y)) in enumerate(scaled.items()):
-        for j, (column, (x, is_log_x)) in enumerate(scaled.items()):
-            axes = grid[i, j]
-            if j > i:
-                axes.set_axis_off()
-                continue
-            low, high = np.quantile(x, [0.002, 0.998])
-            if i == j:
-                heights, edges = np.histogram(x, np.linspace(low, high, 31))
-                axes.stairs(heights, edges, fill=True, color=CHAIN, alpha=0.75)
-            else:
-                _regions(axes, x, y)
-                axes.set_ylim(*np.quantile(y, [0.002, 0.998]))
-            axes.set_xlim(low, high)
-            _few_ticks(axes.xaxis, is_log_x)
-            _few_ticks(axes.yaxis, is_log_y)
-            beside, below = j == 0 < i, i == count - 1
-            axes.tick_params(labelsize=7, left=beside, labelleft=beside, bottom=below, labelbottom=below)
-            axes.tick_params(axis="x", rotation=45)
-            if i == j:
-                axes.set_yticks([])
-            if j == 0 < i:
-                axes.set_ylabel(named(row, effects).replace(", ", ",\n"), fontsize=8)
-            if i == count - 1:
-                axes.set_xlabel(named(column, effects).replace(", ", ",\n"), fontsize=8)
-    figure.align_labels()
+    unit = [_across(values) for values, _ in scaled.values()]
+    for i, (name, (values, is_log)) in enumerate(scaled.items()):
+        bottom = count - 1 - i
+        for j in range(i):
+            _regions(axes, unit[j], unit[i], (j, bottom))
+        heights, edges = np.histogram(unit[i], np.linspace(0.0, 1.0, 31))
+        stairs = bottom + 0.92 * _SIDE * heights / heights.max()
+        axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
+        ticks, labels = _few_ticks(values, is_log)
+        words = named(name, effects).replace(", ", ",\n")
+        axes.text(i + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
+        _ticks(axes, [(i + _SIDE * t, 0.0) for t in ticks], (0.0, -_TICK))
+        for t, label in zip(ticks, labels, strict=True):
+            axes.text(i + _SIDE * t, -2 * _TICK, label, fontsize=7, rotation=45, ha="center", va="top")
+        if i:
+            axes.text(-0.42, bottom + _SIDE / 2, words, fontsize=8, rotation=90, ha="right", va="center",
+                      multialignment="center")  # fmt: skip
+            _ticks(axes, [(0.0, bottom + _SIDE * t) for t in ticks], (-_TICK, 0.0))
+            for t, label in zip(ticks, labels, strict=True):
+                axes.text(-2 * _TICK, bottom + _SIDE * t, label, fontsize=7, ha="right", va="center")
+    frames = [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for i in range(count) for j in range(i + 1)]
+    axes.add_collection(PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8))
     return figure
 
 
@@ -243,26 +249,61 @@ def _straight(values: Array) -> tuple[Array, bool]:
     return (np.log10(values), True) if wide else (values, False)
 
 
-def _few_ticks(axis: Any, is_log: bool) -> None:
-    axis.set_major_locator(MaxNLocator(3, prune="both"))
+def _ends(values: Array) -> tuple[float, float]:
+    """Where a cell begins and ends: all draws but a few at either end, and a margin."""
+    low, high = np.quantile(values, [0.002, 0.998])
+    margin = 0.05 * (high - low)
+    return float(low - margin), float(high + margin)
+
+
+def _across(values: Array) -> Array:
+    """The values as shares of their cell."""
+    low, high = _ends(values)
+    return (values - low) / (high - low)
+
+
+def _few_ticks(values: Array, is_log: bool) -> tuple[Array, list[str]]:
+    """Places of a few ticks as shares of the cell, and their labels."""
+    low, high = _ends(values)
+    first, last = low + 0.05 * (high - low), high - 0.05 * (high - low)  # labels of neighbouring cells do not touch
     if is_log:
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{10**value:.2g}"))
+        decades = np.arange(np.floor(low), np.ceil(high) + 1)
+        for within in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+            ticks = np.sort(np.log10(within) + decades[:, None], axis=None)
+            ticks = ticks[(first <= ticks) & (ticks <= last)]
+            if len(ticks) <= _MOST_TICKS:
+                break
+        ticks = ticks[:: -(-len(ticks) // _MOST_TICKS)] if len(ticks) else ticks
+        labels = [f"{10**t:.6g}" for t in ticks]
+    else:
+        ticks = np.array(MaxNLocator(_MOST_TICKS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
+        ticks = ticks[(first <= ticks) & (ticks <= last)]
+        ticks = np.where(np.abs(ticks) < 1e-9 * (high - low), 0.0, ticks)
+        labels = [f"{t:.10g}".replace("-", "\N{MINUS SIGN}") for t in ticks]
+    return (ticks - low) / (high - low), labels
 
 
-def _regions(axes: Any, x: Array, y: Array) -> None:
-    """Shade the densest cells that hold 50 and 90 % of the draws, smoothed over neighbours."""
-    limits = [np.quantile(v, [0.002, 0.998]) for v in (x, y)]
-    counts, xs, ys = np.histogram2d(x, y, bins=_CELLS, range=limits)
+def _ticks(axes: Any, places: Sequence[tuple[float, float]], step: tuple[float, float]) -> None:
+    """Short lines from the places outwards."""
+    lines = [(place, (place[0] + step[0], place[1] + step[1])) for place in places]
+    axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8, clip_on=False))
+
+
+def _regions(axes: Any, x: Array, y: Array, corner: tuple[float, float]) -> None:
+    """Shade the densest places that hold 50 and 90 % of the draws, smoothed over neighbours, in a cell."""
+    counts, xs, ys = np.histogram2d(x, y, bins=_CELLS, range=[(0.0, 1.0), (0.0, 1.0)])
     density = gaussian_filter(counts, 1.0)
     ranked = np.sort(density.ravel())[::-1]
     held = np.cumsum(ranked) / ranked.sum()
     half, most = (float(ranked[np.searchsorted(held, share)]) for share in (0.5, 0.9))
     if not 0 < most < half < ranked[0]:
         return
-    middle = [(edges[1:] + edges[:-1]) / 2 for edges in (xs, ys)]
-    axes.contourf(*middle, density.T, levels=[most, half, ranked[0]], colors=["#b5c4d1", CHAIN])
+    places = [at + _SIDE * (edges[1:] + edges[:-1]) / 2 for at, edges in zip(corner, (xs, ys), strict=True)]
+    axes.contourf(*places, density.T, levels=[most, half, ranked[0]], colors=["#b5c4d1", CHAIN])
 
 
+_MOST_TICKS = 4  # so that labels do not touch
+_SIDE, _GAP, _TICK = 0.92, 0.08, 0.035  # of a cell, between cells and of a tick, in units of both together
 _CELLS = 22  # of a region's grid along each axis: fine enough to look smooth
 
 
@@ -321,6 +362,6 @@ def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
         axes.axvline(t, color=INK, lw=0.5, alpha=0.4)
         axes.annotate(word, (t, 1.0), xycoords=("data", "axes fraction"), ha="right", va="top", fontsize=8, color=INK,
                       xytext=(-2, -2), textcoords="offset points")  # fmt: skip
-    logarithmic(axes, "y")
+    logarithmic(axes, "both")
     legend_below(figure, axes, 3)
     return figure

@@ -8,11 +8,10 @@ that a weakened prior keeps its median.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from arviz_stats.base import array_stats
 
+from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
 from wirebayes.model.prior import fast_logpdf
@@ -24,7 +23,6 @@ SENSITIVE = 0.05  # the threshold that the authors of the method propose
 RIDGE = 0.9  # correlation above which two parameters are known in combination only
 _POWERS = (1.0 / 1.1, 1.1)  # so small that weights stay even, so large that the change exceeds the chance of 4000 draws
 _DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
-_statistics: Any = array_stats
 
 
 def identifiability(fitted: Fit) -> dict[str, Identifiability]:
@@ -93,8 +91,9 @@ def sensitivity(values: Array, log_component: Array) -> float:
     """Distance the distribution of (n,) `values` moves for each doubling of a component's power."""
     if np.ptp(log_component) == 0:
         return 0.0
-    weights = [np.exp(_statistics.power_scale_lw(log_component, alpha=alpha))[None] for alpha in _POWERS]
-    return float(_statistics.power_scale_sense(values[None], *weights, *_POWERS))
+    statistics = array_statistics()
+    weights = [np.exp(statistics.power_scale_lw(log_component, alpha=alpha))[None] for alpha in _POWERS]
+    return float(statistics.power_scale_sense(values[None], *weights, *_POWERS))
 
 
 def log_priors(fitted: Fit, theta: Array) -> Array:
@@ -199,7 +198,7 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
     here = problem.samples[sample]
     theta = _thinned(fitted.flat)
     # the prior to the power of a half: weights are its inverse root
-    log_weight, k = _statistics.psislw(0.5 * log_priors(fitted, theta).sum(axis=1))
+    log_weight, k = array_statistics().psislw(0.5 * log_priors(fitted, theta).sum(axis=1))
     weight = np.exp(log_weight - log_weight.max())
 
     def creep(rows: Array) -> Array:

@@ -152,35 +152,53 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the posterior of a fit")
     with _opened(path) as tree:
-        about, constant = tree["posterior"].attrs, tree["constant_data"].to_dataset()
-        if "wirebayes_version" not in about:
-            raise InputError(f"{path}: not a posterior of wirebayes")
-        posterior, observed = tree["posterior"].to_dataset(), tree["observed_data"].to_dataset()
-        names = json.loads(about["experiments"])
+        names = _names_in(tree, path)
         if experiment is None and len(names) > 1:
             raise InputError(f"{path}: holds {', '.join(names)}; say which with --experiment")
         if experiment is not None and experiment not in names:
             raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
-        at = names.index(experiment or names[0])
-        posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
-        draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
-        lengths = json.loads(about["lengths_mm"])
-        keys, known = json.loads(about["effects"]), catalogue(own_effects)
-        model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
-                      float(about["tension_ref_N"]))  # fmt: skip
-        exponent = draws.pop(LENGTH_EXPONENT, None)
-        if len(names) > 1:
-            reference = float(np.exp(np.mean(np.log(lengths))))
-            draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
-            draws = _by_length(draws, model.effects, lengths[at], reference)
-        if "reference_C" not in constant.attrs:
-            raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
-        reference_C = json.loads(constant.attrs["reference_C"])[at]
-        protocol, tension = _measured(constant, observed, names[at], float(lengths[at]), reference_C)
-        resolutions = json.loads(about["resolutions_N"])
-        sample = Sample(names[at], about["material"], protocol, tension[..., None], float(resolutions[at]), model)
-        check(draws, sample, about["likelihood"])
-        return Stored(draws, sample, about["likelihood"], exponent)
+        return _stored(tree, path, names.index(experiment or names[0]), own_effects)
+
+
+def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:
+    """The posterior of each experiment in a folder that `save` wrote, beside draws of its prior, each (n,)."""
+    path = folder / "posterior.nc"
+    with _opened(path) as tree:
+        return [(_stored(tree, path, at), _prior(tree, at)) for at in range(len(_names_in(tree, path)))]
+
+
+def _names_in(tree: Any, path: Path) -> list[str]:
+    about = tree["posterior"].attrs
+    if "wirebayes_version" not in about:
+        raise InputError(f"{path}: not a posterior of wirebayes")
+    names: list[str] = json.loads(about["experiments"])
+    return names
+
+
+def _stored(tree: Any, path: Path, at: int, own_effects: Path | None = None) -> Stored:
+    """The posterior of the experiment at this place among those of the tree."""
+    about, constant = tree["posterior"].attrs, tree["constant_data"].to_dataset()
+    posterior, observed = tree["posterior"].to_dataset(), tree["observed_data"].to_dataset()
+    names = json.loads(about["experiments"])
+    posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
+    draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
+    lengths = json.loads(about["lengths_mm"])
+    keys, known = json.loads(about["effects"]), catalogue(own_effects)
+    model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
+                  float(about["tension_ref_N"]))  # fmt: skip
+    exponent = draws.pop(LENGTH_EXPONENT, None)
+    if len(names) > 1:
+        reference = float(np.exp(np.mean(np.log(lengths))))
+        draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
+        draws = _by_length(draws, model.effects, lengths[at], reference)
+    if "reference_C" not in constant.attrs:
+        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+    reference_C = json.loads(constant.attrs["reference_C"])[at]
+    protocol, tension = _measured(constant, observed, names[at], float(lengths[at]), reference_C)
+    resolutions = json.loads(about["resolutions_N"])
+    sample = Sample(names[at], about["material"], protocol, tension[..., None], float(resolutions[at]), model)
+    check(draws, sample, about["likelihood"])
+    return Stored(draws, sample, about["likelihood"], exponent)
 
 
 def _measured(
@@ -247,10 +265,15 @@ def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]
     """The prior: draws of the prior of one experiment's parameters, each (n,)."""
     path = folder / "posterior.nc"
     with _opened(path) as tree:
-        prior, names = tree["prior"].to_dataset(), json.loads(tree["posterior"].attrs["experiments"])
-        if "experiment" in prior.dims:
-            prior = prior.isel(experiment=names.index(experiment or names[0]))
-        return {str(name): values.values.reshape(-1) for name, values in prior.data_vars.items()}
+        names = _names_in(tree, path)
+        return _prior(tree, names.index(experiment or names[0]))
+
+
+def _prior(tree: Any, at: int) -> dict[str, Array]:
+    """Draws of the prior of the experiment at this place among those of the tree."""
+    prior = tree["prior"].to_dataset()
+    prior = prior.isel(experiment=at) if "experiment" in prior.dims else prior
+    return {str(name): values.values.reshape(-1) for name, values in prior.data_vars.items()}
 
 
 def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator) -> Any:

@@ -28,7 +28,7 @@ from wirebayes.report.blocks import (
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pages.paper_summary import listed
 from wirebayes.results.contraction import MOST, contraction
-from wirebayes.results.store import Stored, experiments_in, load, prior_draws, unit_of
+from wirebayes.results.store import Stored, load_with_priors, unit_of
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
@@ -48,11 +48,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         if configuration.get("own_effects"):
             sections.append(_of_summary(summary))
             continue
-        names = experiments_in(file.parent / "posterior.nc")
-        for name in names:
-            stored = load(file.parent, name)
+        for stored, prior in load_with_priors(file.parent):
             effects |= {effect.name: effect for effect in stored.sample.model.effects}
-            sections.append(section(stored, prior_draws(file.parent, name), summary))
+            sections.append(section(stored, prior, summary))
     titles = listed([s.title for s in sections])
     lead = f"Posterior of {titles}: what the readings say about each parameter, compared with the prior."
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
