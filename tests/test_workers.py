@@ -52,6 +52,20 @@ with workers(2) as parallel_map:
     assert _run(script.format(""), tmp_path) == "False"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes are not forked")
+def test_ctrl_c_while_modules_load_is_not_heard_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "interrupting.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    script = """
+from wirebayes.workers import _prepared, workers
+_prepared(["interrupting"])
+with workers(2) as parallel_map:
+    print(*parallel_map(abs, [-1, -2]))
+    print(*parallel_map(eval, ["'interrupting' in __import__('sys').modules"]))
+"""
+    assert _run(script, tmp_path) == "1 2\nTrue"
+
+
 def test_a_users_files_are_not_taken_for_pythons(tmp_path: Path) -> None:
     (tmp_path / "random.py").write_text("raise RuntimeError('this is not the module you look for')")
     script = """

@@ -51,12 +51,14 @@ def _prepared(preload: list[str]) -> None:
         os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [ignored, _TRACKER]))
     if not _FORKS:
         return
-    from multiprocessing import forkserver
+    from multiprocessing import forkserver, resource_tracker
 
     safe = os.environ.get("PYTHONSAFEPATH")
     os.environ["PYTHONSAFEPATH"] = "1"  # a user's random.py in this folder is not Python's
     try:
         with held_back():
+            resource_tracker.ensure_running()
+        with held_back():  # anew, for the tracker's start lets signals through again
             forkserver.set_forkserver_preload(preload)
             forkserver.ensure_running()
     finally:
