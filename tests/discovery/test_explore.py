@@ -111,6 +111,20 @@ def test_what_further_effects_explain_may_be_a_remainder_that_is_not_smooth(monk
         assert found.left_over == {frozenset("a"): pytest.approx(np.log(1.0 / 0.5) + PAIR + min(value, LEFT_OVER))}
 
 
+def test_a_step_back_finds_a_set_whose_names_are_little_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alone a is the best name by far; beside c, which came last, b explains more than a and b together."""
+    singles, chain = {"a": 20.0, "b": 8.0, "c": 7.0}, {"a": {"b": 12.0}, "ab": {"c": 12.0}, "b": {"c": 35.0}}
+    found, order = explored(monkeypatch, singles, chain)
+    assert order == ["a", "ab", "abc", "b", "bc"]
+    assert found.fitted[frozenset("bc")].effects.log_bayes == 43.0
+
+
+def test_a_step_back_goes_no_way_that_was_gone_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside b, c was found to explain nothing, so the set of both is not looked for again."""
+    singles, chain = {"a": 20.0, "b": 19.0, "c": 7.0}, {"a": {"b": 12.0}, "ab": {"c": 12.0}, "b": {"d": 1.0}}
+    assert explored(monkeypatch, singles, chain)[1] == ["a", "b", "ab", "abc"]
+
+
 def test_credit_beside_a_remainder_is_that_of_the_best_form(monkeypatch: pytest.MonkeyPatch) -> None:
     from wirebayes.discovery.refit import occam
 

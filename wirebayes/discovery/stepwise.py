@@ -1,4 +1,7 @@
-"""The search through sets of effects: forward from each set close enough to the best, every set kept.
+"""The search through sets of effects: forward from each set close enough to the best, and back, every set kept.
+
+A step back asks whether an early effect is still needed beside those that came after it: the set without it may be
+better, and was never reached because the names in it explain little one by one.
 
 The evidence of a set comes from a chain of refits, each effect refitted beside those before it. The prior of an
 amplitude is fixed once, on the plain fit, so the order of the chain does not matter.
@@ -108,6 +111,7 @@ class _Frontier:
     fitted: dict[Key, FittedSet] = field(default_factory=dict)
     parents: dict[Key, tuple[Key, str]] = field(default_factory=dict)
     credit: dict[Key, float] = field(default_factory=dict)
+    towards: list[Key] = field(default_factory=list)
 
     def add(self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf) -> None:
         """A set that a refit found, unless another order of the same names found a better one.
@@ -136,6 +140,14 @@ class _Frontier:
         """The largest log weight that a set may come to, by what is known so far."""
         with_remainder = self.credit[key] + np.log(REMAINDER_WEIGHT)
         return log_prior(len(key), self.names) + float(np.logaddexp(self.known[key].log_bayes, with_remainder))
+
+    def step_back(self, key: Key) -> None:
+        """Go towards the sets that lack one effect of a fitted set and that no step forward has met."""
+        for name in sorted(key):
+            fewer = key - {name}
+            before = [fewer - {other} for other in sorted(fewer)]  # from these the smaller set is one step forward
+            if fewer not in self.known and not any(k in self.fitted for k in before):
+                self.towards += sorted((k for k in before if k in self.known), key=self.promise)[-1:]
 
 
 def explore(
@@ -178,9 +190,10 @@ def explore(
         open_ = [k for k, promise in promises.items() if k not in done and promise > best - REACH]
         open_ = sorted(open_, key=lambda k: (-promises[k], sorted(k)))
         # as many at once whatever the number of cores, so that the sets are the same
+        open_ = list(dict.fromkeys([k for k in frontier.towards if k not in done] + open_))
         wave = open_[: FIRST_LOOK if not done else 2][: max(MOST_LOOKS - len(done), 0)]
-        if not wave and open_ and promises[open_[0]] == best:
-            wave = open_[:1]  # the best set is always fitted
+        if not wave:
+            wave = [k for k in open_ if promises[k] == best][:1]  # the best set is always fitted
         if not wave:
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]
@@ -195,6 +208,7 @@ def explore(
             )  # fmt: skip
             frontier.known[key] = done[key].effects
             frontier.credit[key] = known.log_bayes + beside
+            frontier.step_back(key)
             if new.further is None or len(key) >= MOST_EFFECTS:
                 continue
             for further in new.further.winners:
