@@ -194,8 +194,8 @@ class Fits:
         *,
         scanned: float = 0.0,
         refitted: dict[str, float] | None = None,
-        scope: str = "material",
         on: tuple[int, ...] = (0, 1),
+        shared: bool = False,
     ) -> None:
         self.did: list[Any] = []
         self.blocks: Any = [
@@ -204,15 +204,17 @@ class Fits:
             )
             for b in range(2)
         ]
-        refit = SimpleNamespace(effect="new", blocks=on, theta=[np.array([10.0 * b]) for b in on])
+        places = [on] * len(on) if shared else [(b,) for b in on]
+        refits = {
+            b: SimpleNamespace(effect="new", blocks=place, theta=[np.array([10.0 * c]) for c in place])
+            for b, place in zip(on, places, strict=True)
+        }
         self.evidence = None if refitted is None else evidence(refitted)
-        further = SimpleNamespace(amplitudes=lambda name: dict.fromkeys(on, refit))
+        further = SimpleNamespace(amplitudes=lambda name: refits)
         self.parent: Any = stepwise.FittedSet(
             EffectSet(("a",), 7.0, {}, None), self.blocks, ("first",), further, ([], [], [])  # type: ignore[arg-type]
         )  # fmt: skip
-        self.settings: Any = SimpleNamespace(
-            law="modified", history="additive", kinds={"b": SimpleNamespace(scope=scope)}
-        )
+        self.settings: Any = SimpleNamespace(law="modified", history="additive", kinds={})
 
         def fitted(experiments: str, effects: Any, law: str, history: str, rng: Any, near: Any) -> Any:
             self.did.append(("fitted", experiments, effects, law, history, near.tolist()))
@@ -249,22 +251,14 @@ def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytes
     assert found.scanned[:2] == (["probe"], ["candidate"]) and len(found.scanned[2]) == 2
 
 
-@pytest.mark.parametrize(
-    ("scope", "on", "shared"),
-    [
-        ("material", (0, 1), False),
-        ("instrument", (0, 1), True),
-        ("environment", (0, 1), True),
-        ("instrument", (0,), False),
-    ],
-)
-def test_materials_inform_each_other_of_what_the_bench_has(
-    scope: str, on: tuple[int, ...], shared: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("on", "shared", "told"), [((0, 1), False, False), ((0, 1), True, True), ((0,), True, False)])
+def test_materials_inform_each_other_of_an_amplitude_that_they_share(
+    on: tuple[int, ...], shared: bool, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An amplitude that is one for all of them; of one material alone there is nobody to tell."""
-    fits = Fits(monkeypatch, scope=scope, on=on)
+    """Where each has its own there is nothing to tell, and of one material alone there is nobody."""
+    fits = Fits(monkeypatch, on=on, shared=shared)
     fits.fit()
-    assert ("informed", dict.fromkeys(on, "new")) in fits.did if shared else all(d[0] != "informed" for d in fits.did)
+    assert ("informed", dict.fromkeys(on, "new")) in fits.did if told else all(d[0] != "informed" for d in fits.did)
 
 
 @pytest.mark.parametrize(

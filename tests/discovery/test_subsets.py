@@ -34,3 +34,8 @@ def test_materials_that_show_it_make_it_likelier_in_the_next() -> None:
     without = over_subsets(np.array([8.0, -8.0, -8.0, -8.0, 0.0]))[1][-1]
     assert with_neighbours == pytest.approx(5 / 6, abs=0.01)  # Laplace's rule of succession: (4 + 1) / (4 + 2)
     assert without < 0.4
+
+
+def test_what_is_impossible_in_every_material_acts_in_none() -> None:
+    total, each, _ = over_subsets(np.full(3, -np.inf))
+    assert total == -np.inf and each.tolist() == [0.0, 0.0, 0.0]

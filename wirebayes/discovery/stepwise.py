@@ -18,7 +18,7 @@ from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
 from wirebayes.discovery.refit import Refit, occam
-from wirebayes.discovery.screening import FILE_WIDE, Candidate
+from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import (
     FIRST_LOOK,
     LEFT_OVER,
@@ -242,12 +242,13 @@ def _fit(parent: FittedSet, name: str, settings: Settings, units: _Units, rng: n
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
     assert parent.further is not None
     blocks, effects = list(parent.blocks), {}
-    for b, r in parent.further.amplitudes(name).items():
+    refits = parent.further.amplitudes(name)
+    for b, r in refits.items():
         effects[b] = r.effect
         near = r.theta[r.blocks.index(b)]
         every = (*blocks[b].effects, r.effect)
         blocks[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near)
-    if len(effects) > 1 and settings.kinds[name].scope in FILE_WIDE:
+    if any(len(r.blocks) > 1 for r in refits.values()):
         blocks = informed(blocks, effects, rng)
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
     scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]

@@ -28,7 +28,9 @@ def over_subsets(values: Array) -> tuple[float, Array, list[int]]:
     weights = _log_weights(b)
     total = float(np.logaddexp.reduce(weights + _symmetric(values)[1:]))
     without = np.array([_symmetric(np.delete(values, i))[:b] for i in range(b)])  # of 0 to b - 1 others
-    each = np.exp(values + np.logaddexp.reduce(weights + without, axis=1) - total)
+    each = np.zeros(b)
+    if np.isfinite(total):
+        each = np.exp(values + np.logaddexp.reduce(weights + without, axis=1) - total)
     order = np.argsort(-values, kind="stable")
     most = int(np.argmax(weights + np.cumsum(values[order])))
     return total, np.minimum(each, 1.0), sorted(int(i) for i in order[: most + 1])
