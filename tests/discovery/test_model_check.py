@@ -3,6 +3,8 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
+from time import sleep
 
 import numpy as np
 import pytest
@@ -124,6 +126,38 @@ def test_fit_puts_a_failed_check_first(
     shown = capsys.readouterr()
     assert shown.err.strip() == captured and json.loads(shown.out) == summary
     assert cli.main([*command, "--quiet"]) == 0 and capsys.readouterr().out == ""
+
+
+def test_a_single_fit_is_checked_while_it_is_sampled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same result as afterwards, stored first; whoever comes later does not check again."""
+    begun, summary = Event(), tmp_path / "a" / "summary.json"
+    summary.parent.mkdir()
+    job = Job("a", (simulated(tmp_path / "wire"),))
+    found = check_model(job, 5, simulations=19)
+
+    def check(*given: object, parallel_map: object) -> ModelCheck:
+        begun.set()
+        return found
+
+    monkeypatch.setattr(model_check, "check_model", check)
+    monkeypatch.setattr(model_check, "workers", lambda prepare: _Serial())
+    with model_check.checked_meanwhile(job, tmp_path, 5):
+        assert begun.wait(10.0)  # before there is a fit
+        summary.write_text('{"experiment": "a"}')
+    assert list(json.loads(summary.read_text()).items()) == [("model_check", found.to_dict()), ("experiment", "a")]
+    begun.clear()
+    with model_check.checked_meanwhile(job, tmp_path, 5):
+        assert not begun.wait(0.1)
+
+
+def test_a_fit_that_fails_does_not_wait_for_its_check(tmp_path: Path) -> None:
+    """The check's processes end with the fit's block, though they would have worked for minutes."""
+    job = Job("a", (simulated(tmp_path / "wire"),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model_check, "check_model", lambda job, seed, parallel_map: list(parallel_map(sleep, [600.0])))
+        with pytest.raises(ZeroDivisionError), model_check.checked_meanwhile(job, tmp_path, 5):
+            raise ZeroDivisionError
+    assert not (tmp_path / "a").exists()
 
 
 class _Serial:

@@ -3,6 +3,8 @@
 Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wrong is a bug and shows its traceback.
 """
 
+import atexit
+import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -149,6 +151,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         arguments = sys.argv[1:]
         watch(arguments)
+        # The end of the process frees all at once; Python would free each object before it, for half a second.
+        atexit.register(gc.freeze)
         # Of a damaged file, h5netcdf complains a second time, in a traceback from a destructor that stops nothing.
         sys.unraisablehook = lambda unraisable: None
     arguments = list(arguments)

@@ -6,8 +6,9 @@ simulated at the fit and refitted, so the readings are not used twice, and for o
 """
 
 import json
-from collections.abc import Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -181,11 +182,8 @@ def write_checks(
     simulations : int, optional
         As for `check_model`.
     """
-    alpha = level(len(jobs))
-    paths = {job.folder: directory / job.folder / "summary.json" for job in jobs}
-    summaries = {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items()}
-    todo = [job for job in jobs if "model_check" not in summaries[job.folder]]
-    work = partial(check_model, seed=seed, alpha=alpha, simulations=simulations)
+    todo = [job for job in jobs if not is_checked(job, directory)]
+    work = partial(check_model, seed=seed, alpha=level(len(jobs)), simulations=simulations)
     own_effects = jobs[0].own_effects
     with (
         workers(prepare=partial(catalogue, own_effects))
@@ -195,5 +193,41 @@ def write_checks(
         # One fit shares its simulations among the cores, several are each done on one.
         checks = [work(todo[0], parallel_map=parallel_map)] if len(todo) == 1 else parallel_map(work, todo)
         for done, (job, check) in enumerate(zip(todo, checks, strict=True), 1):
-            write_json(paths[job.folder], {"model_check": check.to_dict()} | summaries[job.folder])
+            write_check(job, directory, check)
             report("checks", done, len(todo))
+
+
+@contextmanager
+def checked_meanwhile(job: Job, directory: Path, seed: int) -> Iterator[None]:
+    """Check the only fit of a command while the block samples it: the check needs no draws, and the other core is free.
+
+    The result is stored at the end of the block, which leaves the fit's ``summary.json``.
+
+    Parameters
+    ----------
+    job : Job
+    directory : Path
+        Of the run; the job names its folder within it.
+    seed : int
+        Of the run.
+    """
+    if is_checked(job, directory):
+        yield
+        return
+    # the processes are the inner ones: where the block fails, they end at once, and with them the check
+    with ThreadPoolExecutor(1) as beside, workers(prepare=partial(catalogue, job.own_effects)) as parallel_map:
+        check = beside.submit(check_model, job, seed, parallel_map=parallel_map)
+        yield
+        write_check(job, directory, check.result())
+
+
+def is_checked(job: Job, directory: Path) -> bool:
+    """Whether the result of a fit's check is stored."""
+    path = directory / job.folder / "summary.json"
+    return path.exists() and "model_check" in json.loads(path.read_text(encoding="utf-8"))
+
+
+def write_check(job: Job, directory: Path, check: ModelCheck) -> None:
+    """Put the result of a check first in the ``summary.json`` of its fit."""
+    path = directory / job.folder / "summary.json"
+    write_json(path, {"model_check": check.to_dict()} | json.loads(path.read_text(encoding="utf-8")))

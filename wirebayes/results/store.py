@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -39,6 +39,7 @@ UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload":
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
 _PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
+_MODEL = ("posterior", "observed_data", "constant_data")  # groups that say what was fitted, and the draws
 _CHUNK = 2000  # draws at a time: bounds the memory
 
 
@@ -120,15 +121,15 @@ class Stored:
 
 def experiments_in(path: Path) -> tuple[str, ...]:
     """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
-    with _opened(path) as tree:
-        return tuple(str(name) for name in json.loads(tree["posterior"].attrs["experiments"]))
+    with _opened(path, "posterior") as groups:
+        return tuple(str(name) for name in json.loads(groups["posterior"].attrs["experiments"]))
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """The tree of a ``posterior.nc``; whatever is wrong with it is an `InputError`."""
-    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
-        yield tree
+def _opened(path: Path, *groups: str) -> Iterator[dict[str, xr.Dataset]]:
+    """Some groups of a ``posterior.nc``, for each costs time to open; whatever is wrong there is an `InputError`."""
+    with stored_results(path), ExitStack() as stack:
+        yield {g: stack.enter_context(xr.open_dataset(path, group=g, engine="h5netcdf")) for g in groups}
 
 
 def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
@@ -151,34 +152,34 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
     path = folder / "posterior.nc"
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the posterior of a fit")
-    with _opened(path) as tree:
-        names = _names_in(tree, path)
+    with _opened(path, *_MODEL) as groups:
+        names = _names_in(groups, path)
         if experiment is None and len(names) > 1:
             raise InputError(f"{path}: holds {', '.join(names)}; say which with --experiment")
         if experiment is not None and experiment not in names:
             raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
-        return _stored(tree, path, names.index(experiment or names[0]), own_effects)
+        return _stored(groups, path, names.index(experiment or names[0]), own_effects)
 
 
 def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:
     """The posterior of each experiment in a folder that `save` wrote, beside draws of its prior, each (n,)."""
     path = folder / "posterior.nc"
-    with _opened(path) as tree:
-        return [(_stored(tree, path, at), _prior(tree, at)) for at in range(len(_names_in(tree, path)))]
+    with _opened(path, *_MODEL, "prior") as groups:
+        return [(_stored(groups, path, at), _prior(groups, at)) for at in range(len(_names_in(groups, path)))]
 
 
-def _names_in(tree: Any, path: Path) -> list[str]:
-    about = tree["posterior"].attrs
+def _names_in(groups: Mapping[str, xr.Dataset], path: Path) -> list[str]:
+    about = groups["posterior"].attrs
     if "wirebayes_version" not in about:
         raise InputError(f"{path}: not a posterior of wirebayes")
     names: list[str] = json.loads(about["experiments"])
     return names
 
 
-def _stored(tree: Any, path: Path, at: int, own_effects: Path | None = None) -> Stored:
-    """The posterior of the experiment at this place among those of the tree."""
-    about, constant = tree["posterior"].attrs, tree["constant_data"].to_dataset()
-    posterior, observed = tree["posterior"].to_dataset(), tree["observed_data"].to_dataset()
+def _stored(groups: Mapping[str, xr.Dataset], path: Path, at: int, own_effects: Path | None = None) -> Stored:
+    """The posterior of the experiment at this place among those of the file."""
+    posterior, observed, constant = (groups[name] for name in _MODEL)
+    about = posterior.attrs
     names = json.loads(about["experiments"])
     posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
     draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
@@ -246,7 +247,8 @@ def _measured(
 
 def datatree(folder: Path) -> xr.DataTree:
     """The whole content of a folder's ``posterior.nc``, in memory."""
-    with _opened(folder / "posterior.nc") as tree:
+    path = folder / "posterior.nc"
+    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
         loaded: xr.DataTree = tree.load()
         return loaded
 
@@ -264,14 +266,14 @@ def datatrees(folders: Mapping[str, Path]) -> xr.DataTree:
 def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
     """The prior: draws of the prior of one experiment's parameters, each (n,)."""
     path = folder / "posterior.nc"
-    with _opened(path) as tree:
-        names = _names_in(tree, path)
-        return _prior(tree, names.index(experiment or names[0]))
+    with _opened(path, "posterior", "prior") as groups:
+        names = _names_in(groups, path)
+        return _prior(groups, names.index(experiment or names[0]))
 
 
-def _prior(tree: Any, at: int) -> dict[str, Array]:
-    """Draws of the prior of the experiment at this place among those of the tree."""
-    prior = tree["prior"].to_dataset()
+def _prior(groups: Mapping[str, xr.Dataset], at: int) -> dict[str, Array]:
+    """Draws of the prior of the experiment at this place among those of the file."""
+    prior = groups["prior"]
     prior = prior.isel(experiment=at) if "experiment" in prior.dims else prior
     return {str(name): values.values.reshape(-1) for name, values in prior.data_vars.items()}
 

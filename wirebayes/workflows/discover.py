@@ -21,6 +21,7 @@ from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
+from wirebayes.results.store import load
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import without_script, workers
 from wirebayes.workflows.options import (
@@ -217,5 +218,6 @@ def _pictures(found: search.Findings, output: Path, own_effects: Path | None) ->
 
     for e in (e for block in found.final for e in block.experiments):
         verdict = found.report["experiments"][e.name]
-        before_and_after(output / e.name, verdict, output / f"{e.name}.svg", own_effects)
-        pictures_of_findings(output / e.name, verdict, own_effects)
+        plain, final = (load(output / e.name / model, own_effects=own_effects) for model in ("plain", "final"))
+        before_and_after(plain, final, verdict, output / f"{e.name}.svg")
+        pictures_of_findings(plain, verdict, output / e.name)

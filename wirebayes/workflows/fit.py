@@ -1,13 +1,14 @@
 """The posterior of each experiment, or of all samples of a material together."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import get_args
 
 from scipy import stats
 
 from wirebayes import __version__
-from wirebayes.discovery.model_check import write_checks
+from wirebayes.discovery.model_check import checked_meanwhile, write_checks
 from wirebayes.effects import catalogue, named, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
@@ -143,8 +144,10 @@ def fit(
     with open_run(place.path, configuration) as opened:
         if opened.state != "done":
             with without_script():
-                run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
-                if check:
+                alone = check and len(jobs) == 1
+                with checked_meanwhile(jobs[0], place.path, seed) if alone else nullcontext():
+                    run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+                if check and not alone:
                     write_checks(jobs, place.path, seed, progress or silent)
             opened.finish()
     return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")

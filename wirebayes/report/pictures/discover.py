@@ -4,11 +4,7 @@ import textwrap
 from itertools import pairwise
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
 import numpy as np
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -16,40 +12,37 @@ from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.model import likelihoods
 from wirebayes.report.blocks import save
-from wirebayes.results import store
+from wirebayes.results.store import Stored
 from wirebayes.typing import Array
 from wirebayes.wire.staircase import Linearised, linearise
 
 _MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
 
 
-def before_and_after(folder: Path, verdict: ExperimentFindings, target: Path, own_effects: Path | None = None) -> None:
-    """Draw measured minus predicted tension for a folder's ``plain`` and ``final`` posteriors.
+def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, target: Path) -> None:
+    """Draw measured minus predicted tension for the plain and the final posterior of an experiment.
 
     Parameters
     ----------
-    folder : Path
-        Holds ``plain`` and ``final``.
+    plain, final : Stored
     verdict : dict
         The experiment's part of ``discovery.json``.
     target : Path
         The picture to write.
-    own_effects : Path, optional
-        The user's Python file of effects.
     """
-    figure, axes = plt.subplots(2, 1, figsize=(9.0, 6.0), sharex=True, sharey=True, layout="constrained")
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True, sharey=True)
     unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
     added = " + ".join([e.replace("_", " ") for e in verdict["accepted"]] + unknown)
-    titles = {"plain": "plain model", "final": f"with {added}" if added else "nothing had to be added"}
-    for axis, model in zip(axes, titles, strict=True):
-        _residuals(axis, store.load(folder / model, own_effects=own_effects), verdict["held_out"]["holds"])
-        axis.set_title(f"{folder.name}: {titles[model]}", loc="left", fontsize=10)
+    titles = "plain model", f"with {added}" if added else "nothing had to be added"
+    for axis, stored, title in zip(axes, (plain, final), titles, strict=True):
+        _residuals(axis, stored, verdict["held_out"]["holds"])
+        axis.set_title(f"{target.stem}: {title}", loc="left", fontsize=10)
         axis.set_ylabel("measured − predicted (N)")
     axes[1].set_xlabel("hold number; within each hold, time runs to the right")
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     save(figure, target)
-    plt.close(figure)
 
 
 def waterfall(verdict: ExperimentFindings) -> Figure:
@@ -66,7 +59,8 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     bars = [(0.0, heights[0], _MEASURED)]
     bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
     bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
-    figure, axis = plt.subplots(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
+    figure = Figure(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
+    axis = figure.subplots()
     labels = [f"{heights[0]:.3g} N", *(f"{b - a:+.2g} N".replace("-", "−") for a, b in pairwise(heights))]
     labels += [f"{max(heights[-1] - floor, 0.0):.2g} N", f"{floor:.2g} N"]
     for x, ((low, high, colour), label) in enumerate(zip(bars, labels, strict=True)):
@@ -82,21 +76,20 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     return figure
 
 
-def pictures_of_findings(folder: Path, verdict: ExperimentFindings, own_effects: Path | None = None) -> None:
-    """Draw, for each pattern found, what the ``plain`` posterior leaves over along it: ``where-COVARIATE.svg``.
+def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Path) -> None:
+    """Draw, for each pattern found, what the plain posterior leaves over along it: ``where-COVARIATE.svg``.
 
     None for a pattern over what does not vary within the experiment.
 
     Parameters
     ----------
-    folder : Path
-        Of the experiment; holds the ``plain`` posterior and receives the pictures.
+    stored : Stored
+        The plain posterior.
     verdict : dict
         The experiment's entry in ``discovery.json``.
-    own_effects : Path, optional
-        File of a user's own effects.
+    folder : Path
+        Receives the pictures.
     """
-    stored = store.load(folder / "plain", own_effects=own_effects)
     sample, mask = stored.sample, stored.sample.protocol.mask
     line, _ = _walked(stored)
     residual = np.where(mask, sample.readings[..., 0] - line.tension.mean(axis=2), 0.0)
@@ -108,7 +101,8 @@ def pictures_of_findings(folder: Path, verdict: ExperimentFindings, own_effects:
         # a pattern within holds is hidden by their levels
         within = finding["covariate"] == "time in hold"
         left = (residual - level if within else residual)[mask]
-        figure, axis = plt.subplots(figsize=_PANEL, layout="constrained")
+        figure = Figure(figsize=_PANEL, layout="constrained")
+        axis = figure.subplots()
         axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
         values = np.unique(x)
         few = len(values) <= _GROUPS  # then a mean of each value
@@ -123,17 +117,16 @@ def pictures_of_findings(folder: Path, verdict: ExperimentFindings, own_effects:
         axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
         axis.legend(fontsize=8, frameon=False)
         save(figure, folder / f"where-{finding['covariate'].replace(' ', '-')}.svg")
-        plt.close(figure)
 
 
-def _walked(stored: store.Stored) -> tuple[Linearised, dict[str, Array]]:
+def _walked(stored: Stored) -> tuple[Linearised, dict[str, Array]]:
     """The staircase under some of the stored draws, and these."""
     rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
     own = {name: values[rows] for name, values in stored.draws.items()}
     return linearise(stored.sample.protocol, own, stored.sample.model), own
 
 
-def _residuals(axis: Axes, stored: store.Stored, held: list[int]) -> None:
+def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
     sample = stored.sample
     line, own = _walked(stored)
     variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
