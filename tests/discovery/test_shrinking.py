@@ -55,22 +55,20 @@ def test_the_last_third_is_held_out_where_there_are_four_holds(holds: int, train
 
 
 @pytest.mark.parametrize("remains", [False, True])
-def test_gains_are_sums_over_holds_with_their_spread(remains: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gains_are_sums_over_holds_with_their_spread(remains: bool) -> None:
     """Two experiments; fits in the order plain, with the effects, plain with a discrepancy, effects with one."""
     plain, effects = np.array([1.0, 2.0, 3.0, 4.0]), np.array([4.0, 4.0, 4.0, 8.0])
     smooth, both = [np.array([2.0, 3.0]), np.array([4.0, 5.0])], [np.array([7.0, 7.0]), np.array([7.0, 11.0])]
     fits = [plain, effects, *smooth, *(both if remains else [])]
-    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: fit)
-    found = shrinking._gain(fits, 1, 2, remains, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    found = shrinking._gain(fits, 1, 2, remains)
     gained = np.array([6.0, 5.0, 4.0, 7.0] if remains else [3.0, 2.0, 1.0, 4.0])
     assert found.final == gained.sum() and found.flexible == 4.0
     assert found.standard_error == pytest.approx(2.0 * np.std(gained, ddof=1))  # the root of four holds
 
 
-def test_a_gain_without_named_effects_is_that_of_the_discrepancy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: fit)
+def test_a_gain_without_named_effects_is_that_of_the_discrepancy() -> None:
     fits = [np.array([1.0, 2.0]), np.array([4.0, 8.0])]
-    found = shrinking._gain(fits, 0, 1, True, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    found = shrinking._gain(fits, 0, 1, True)
     assert found.final == found.flexible == 9.0
 
 
@@ -122,13 +120,13 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
         names = [e.name for e in pair]
         return [held(error[trained.block.name + smooth] + names.index(e.name)) for e in trained.experiments]
 
-    def gained(fits: list[Any], named: int, n: int, remains: bool, rng: Any, parallel_map: Any) -> _Gain:
-        chosen = [f.name for f in fits]
+    def gained(elpd: list[str], named: int, n: int, remains: bool) -> _Gain:
         base = (["plain", stages[-1]] if stages else ["plain"]) + ["~"] * (4 if remains and stages else 2)
-        assert chosen == base and named == bool(stages) and n == 2
+        assert elpd == base and named == bool(stages) and n == 2
         return _Gain(9.0, 1.0, 2.0)
 
     monkeypatch.setattr(shrinking, "_predicted", predicted)
+    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: fit.name)
     monkeypatch.setattr(shrinking, "with_discrepancy", lambda base, e, rng: ("discrepancy",))
     monkeypatch.setattr(shrinking, "fitted", lambda *given: Model(name="~"))
     monkeypatch.setattr(shrinking, "_gain", gained)

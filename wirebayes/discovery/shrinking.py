@@ -12,6 +12,7 @@ from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import HeldOut, LeaveOneHoldOutGain, Scores, Step
+from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
@@ -72,18 +73,20 @@ def shrinking(
     models = ["plain", *names]
     if not all(train):
         return [Shrinking(_NOT_HELD_OUT.copy(), [{"model": m, **_NOTHING} for m in models]) for _ in train]
-    smooth = [_beside_discrepancy(plain, train, rng, parallel_map)] if remains or stages else []
-    if remains and stages:
-        smooth.append(_beside_discrepancy(stages[-1], train, rng, parallel_map))
+    bases = [plain, *(stages[-1:] if remains else [])] if remains or stages else []
+    smooth = _beside_discrepancy(bases, train, rng, parallel_map)
     trained = [_Trained(plain.experiments, train, b.effects, b) for b in (plain, *stages)]
     trained += [t for beside in smooth for t in beside.trained]
-    found = list(parallel_map(_predicted, trained, rng.spawn(len(trained))))
+    predicted = parallel_map(_predicted, trained, rng.spawn(len(trained)))
+    fits = [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
+    # handed over before any result is waited for: no core idles between the two
+    left_out = parallel_map(held_out.truncated_leave_one_hold_out, fits, rng.spawn(len(fits))) if smooth else ()
+    found, elpd = list(predicted), list(left_out)
     by_step, alone_ = found[: len(models)], [part[0] for part in found[len(models) :]]
     n = len(train)
     flexible = alone_[:n] if smooth else [None] * n
     final = alone_[-n:] if remains else by_step[-1]
-    fits = [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
-    gain = _gain(fits, len(stages[-1:]), n, remains, rng, parallel_map) if smooth else None
+    gain = _gain(elpd, len(stages[-1:]), n, remains) if smooth else None
     out = []
     for i, before in enumerate(by_step[0]):
         report = _compared(before, final[i], flexible[i], gain)
@@ -115,16 +118,21 @@ class _Smooth:
 
 
 def _beside_discrepancy(
-    base: LaplaceFit, train: Sequence[int], rng: np.random.Generator, parallel_map: ParallelMap
-) -> _Smooth:
-    """A smooth discrepancy beside the effects of `base`, its size what they leave over in the holds trained on."""
-    members, n = base.experiments, len(base.experiments)
-    first = [e.train(k) for e, k in zip(members, train, strict=True)]
-    added = list(parallel_map(with_discrepancy, repeat(base), [*members, *first], rng.spawn(2 * n)))
-    alone = [(e,) for e in members]
-    fits = parallel_map(fitted, alone, added[:n], repeat(base.law), repeat(base.history), rng.spawn(n))
-    trained = [_Trained(e, (k,), extra, base) for e, k, extra in zip(alone, train, added[n:], strict=True)]
-    return _Smooth(list(fits), trained)
+    bases: Sequence[LaplaceFit], train: Sequence[int], rng: np.random.Generator, parallel_map: ParallelMap
+) -> list[_Smooth]:
+    """A smooth discrepancy beside the effects of each base, its size what they leave over in the holds trained on."""
+    n, handed_over = len(train), []
+    for base in bases:
+        first = [e.train(k) for e, k in zip(base.experiments, train, strict=True)]
+        added = parallel_map(with_discrepancy, repeat(base), [*base.experiments, *first], rng.spawn(2 * n))
+        handed_over.append((base, added, rng.spawn(n)))
+    fitting = []
+    for base, added, own in handed_over:
+        effects, alone_ = list(added), [(e,) for e in base.experiments]
+        fits = parallel_map(fitted, alone_, effects[:n], repeat(base.law), repeat(base.history), own)
+        trained = zip(alone_, train, effects[n:], strict=True)
+        fitting.append((fits, [_Trained(e, (k,), extra, base) for e, k, extra in trained]))
+    return [_Smooth(list(fits), trained) for fits, trained in fitting]
 
 
 @dataclass(frozen=True)
@@ -148,11 +156,8 @@ class _Gain:
         }
 
 
-def _gain(
-    fits: Sequence[LaplaceFit], named: int, n: int, remains: bool, rng: np.random.Generator, parallel_map: ParallelMap
-) -> _Gain:
-    """Leave out each hold of the fits: plain, with the effects (`named` is 1 or 0), then n of each smooth lot."""
-    elpd = list(parallel_map(held_out.truncated_leave_one_hold_out, fits, rng.spawn(len(fits))))
+def _gain(elpd: Sequence[Array], named: int, n: int, remains: bool) -> _Gain:
+    """From (H,) densities of left-out holds: plain, with the effects (`named` is 1 or 0), then n of each smooth lot."""
     plain, smooth = elpd[0], np.concatenate(elpd[1 + named : 1 + named + n])
     difference = (np.concatenate(elpd[-n:]) if remains else elpd[1]) - plain
     spread = float(difference.std(ddof=1) * np.sqrt(len(difference)))

@@ -86,8 +86,10 @@ def run(
             one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
         return
     work = partial(one, directory=directory, seed=seed, policy=policy)
+    # those that take longest begin first, so that no core waits for one that began last
+    longest = sorted(todo, key=lambda job: -len(job.experiments) * (1 + len(job.effects)))
     with workers(len(todo)) as parallel_map:
-        for done, _ in enumerate(parallel_map(work, todo), 1):
+        for done, _ in enumerate(parallel_map(work, longest), 1):
             report("fits", done, len(todo))
 
 
