@@ -14,8 +14,9 @@ QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
-    # with few draws, the shape of the importance ratios' tail is anybody's guess
-    return fit(build([experiments()[0]]), 2)
+    # of this wire some holds are easy and some are not, whatever the draws; with few of them, the shape of the
+    # importance ratios' tail is anybody's guess
+    return fit(build([experiments()[1]]), 2)
 
 
 @pytest.mark.statistical
@@ -23,7 +24,7 @@ def test_importance_sampling_agrees_with_refitting_without_the_hold(fitted: Fit)
     fast = smoothed_leave_one_hold_out(fitted, policy=QUICK)
     exact = smoothed_leave_one_hold_out(fitted, policy=QUICK, exact=True)
     assert exact.refitted.all() and not fast.refitted.all()
-    assert list(fast.hold) == [1, 2, 3, 4, *range(6, 14)]
+    assert list(fast.hold) == list(range(1, 13))
     easy = ~fast.refitted
     # Monte-Carlo error of 500 effective draws at Pareto k up to 0.5
     assert np.abs(fast.elpd - exact.elpd)[easy].max() < 0.25

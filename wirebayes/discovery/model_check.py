@@ -228,6 +228,14 @@ def is_checked(job: Job, directory: Path) -> bool:
 
 
 def write_check(job: Job, directory: Path, check: ModelCheck) -> None:
-    """Put the result of a check first in the ``summary.json`` of its fit."""
+    """Put the result of a check first in the ``summary.json`` of its fit.
+
+    Parameters
+    ----------
+    job : Job
+    directory : Path
+        Of the run; the job names its folder within it.
+    check : ModelCheck
+    """
     path = directory / job.folder / "summary.json"
     write_json(path, {"model_check": check.to_dict()} | json.loads(path.read_text(encoding="utf-8")))
