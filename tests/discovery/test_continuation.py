@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from wirebayes.discovery import continuation, linear_scan, refit, screening
 from wirebayes.discovery.continuation import Continuation, climb, ladders, start, strengths
 from wirebayes.discovery.linear_scan import RATIOS, Scan, Tangent, expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.screening import GlobalTest
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import read_experiments
@@ -162,12 +164,40 @@ def test_simulations_that_come_later_are_climbed_and_the_others_kept(
 
     monkeypatch.setattr(continuation, "climb", counted)
     larger = Continuation([block], trials, candidates, [data])
+    monkeypatch.setattr(continuation, "BY_LARGER", 1.0)  # no surprise is too small to be found out
     for simulated in (drawn[0], both):
         found = larger.test([simulated], screening.global_test(candidates, [data], [simulated.scan]))
     assert rows == [1, 40, 40]
     anew = Continuation([block], trials, candidates, [data])
     again = anew.test([both], screening.global_test(candidates, [data], [both.scan]))
     assert found.surprises == again.surprises and anew.log_bayes == larger.log_bayes
+
+
+@pytest.mark.parametrize(("as_high", "counts"), [(0, True), (19, True), (20, False), (400, False)])
+def test_larger_effects_count_where_they_are_clear(as_high: int, counts: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name that by its ladder surprises as much as the most surprising name in 2 % of the data sets, or less."""
+    null = np.linspace(0.0, 10.0, 999)
+    height = float(null[-1 - as_high] + 0.001)
+    test = GlobalTest({"a": np.linspace(-2.0, 4.0, 999)}, {"a": 1.0, "b": 5.0}, null)
+    larger = Continuation.__new__(Continuation)
+    larger._values = {"a": 20.0}
+    monkeypatch.setattr(Continuation, "_chance", lambda *given: np.empty(0))
+    monkeypatch.setattr(continuation, "surprise", lambda value, chance: height)
+    found = larger.test([], test)
+    assert found.p == ((1 + as_high) / 1000 if counts else test.p) and test.p == 0.501
+    assert found.surprises == ({"a": height, "b": 5.0} if counts else test.surprises)
+
+
+@pytest.mark.parametrize(("value", "climbed"), [(0.0, 40), (2.9, 200), (9.0, 999)])
+def test_no_more_simulations_climb_than_it_takes(value: float, climbed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once several are as high as the data, these cannot be surprising enough."""
+    way: Any = SimpleNamespace(effect=SimpleNamespace(name="a"))
+    larger = Continuation.__new__(Continuation)
+    larger._values, larger._known, larger._ways = {"a": value}, {}, [way]
+    simulated: Any = SimpleNamespace(z=np.tile(np.arange(100.0), 10)[:999, None] / 33.0, readings=[])
+    monkeypatch.setattr(Continuation, "_strengths", lambda self, ways, plain: {"a": plain[0][0][:, 0]})
+    found = larger._chance("a", np.full(999, -2.0), [simulated], needed=np.log(1000 / 3))
+    assert len(found) == climbed
 
 
 def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(tmp_path: Path) -> None:
@@ -182,7 +212,7 @@ def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(
     assert block.parameters("simulated")["setting_sd"] > 1.0
     kinds = {name: CATALOGUE[name] for name in ("clamp_transient", "strain_stiffening")}
     trials, candidates, data = scanned(block, kinds)
-    drawn = screening.replicated(block, trials, 99, np.random.default_rng(1))
+    drawn = screening.replicated(block, trials, 499, np.random.default_rng(1))
     near = screening.global_test(candidates, [data], [drawn.scan])
     larger = Continuation([block], trials, candidates, [data])
     far, log_bayes = larger.test([drawn], near), larger.log_bayes

@@ -30,6 +30,7 @@ from wirebayes.discovery.linear_scan import (
 )
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
+from wirebayes.discovery.settings import BY_LARGER
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import cholesky, solve
@@ -52,7 +53,6 @@ _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the
 _LARGE = 1e200  # above any sum of squares, and its square root finite
 _PIECE = 64  # rows weighed at once: what stays in the cache
 _FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
-_ENOUGH = 6  # simulations as high at which no more are made
 _TRIED = 3  # names
 _LEVEL = 0.95  # of chance, above which a name is worth a try
 
@@ -576,33 +576,40 @@ class Continuation:
         self._known: dict[str, Array] = {}  # of each name, in the simulations climbed so far
 
     def test(self, simulated: Sequence[Replicates], test: GlobalTest) -> GlobalTest:
-        """The linear global test with what the ladders add to the data and to these simulations, a block each.
+        """The global test again, with what the ladders add, where that makes the result clear; else as it was.
 
         Only names that come above the linear scan's own level are tried in the simulations: others do not decide. How
         often the most surprising of all names is that surprising is known from the linear scan of the same simulations.
-        Simulations are those of an earlier call, and more.
+        This holds in the far tail, where one name alone decides. Nearer the middle, ladders of a few names would be
+        compared with scans of all names, and p would not be uniform; so ladders count up to p = `BY_LARGER`, or where p
+        is as small as it can be. Simulations are those of an earlier call, and more.
         """
-        values = self._values
+        values, count = self._values, len(test.null)
+        clear = max(BY_LARGER, 1.0 / (1 + count))
+        needed = float(np.quantile(test.null, 1.0 - clear))  # below it no surprise can make p so small
         lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in values.items()}
         surprises = dict(test.surprises)
         for name in sorted((n for n in lead if lead[n] > 0), key=lambda n: -lead[n])[:_TRIED]:
-            surprises[name] = surprise(values[name], self._chance(name, test.chance[name], simulated))
+            chance = self._chance(name, test.chance[name], simulated, needed)
+            surprises[name] = max(surprises[name], surprise(values[name], chance))
             if surprises[name] > test.null.max():
                 break
-        return replace(test, surprises=surprises)
+        larger = replace(test, surprises=surprises)
+        return larger if larger.p <= clear else test
 
-    def _chance(self, name: str, linear: Array, simulated: Sequence[Replicates]) -> Array:
+    def _chance(self, name: str, linear: Array, simulated: Sequence[Replicates], needed: float) -> Array:
         """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more than it takes."""
         known = self._known.get(name, np.empty(0))
         ways = [way for way in self._ways if way.effect.name == name]
-        out = np.empty(0)
-        while len(out) < len(linear) and (out >= self._values[name]).sum() < _ENOUGH:
+        out, as_high = np.empty(0), 0
+        while len(out) < len(linear) and (not as_high or np.log1p(len(linear)) - np.log1p(as_high) >= needed):
             last = min(len(out) + (_ROWS if len(out) else _FIRST_ROWS), len(linear))
             if last > len(known):
                 rows = slice(len(known), last)
                 climbed = self._strengths(ways, [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated])
                 known = np.append(known, np.max(list(climbed.values()), axis=0))
             out = np.maximum(linear[:last], known[:last])
+            as_high = int((out >= self._values[name]).sum())
         self._known[name] = known
         return out
 

@@ -10,6 +10,7 @@ from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 ALPHA = 0.04  # level of the global test: one clean file in twenty-five is called incomplete
+BY_LARGER = 0.02  # p up to which what only larger effects show counts
 SIMULATIONS = 999  # p of .04 is then known to .006, and more are made where that is not enough
 
 # Prior over models. A single effect of any name has weight 1.
