@@ -41,6 +41,8 @@ def test_a_part_that_has_a_name_is_said_with_the_rest_that_has_none(tmp_path: Pa
     part = SLIP | {"verdict": "partial", "effects": ["grip_slip"]}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": part}})
     assert answer.answer(found)[0] == "a: grip_slip is missing, and something that is not in the catalogue (p = 0.001)"
+    two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"a": part | {"effects": ["grip_slip", "toe"]}}})
+    assert answer.answer(two)[0].startswith("a: grip_slip, toe are missing, and something")
 
 
 def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:

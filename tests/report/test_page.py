@@ -272,6 +272,7 @@ DISCOVERY = {
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "Nothing is missing"),
         ({"verdict": "unknown", "effects": []}, "that no effect in the catalogue explains"),
         ({"verdict": "partial"}, "Strain stiffening is missing, and something else that no effect"),
+        ({"verdict": "partial", "effects": ["toe", "memory"]}, "Toe and memory are missing, and something else"),
         ({}, "remains beside them with probability 0.020"),
         ({"verdict": "ambiguous", "set": ["toe", "memory"]}, "cannot distinguish between toe and memory"),
     ],

@@ -152,7 +152,8 @@ def _finding(name: str, report: ExperimentFindings) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
     finding = _NAMED.get(verdict, f"{verdict}: {effects}")
     if verdict == "partial":
-        finding = f"{effects} is missing, and something that is not in the catalogue"
+        are = "are" if report["effects"][1:] else "is"
+        finding = f"{effects} {are} missing, and something that is not in the catalogue"
     lines = [f"{name}: {finding} (p = {report['p_global']:.2g})"]
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"

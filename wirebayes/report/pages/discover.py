@@ -63,8 +63,8 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         "unknown": "Something is missing that no effect in the catalogue explains.",
         "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}{_alike(v)}.",
         "named": f"What is missing: {listed([spoken(e) for e in v['effects']])}{_alike(v)}.",
-        "partial": f"{listed([spoken(e) for e in v['effects']]).capitalize()} is missing, and something else that no "
-        "effect in the catalogue explains.",
+        "partial": f"{listed([spoken(e) for e in v['effects']]).capitalize()} {'are' if v['effects'][1:] else 'is'} "
+        "missing, and something else that no effect in the catalogue explains.",
     }
     blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
