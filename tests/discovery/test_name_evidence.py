@@ -9,12 +9,11 @@ from scipy import integrate, stats
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import name_evidence, refit, screening
-from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, expand, probes, scan
+from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, probes
 from wirebayes.discovery.power import amplitude_80
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.search import discover
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference.laplace_fit import fitted
 from wirebayes.simulation.synthetic import Bench, Truth
 
 NORM = 25.0  # δ per unit of amplitude in these scans
@@ -105,35 +104,6 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["grip_slip"] == pytest.approx(9.0 - np.log(12.0), abs=1e-3)
     assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
-
-
-WIRE = {"k1": 900.0, "B": 0.25, "k2": 0.02, "N": 0.8, "sensor_sd": 0.006, "setting_sd": 0.008}
-
-
-@pytest.mark.parametrize(
-    ("sizes", "places", "weight"),
-    [((0.008, 0.008), [(0, 1)], 1 / 2), ((0.008, -0.008), [(0,), (1,)], 1 / 4), ((0.0, 0.008), [(1,)], 1 / 8)],
-    ids=["one for both", "one for each", "in the second alone"],
-)
-def test_an_amplitude_of_the_bench_is_one_for_all_materials_or_one_for_each(
-    sizes: tuple[float, ...], places: list[tuple[int, ...]], weight: float
-) -> None:
-    """The variants have half the weight each, and in the second one the numbers of materials, and each choice."""
-    name, experiments = "sensor_nonlinearity", []
-    for material, size in zip(("soft", "stiff"), sizes, strict=True):
-        truth = Truth(WIRE | {f"{name}.a": size}, [named(name)])
-        experiments.append(simulated_tests([Bench(name=material, material=material)], truth, seed=3))
-    blocks = [fitted(e, (), "hooke", "saturating", np.random.default_rng(0)) for e in experiments]
-    trials, candidates = screening.candidate_probes(blocks, {name: CATALOGUE[name]})
-    scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
-    found = name_evidence.weigh_names(blocks, trials, candidates, scans)
-    best = found.winners[name]
-    assert [r.blocks for r in best] == places
-    for b, r in found.amplitudes(name).items():
-        assert r.amplitude == pytest.approx(sizes[b], abs=3.0 * r.sd)
-    assert [acts > 0.5 for acts in found.presence[name]] == [size != 0.0 for size in sizes]
-    # what fits worse adds little
-    assert found.log_bayes[name] == pytest.approx(sum(r.log_bayes for r in best) + np.log(weight), abs=0.2)
 
 
 @pytest.mark.parametrize("one_sided", [True, False])

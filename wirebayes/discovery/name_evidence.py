@@ -111,36 +111,23 @@ def weigh_names(
 def _forms(
     trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan], further: Mapping[Candidate, float]
 ) -> list[_Form]:
-    """The variants of every effect, each place with the probe that the linear scan likes best there.
-
-    What the bench or the air does to all blocks has one amplitude for all, or one in each of some blocks: both are
-    variants, for two benches may stand behind one file.
-    """
-    best: dict[tuple[str, bool], dict[tuple[int, ...], tuple[float, int]]] = {}
+    """The variants of every effect, each place with the probe that the linear scan likes best there."""
+    best: dict[_Place, tuple[float, int]] = {}
     effects: dict[str, Effect] = {}
-    promise: dict[tuple[str, bool], float] = {}
-
-    def consider(c: Candidate, variant: tuple[str, bool], larger: float = -np.inf) -> None:
-        value = float(log_bayes(c, scans)[0][0])
-        promise[variant] = max(promise.get(variant, -np.inf), value, larger)
-        if c.shared:
-            places = best.setdefault(variant, {})
-            places[c.blocks] = max(places.get(c.blocks, (-np.inf, 0)), (value, c.probe), key=lambda item: item[0])
-
+    promise: dict[str, float] = {}
     for c in candidates:
-        key = trials[c.probe].effect.key
-        effects[key] = trials[c.probe].effect
-        for_all = c.shared and len(c.blocks) > 1
-        consider(c, (key, for_all), further.get(c, -np.inf))
-        if for_all:
-            for own in [Candidate(c.probe, c.name, (b,), True) for b in c.blocks]:
-                consider(own, (key, False))
-            consider(Candidate(c.probe, c.name, c.blocks, False), (key, False))
+        effect = trials[c.probe].effect
+        effects[effect.key] = effect
+        value = float(log_bayes(c, scans)[0][0])
+        promise[effect.key] = max(promise.get(effect.key, -np.inf), value, further.get(c, -np.inf))
+        if c.shared:
+            place = effect.key, c.blocks
+            best[place] = max(best.get(place, (-np.inf, 0)), (value, c.probe), key=lambda item: item[0])
     out = []
-    for variant, places in best.items():
-        key = variant[0]
-        values, which = zip(*places.values(), strict=True)
-        out.append(_Form(effects[key], tuple((key, on) for on in places), values, which, promise[variant]))
+    for key, effect in effects.items():
+        places = [place for place in best if place[0] == key]
+        values, which = zip(*(best[place] for place in places), strict=True)
+        out.append(_Form(effect, tuple(places), values, which, promise[key]))
     return out
 
 
