@@ -2,7 +2,7 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-INPUTS := pyproject.toml constraints.txt
+INPUTS := pyproject.toml constraints.txt wirebayes/wire/_kernel.pyx
 
 # One thread each for the linear algebra: the package's own processes share the cores.
 export OMP_NUM_THREADS ?= 1

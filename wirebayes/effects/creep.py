@@ -19,6 +19,7 @@ class PermanentCreep(Effect):
 
     name = "permanent_creep"
     place = "amount"
+    formula = "permanent"
     scope = "material"
     amplitudes = (Amplitude("psi", "-", 0.0, stats.uniform(0.0, 1.0)),)
     sentence = "A part of the creep is permanent: later holds creep as if it had not occurred."
@@ -33,6 +34,7 @@ class Memory(Effect):
 
     name = "memory"
     place = "creep"
+    formula = "memory"
     scope = "material"
     amplitudes = (Amplitude("omega", "-", 0.0, stats.halfnorm(0.0, 1.0)),)
     sentence = "The creep of earlier holds continues on its own time scale after the next hold has begun."
@@ -52,6 +54,7 @@ class SecondRelaxation(Effect):
 
     name = "second_relaxation"
     place = "elongation"
+    formula = "second_mode"
     scope = "material"
     amplitudes = (
         Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.1), is_elongation=True),
@@ -69,6 +72,7 @@ class SteadyCreep(Effect):
 
     name = "steady_creep"
     place = "elongation"
+    formula = "flow"
     scope = "material"
     amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 1e-3), is_elongation=True),)
     sentence = "The wire also flows steadily under tension and never settles."
@@ -87,6 +91,7 @@ class SteadyCreepCarried(Effect):
 
     name = "steady_creep"
     place = "creep"
+    formula = "flow_carried"
     scope = "material"
     amplitudes = SteadyCreep.amplitudes
     sentence = "The wire also flows steadily under tension; on unloading it recovers that flow."
@@ -105,6 +110,7 @@ class TensionDependentRate(Effect):
 
     name = "tension_dependent_rate"
     place = "rate"
+    formula = "rate_power"
     scope = "material"
     amplitudes = (Amplitude("m", "-", 0.0, stats.norm(0.0, 0.5)),)
     sentence = "The creep runs faster or slower at higher tension."
@@ -120,6 +126,7 @@ class Ageing(Effect):
 
     name = "ageing"
     place = "amount"
+    formula = "ageing"
     scope = "material"
     amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.5)),)
     sentence = "Each hold relaxes less than the one before, whatever its tension."
@@ -134,6 +141,7 @@ class CreepThreshold(Effect):
 
     name = "creep_threshold"
     place = "drive"
+    formula = "threshold"
     scope = "material"
     amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 2.0)),)
     sentence = "Below a threshold tension the wire does not creep."

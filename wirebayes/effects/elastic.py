@@ -12,6 +12,7 @@ from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
 Own = dict[str, NDArray[Any]]
+_DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length; compiled code counts them in this order
 
 
 class StrainStiffening(Effect):
@@ -19,6 +20,7 @@ class StrainStiffening(Effect):
 
     name = "strain_stiffening"
     place = "strain"
+    formula = "stiffening"
     scope = "material"
     amplitudes = (Amplitude("c", "-", 0.0, stats.norm(0.0, 20.0)),)
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
@@ -33,6 +35,7 @@ class Toe(Effect):
 
     name = "toe"
     place = "strain"
+    formula = "toe"
     scope = "material"
     amplitudes = (Amplitude("c", "-", 0.0, stats.halfnorm(0.0, 0.002)),)
     sentence = "At low tension the line is still straightening out and pulls less than its stiffness implies."
@@ -54,6 +57,7 @@ class FixtureCompliance(Effect):
 
     name = "fixture_compliance"
     place = "strain"
+    formula = "series"
     scope = "instrument"
     amplitudes = (Amplitude("c", "mm/N", 0.0, stats.halfnorm(0.0, 0.2)),)
     sentence = "The test bench itself deforms under the tension."
@@ -73,6 +77,7 @@ class ThermalExpansion(Effect):
 
     name = "thermal_expansion"
     place = "zero_length"
+    formula = "thermal"
     scope = "material"
     amplitudes = (Amplitude("alpha", "1/K", 0.0, stats.norm(0.0, 1e-4)),)
     sentence = "The wire grows or shrinks with the logged temperature."
@@ -94,6 +99,7 @@ class LengthDependence(Effect):
     which: str = "k1"
     name = "length_dependence"
     place = "sample"
+    formula = "length_power"
     scope = "material"
     compares_lengths = True
     amplitudes = (Amplitude("p", "-", 0.0, stats.norm(0.0, 1.0)),)
@@ -104,12 +110,16 @@ class LengthDependence(Effect):
     def key(self) -> str:
         return f"{self.name}@{self.which}"
 
+    @property
+    def formula_constant(self) -> float:
+        return float(_DEPENDENT.index(self.which))
+
     def apply(self, value: Any, own: Own, hold: HoldContext) -> Any:
         return value | {self.which: value[self.which] * (hold.length_mm / hold.length_ref_mm) ** own["p"]}
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
-        return [cls(which) for which in ("k1", "B", "U", "N")] if _two_lengths(protocols) else []
+        return [cls(which) for which in _DEPENDENT] if _two_lengths(protocols) else []
 
 
 def _two_lengths(protocols: Sequence[Protocol]) -> bool:

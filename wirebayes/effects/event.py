@@ -17,6 +17,7 @@ class GripSlip(EventEffect):
 
     name = "grip_slip"
     place = "zero_length"
+    formula = "slip"
     amplitudes = (Amplitude("w", "mm", 0.0, stats.norm(0.0, 0.3)),)
     sentence = "The wire slipped in its grip once."
     shows = "one step in level; names the hold"
@@ -31,6 +32,7 @@ class UnrecordedHold(EventEffect):
 
     name = "unrecorded_hold"
     place = "wait"
+    formula = "wait"
     amplitudes = (Amplitude("T", "s", 0.0, stats.halfnorm(0.0, 300.0)),)
     sentence = "Time passed at a displacement before its first reading."
     shows = "step in level; names the hold"

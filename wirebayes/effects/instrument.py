@@ -18,6 +18,7 @@ class ReadingDelay(Effect):
 
     name = "reading_delay"
     place = "clock"
+    formula = "delay"
     scope = "instrument"
     amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 5.0)),)
     sentence = "The first reading of each hold was taken later than recorded."
@@ -34,6 +35,7 @@ class SensorDrift(Effect):
 
     name = "sensor_drift"
     place = "reading"
+    formula = "drift"
     scope = "instrument"
     amplitudes = (Amplitude("a", "N/s", 0.0, stats.norm(0.0, 1e-3)),)
     sentence = "The force sensor drifts with time."
@@ -48,6 +50,7 @@ class SensorNonlinearity(Effect):
 
     name = "sensor_nonlinearity"
     place = "reading"
+    formula = "square"
     scope = "instrument"
     amplitudes = (Amplitude("a", "1/N", 0.0, stats.norm(0.0, 0.02)),)
     sentence = "The force sensor is nonlinear at higher tension."
@@ -62,6 +65,7 @@ class ClampTransient(Effect):
 
     name = "clamp_transient"
     place = "reading"
+    formula = "transient"
     scope = "instrument"
     amplitudes = (
         Amplitude("a", "-", 0.0, stats.norm(0.0, 0.05)),
@@ -88,6 +92,7 @@ class LostMotion(_NeedsReversal):
 
     name = "lost_motion"
     place = "position"
+    formula = "lost_motion"
     scope = "instrument"
     amplitudes = (Amplitude("w", "mm", 0.0, stats.halfnorm(0.0, 0.1)),)
     sentence = "The screw has play: after a reversal the true position lags behind."
@@ -102,6 +107,7 @@ class GuideFriction(_NeedsReversal):
 
     name = "guide_friction"
     place = "reading"
+    formula = "friction"
     scope = "instrument"
     amplitudes = (Amplitude("mu", "-", 0.0, stats.norm(0.0, 0.05)),)
     sentence = "Friction in the guide raises the reading while loading and lowers it while unloading."

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wirebayes.typing import Array
+from wirebayes.wire import compiled
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
 
@@ -56,6 +57,8 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     -------
     Filtered
     """
+    if compiled.kernel is not None:
+        return Filtered(*compiled.kernel.chain(*_flat(line, readings, mask, variance, setting_sd)))
     holds, _, n = line.tension.shape
     out = np.zeros((holds, n))
     mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
@@ -87,6 +90,8 @@ def standardised(
     -------
     (n,) and (m, n) arrays
     """
+    if compiled.kernel is not None:
+        return compiled.kernel.standardised(*_flat(line, readings, mask, variance, setting_sd))
     n = line.tension.shape[2]
     noise, total, out = _Noise.of(variance, setting_sd), np.zeros(n), []
     mean, var = np.zeros(n), np.zeros(n)
@@ -101,6 +106,16 @@ def standardised(
         else:
             mean, var = _unread(line, j, mean, var, noise)
     return total, np.concatenate(out)
+
+
+def _flat(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> tuple[Array, ...]:
+    """What compiled filters are called with: contiguous arrays of their own types."""
+    shape = line.tension.shape
+    parts = (line.tension, line.by_setting, line.by_creep, line.carry_by_setting, line.carry_by_creep)
+    lines = (np.ascontiguousarray(part, float) for part in parts)
+    noise = (np.broadcast_to(v, shape[2:]).astype(float) for v in (variance, setting_sd))
+    seen = np.ascontiguousarray(mask).view(np.uint8)
+    return *lines, np.broadcast_to(np.asarray(readings, float), shape), seen, *noise
 
 
 def held_out(
@@ -223,6 +238,10 @@ def seen(
     (n, k, k) and (n, k) arrays
         shapesᵀ V⁻¹ shapes and shapesᵀ V⁻¹ (readings - tension).
     """
+    if compiled.kernel is not None:
+        flat = _flat(line, readings, mask, variance, setting_sd)
+        beside = (np.ascontiguousarray(a, float) for a in (filtered.carried_mean, filtered.carried_var, shapes))
+        return compiled.kernel.seen(*flat, *beside)
     holds, _, n = line.tension.shape
     k = shapes.shape[2]
     gram, along = np.zeros((k, k, n)), np.zeros((k, n))
@@ -440,7 +459,15 @@ def hold_courses(
         the first reading determines a length (n,); None for a hold without readings.
     """
     n = np.shape(theta["k1"])[0]
-    walk = Walk(protocol, dict(theta) | {"preload": np.zeros(n)}, model)
+    theta = dict(theta) | {"preload": np.zeros(n)}
+    call = compiled.call(protocol, theta, model)
+    if call is not None:
+        first = np.broadcast_to(first, (len(protocol.displacement_mm), n))
+        tension, slope = compiled.kernel.courses(*call, first, _NEWTON_STEPS)
+        valid = (first > 0) & (slope[:, 0] > 0)
+        recorded = protocol.recorded
+        return [(t, s, v) if known else None for t, s, v, known in zip(tension, slope, valid, recorded, strict=True)]
+    walk = Walk(protocol, theta, model)
     out: list[tuple[Array, Array, Array] | None] = []
     for j in range(len(protocol.displacement_mm)):
         if not protocol.mask[j].any():

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes import linear_algebra
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
@@ -54,44 +55,37 @@ class MarginalisedProblem(Problem):
         with np.errstate(all="ignore"):
             lines = self._lines(theta)
             seen = self._seen(lines, readings)
-            _, _, value, vectors, along = seen
-            best = np.einsum("nij,nj->in", vectors, along / value)
+            best = (np.swapaxes(linear_algebra.inv(seen.factor), 1, 2) @ seen.along[..., None])[..., 0].T
             for i, (sample, (line, variance, setting_sd)) in enumerate(zip(self.samples, lines, strict=True)):
                 y = sample.readings if readings is None else readings[i]
                 left = y - np.einsum("hrk,kn->hrn", self.shapes[i] * self.sd, best)
                 residuals.append(likelihoods.standardised(line, left, sample.protocol.mask, variance, setting_sd)[1])
-            return self._log_likelihood(seen), np.concatenate([*residuals, best, 0.5 * np.log(value.T)])
+            return self._log_likelihood(seen), np.concatenate([*residuals, best, np.log(seen.diagonal.T)])
 
     def _lines(self, theta: Array) -> list[tuple[Linearised, Array, Array]]:
         return [self.linearised(theta, sample) for sample in self.samples]
 
-    def _log_likelihood(self, seen: tuple[Array, ...]) -> Array:
-        total, square, value, _, along = seen
-        explained = (along**2 / value).sum(axis=1)
+    def _log_likelihood(self, seen: "_Seen") -> Array:
+        explained = (seen.along**2).sum(axis=1)
         # At absurd parameters rounding may make more of the readings than there is to explain.
-        regular = (value[:, 0] > 1.0 - _ROUNDING) & (explained <= (1.0 + _ROUNDING) * square)
-        total = total + 0.5 * (explained - np.log(value).sum(axis=1) - ((self.mean / self.sd) ** 2).sum())
+        regular = (seen.diagonal > 1.0 - _ROUNDING).all(axis=1) & (explained <= (1.0 + _ROUNDING) * seen.square)
+        total = seen.total + 0.5 * (explained - ((self.mean / self.sd) ** 2).sum()) - np.log(seen.diagonal).sum(axis=1)
         return np.where(regular & np.isfinite(total), total, -np.inf)
 
     def drawn(self, theta: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
-        _, _, value, vectors, along = self._seen(self._lines(theta), None)
-        normal = rng.normal(size=along.shape)
-        amplitudes = np.einsum("nij,nj->ni", vectors, along / value + normal / np.sqrt(value)) * self.sd
-        log_density = 0.5 * (np.log(value) - normal**2 - np.log(2.0 * np.pi)).sum(axis=1)
+        seen = self._seen(self._lines(theta), None)
+        normal = rng.normal(size=seen.along.shape)
+        inverse = np.swapaxes(linear_algebra.inv(seen.factor), 1, 2)
+        amplitudes = (inverse @ (seen.along + normal)[..., None])[..., 0] * self.sd
+        log_density = (np.log(seen.diagonal) - 0.5 * normal**2 - 0.5 * np.log(2.0 * np.pi)).sum(axis=1)
         return amplitudes, log_density - np.log(self.sd).sum()
 
-    def _seen(self, lines: Sequence[tuple[Linearised, Array, Array]], readings: Any) -> tuple[Array, ...]:
-        """What the readings say of the amplitudes, in standard deviations of their priors.
-
-        The log-likelihood of none (n,); no less than what there is to explain (n,), prior included; and of the
-        posterior precision (n, k, k), which is no less than one, the eigenvalues (n, k) and vectors (n, k, k), and its
-        product with the posterior mean along them (n, k).
-        """
-        k = len(self.sd)
+    def _seen(self, lines: Sequence[tuple[Linearised, Array, Array]], readings: Any) -> "_Seen":
+        """What the readings say of the amplitudes."""
         total: Any = 0.0
         square: Any = ((self.mean / self.sd) ** 2).sum()
-        precision: Any = np.eye(k)
+        precision: Any = np.eye(len(self.sd))
         pull: Any = self.mean / self.sd
         for i, sample in enumerate(self.samples):
             y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
@@ -102,9 +96,38 @@ class MarginalisedProblem(Problem):
             total = total + height
             square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
             precision, pull = precision + gram, pull + along
-        finite = np.isfinite(precision).all(axis=(1, 2))
-        value, vectors = np.linalg.eigh(np.where(finite[:, None, None], precision, np.eye(k)))
-        return np.where(finite, total, -np.inf), square, value, vectors, np.einsum("nij,ni->nj", vectors, pull)
+        factor = linear_algebra.cholesky(precision)
+        finite = np.isfinite(factor).all(axis=(1, 2))
+        factor[~finite] = np.eye(len(self.sd))
+        along = np.linalg.solve(factor, pull[..., None])[..., 0]
+        return _Seen(np.where(finite, total, -np.inf), square, factor, along)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What readings say of the amplitudes, in standard deviations of their priors.
+
+    Attributes
+    ----------
+    total : (n,)
+        Log-likelihood of no amplitudes.
+    square : (n,)
+        No less than what there is to explain, prior included.
+    factor : (n, k, k)
+        Lower Cholesky factor of the posterior precision, which is no less than one.
+    along : (n, k)
+        Its transpose times the posterior mean.
+    """
+
+    total: Array
+    square: Array
+    factor: Array
+    along: Array
+
+    @property
+    def diagonal(self) -> Array:
+        """(n, k) of the factor."""
+        return np.einsum("nii->ni", self.factor)
 
 
 def integrated(problem: Problem) -> Problem:

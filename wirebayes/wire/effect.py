@@ -122,6 +122,7 @@ class Effect:
     sentence: ClassVar[str]
     shows: ClassVar[str] = ""
     adds: ClassVar[bool] = False  # a sum to the reading, of each amplitude times a function of hold and time alone
+    formula: ClassVar[str] = ""  # the name of its compiled twin in `wirebayes/wire/_kernel.pyx`, where it has one
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
@@ -152,6 +153,11 @@ class Effect:
     def key(self) -> str:
         """The effect's name, with its hold where it has one."""
         return self.name
+
+    @property
+    def formula_constant(self) -> float:
+        """A number that the compiled twin refers to beside the amplitudes, such as the hold of an event."""
+        return 0.0
 
     def columns(self) -> tuple[str, ...]:
         """Parameter names as they appear in a posterior: ``effect_name.parameter``."""
@@ -267,6 +273,10 @@ class EventEffect(Effect):
     @property
     def key(self) -> str:
         return f"{self.name}@{self.test}:{self.hold}" if self.test else f"{self.name}@{self.hold}"
+
+    @property
+    def formula_constant(self) -> float:
+        return float(self.hold)
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:

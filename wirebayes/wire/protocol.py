@@ -72,6 +72,36 @@ class Protocol:
         return np.asarray(np.maximum(self.mask.sum(axis=1) - 1, 0))
 
     @cached_property
+    def flat(self) -> dict[str, Any]:
+        """The same as contiguous arrays: what compiled code calls a ``Test`` (``wire/_kernel.pyx``)."""
+        times, where = self.distinct_times
+        which = np.array([np.arange(len(times))[rows] for rows in where], np.intc)
+        order, direction = (np.array([hold[key] for hold in self.holds], float) for key in ("order", "direction"))
+        return {
+            "length_mm": float(self.length_mm),
+            "displacement_mm": np.array(self.displacement_mm, float),
+            "time_s": times[which],
+            "warming_K": np.zeros(which.shape) if self.warming_K is None else np.array(self.warming_K, float),
+            "start_s": self.start_s,
+            "order": order,
+            "direction": direction,
+            "times": times,
+            "which": which,
+            "last": self.last_reading.astype(np.intc),
+            "recorded": self.recorded.view(np.uint8),
+            "which_age": np.zeros((0, 0, 0), np.intc),
+        }
+
+    @cached_property
+    def flat_with_ages(self) -> dict[str, Any]:
+        """The same with how long ago each earlier hold began, at the start of a hold and at its readings."""
+        start_s, time_s, times = self.flat["start_s"], self.flat["time_s"], self.flat["times"]
+        age = np.maximum(np.subtract.outer(start_s, start_s), 0.0)[..., None]
+        ages, which = np.unique(np.concatenate([age, age + time_s[:, None]], axis=2), return_inverse=True)
+        which = which.reshape(len(age), len(age), -1).astype(np.intc) + np.intc(len(times))
+        return self.flat | {"times": np.concatenate([times, ages]), "which_age": which}
+
+    @cached_property
     def holds(self) -> tuple[dict[str, Any], ...]:
         """What `wirebayes.wire.effect.HoldContext` says of each hold whatever the wire."""
         start, time = self.start_s, np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.wire import laws
+from wirebayes.wire import compiled, laws
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import Effect, HoldContext, Placed
 from wirebayes.wire.protocol import Protocol
@@ -91,6 +91,11 @@ def simulate(
     (H, R, n) array, N
     """
     n = np.shape(theta["k1"])[0]
+    exact = np.zeros((1, 1)) if setting_mm is None else np.asarray(setting_mm)
+    call = None if np.iscomplexobj(exact) else compiled.call(protocol, theta, model)
+    if call is not None:
+        exact = np.broadcast_to(exact.astype(float), (len(protocol.displacement_mm), n))
+        return compiled.kernel.simulate(*call, exact)
     walk = Walk(protocol, theta, model)
     creep: NDArray[Any] = np.zeros(n)
     beside: dict[str, NDArray[Any]] = {}
@@ -119,6 +124,9 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     -------
     Linearised
     """
+    call = compiled.call(protocol, theta, model)
+    if call is not None:
+        return Linearised(*compiled.kernel.linearise(*call))
     n = np.shape(theta["k1"])[0]
     holds, width = protocol.time_s.shape
     walk = Walk(protocol, {k: np.tile(v, 2) for k, v in theta.items()} if model.effects else theta, model)

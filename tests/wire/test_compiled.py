@@ -1,0 +1,152 @@
+"""The compiled staircase and filter against the ones in numpy, which other tests compare with independent truth."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.wire.protocols import PLAIN, parameters, protocol, protocols
+from wirebayes.effects import CATALOGUE
+from wirebayes.effects.creep import SteadyCreepCarried
+from wirebayes.effects.elastic import LengthDependence, StrainStiffening
+from wirebayes.effects.rivals import Logarithmic
+from wirebayes.model import likelihoods
+from wirebayes.wire import compiled
+from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.staircase import Model, linearise, simulate
+
+if compiled.kernel is None:
+    pytest.skip("the package was installed without a C compiler", allow_module_level=True)
+
+TIMES = [0.0, 30.0, 60.0, 90.0, 120.0]
+ONE_WAY = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+
+
+def forms() -> list[Effect]:
+    """Every form of every effect of the catalogue, events at two holds."""
+    out: list[Effect] = [SteadyCreepCarried(), *(LengthDependence(which) for which in ("k1", "B", "U", "N"))]
+    for kind in CATALOGUE.values():
+        if issubclass(kind, EventEffect):
+            out += [kind(hold=1), kind(hold=3)]
+        elif kind is not LengthDependence:
+            out.append(kind())
+    return out
+
+
+FORMS = forms()
+models = st.builds(
+    Model,
+    st.sampled_from(["hooke", "modified"]),
+    st.sampled_from(["saturating", "additive"]),
+    st.lists(st.sampled_from(FORMS), max_size=4, unique_by=lambda e: e.name).map(tuple),
+    st.just(3.0),
+    st.sampled_from([0.0, 800.0]),
+)
+
+
+def by_numpy(compute: Callable[[], Any]) -> Any:
+    """What a function returns where nothing was compiled."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compiled, "kernel", None)
+        return compute()
+
+
+def drawn(model: Model, rows: list[dict[str, float]], seed: int) -> dict[str, np.ndarray]:
+    """The rows as columns, with amplitudes from their priors."""
+    rng = np.random.default_rng(seed)
+    out = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    for effect in model.effects:
+        priors = zip(effect.columns(), effect.amplitudes, strict=True)
+        out |= {column: a.prior.rvs(len(rows), random_state=rng) for column, a in priors}
+    return out
+
+
+def same(found: Any, expected: Any, scale: float) -> None:
+    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-9 * scale)
+
+
+@settings(deadline=None)
+@given(protocols(), models, st.lists(parameters(), min_size=1, max_size=3), st.integers(0, 2**32 - 1))
+def test_readings_and_derivatives_are_those_of_numpy(p, model, rows, seed):
+    theta = drawn(model, rows, seed)
+    assert compiled.call(p, theta, model) is not None
+    line, expected = linearise(p, theta, model), by_numpy(lambda: linearise(p, theta, model))
+    for name, value in vars(expected).items():
+        same(getattr(line, name), value, theta["k1"].max())
+    setting = np.random.default_rng(seed).normal(0.0, 0.1, (len(p.displacement_mm), len(rows)))
+    same(simulate(p, theta, model, setting), by_numpy(lambda: simulate(p, theta, model, setting)), theta["k1"].max())
+
+
+@settings(deadline=None)
+@given(protocols(), models, st.lists(parameters(), min_size=1, max_size=3), st.integers(0, 2**32 - 1))
+def test_single_holds_are_those_of_numpy(p, model, rows, seed):
+    theta = drawn(model, rows, seed)
+    first = np.random.default_rng(seed).uniform(-0.5, 8.0, (len(p.displacement_mm), 1))
+    found = likelihoods.hold_courses(p, theta, model, first)
+    expected = by_numpy(lambda: likelihoods.hold_courses(p, theta, model, first))
+    for one, other, recorded in zip(found, expected, p.recorded, strict=True):
+        assert (one is not None) == (other is not None) == recorded
+        if one is not None:
+            assert (one[2] == other[2]).all()
+            for a, b in zip(one[:2], other[:2], strict=True):
+                same(a[:, one[2]], b[:, one[2]], theta["k1"].max())
+
+
+@settings(deadline=None)
+@given(protocols(), parameters(), st.floats(1e-3, 0.3), st.floats(1e-3, 1.0), st.integers(0, 2**32 - 1))
+def test_filters_are_those_of_numpy(p, row, sensor_sd, setting_sd, seed):
+    theta = drawn(Model(), [row, row], seed)
+    line = linearise(p, theta)
+    readings = line.tension[..., :1] + np.random.default_rng(seed).normal(0.0, sensor_sd, (*p.time_s.shape, 1))
+    seen = readings, p.mask, np.array([sensor_sd**2, 0.01]), np.array([setting_sd, 0.0])
+    found, expected = likelihoods.chain(line, *seen), by_numpy(lambda: likelihoods.chain(line, *seen))
+    for name, value in vars(expected).items():
+        np.testing.assert_allclose(getattr(found, name), value, rtol=1e-7, atol=1e-9)
+    for one, other in zip(
+        likelihoods.standardised(line, *seen), by_numpy(lambda: likelihoods.standardised(line, *seen)), strict=True
+    ):
+        np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("effect", FORMS, ids=lambda e: e.key)
+def test_each_effect_moves_the_compiled_readings(effect):
+    p = protocol([*ONE_WAY, 3.0, 1.0], [TIMES] * 8, warming=np.linspace(0.0, 5.0, 40).reshape(8, 5))
+    model = Model(effects=(effect,), tension_ref_N=3.0, length_ref_mm=800.0)
+    theta = {name: np.array([value]) for name, value in PLAIN.items()}
+    typical = {c: np.array([a.prior.ppf(0.8)]) for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
+    neutral = {
+        c: np.array([a.prior.ppf(0.8) if a.is_shape else a.neutral])
+        for c, a in zip(effect.columns(), effect.amplitudes, strict=True)
+    }
+    plain = simulate(p, theta, Model())
+    same(simulate(p, theta | neutral, model), plain, 1.0)
+    moved = simulate(p, theta | typical, model)
+    assert np.abs(moved - plain).max() > 1e-3
+    same(moved, by_numpy(lambda: simulate(p, theta | typical, model)), 1.0)
+
+
+class Own(StrainStiffening):
+    """A user's effect that is derived from one of the catalogue and computes something else."""
+
+    def apply(self, value, own, hold):
+        return value * (1.0 - own["c"] * value)
+
+
+def test_an_effect_with_a_function_of_its_own_has_lost_its_parent_s_formula():
+    theta = {name: np.array([value]) for name, value in PLAIN.items()} | {"strain_stiffening.c": np.array([5.0])}
+    p = protocol(ONE_WAY, [TIMES] * 6)
+    assert compiled.call(p, theta, Model(effects=(Own(),))) is None
+    softer, stiffer = (simulate(p, theta, Model(effects=(e,))) for e in (Own(), StrainStiffening()))
+    assert (softer < stiffer).all()
+
+
+def test_numpy_computes_what_has_no_formula_and_what_is_complex():
+    p = protocol(ONE_WAY, [TIMES] * 6)
+    theta = {name: np.array([value]) for name, value in PLAIN.items()}
+    assert compiled.call(p, theta | {"logarithmic.t0": np.array([10.0])}, Model(effects=(Logarithmic(),))) is None
+    assert compiled.call(p, theta | {"k1": np.array([900.0 + 1e-30j])}, Model()) is None
+    step = simulate(p, theta, Model(), np.full((6, 1), 1e-30j))
+    assert np.iscomplexobj(step)

@@ -1,0 +1,60 @@
+from collections.abc import Sequence
+from typing import Any
+
+from wirebayes.typing import Array
+
+MOST_EFFECTS: int
+FORMULAS: tuple[str, ...]
+
+class Test:
+    def __init__(self, **arrays: Any) -> None: ...
+
+class Law:
+    def __init__(
+        self,
+        modified: bool,
+        kept: float,
+        tension_ref_N: float,
+        log_length_ratio: float,
+        formulas: Sequence[tuple[str, int, float]],
+    ) -> None: ...
+
+def linearise(test: Test, law: Law, theta: Array) -> tuple[Array, ...]: ...
+def simulate(test: Test, law: Law, theta: Array, setting_mm: Array) -> Array: ...
+def courses(test: Test, law: Law, theta: Array, first_N: Array, most_steps: int) -> tuple[Array, Array]: ...
+def chain(
+    tension: Array,
+    by_setting: Array,
+    by_creep: Array,
+    carry_by_setting: Array,
+    carry_by_creep: Array,
+    readings: Array,
+    mask: Array,
+    variance: Array,
+    setting_sd: Array,
+) -> tuple[Array, Array, Array]: ...
+def seen(
+    tension: Array,
+    by_setting: Array,
+    by_creep: Array,
+    carry_by_setting: Array,
+    carry_by_creep: Array,
+    readings: Array,
+    mask: Array,
+    variance: Array,
+    setting_sd: Array,
+    carried_mean: Array,
+    carried_var: Array,
+    shapes: Array,
+) -> tuple[Array, Array]: ...
+def standardised(
+    tension: Array,
+    by_setting: Array,
+    by_creep: Array,
+    carry_by_setting: Array,
+    carry_by_creep: Array,
+    readings: Array,
+    mask: Array,
+    variance: Array,
+    setting_sd: Array,
+) -> tuple[Array, Array]: ...

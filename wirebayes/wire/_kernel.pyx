@@ -1,0 +1,636 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, initializedcheck=False
+"""The staircase and its filter, compiled: one parameter set after the other, derivatives by forward differentiation.
+
+The twin of `wirebayes.wire.staircase` and of `wirebayes.model.likelihoods`, which the tests compare it with; they remain
+the reference, and compute what has no formula here. `wirebayes.wire.compiled` decides who computes.
+"""
+
+from libc.math cimport exp, expm1, fabs, fmax, log, log1p, pow, sqrt
+
+import numpy as np
+
+cdef enum:
+    _MOST_EFFECTS = 32
+
+MOST_EFFECTS = _MOST_EFFECTS
+
+# In the order of `FORMULAS`.
+cdef enum Formula:
+    STIFFENING, TOE, SERIES, THERMAL, LENGTH_POWER, PERMANENT, MEMORY, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
+    AGEING, THRESHOLD, SLIP, WAIT, DELAY, DRIFT, SQUARE, TRANSIENT, LOST_MOTION, FRICTION
+
+FORMULAS = (
+    "stiffening", "toe", "series", "thermal", "length_power", "permanent", "memory", "second_mode", "flow",
+    "flow_carried", "rate_power", "ageing", "threshold", "slip", "wait", "delay", "drift", "square", "transient",
+    "lost_motion", "friction",
+)
+
+cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
+
+
+cdef struct Dual:
+    # A value with its derivatives by the setting error of the hold and by the creep carried into it.
+    double v
+    double s
+    double c
+
+
+cdef inline Dual constant(double v) noexcept nogil:
+    return Dual(v, 0.0, 0.0)
+
+
+cdef inline Dual plus(Dual x, Dual y) noexcept nogil:
+    return Dual(x.v + y.v, x.s + y.s, x.c + y.c)
+
+
+cdef inline Dual times(Dual x, double a) noexcept nogil:
+    return Dual(x.v * a, x.s * a, x.c * a)
+
+
+cdef inline Dual product(Dual x, Dual y) noexcept nogil:
+    return Dual(x.v * y.v, x.s * y.v + x.v * y.s, x.c * y.v + x.v * y.c)
+
+
+cdef inline Dual through(Dual x, double value, double slope) noexcept nogil:
+    # A function of x that has this value and slope there.
+    return Dual(value, slope * x.s, slope * x.c)
+
+
+cdef struct Wire:
+    double k1, B, U, k2, N, base, length_mm, log_length_ratio, tension_ref_N, kept
+    bint modified
+    int effects
+    bint own_time
+    int formula[_MOST_EFFECTS]
+    double number[_MOST_EFFECTS]  # the hold of an event, the parameter that depends on the length
+    double own[_MOST_EFFECTS][2]  # amplitudes
+    double beside[_MOST_EFFECTS]  # elongation beside the creep, as it is carried into the hold
+
+
+cdef struct Hold:
+    double index, order, start_s, direction, displacement_mm
+    bint reversed, recorded
+    Dual position, carried, tension  # the tension when it begins
+
+
+cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
+    """Strain after all effects on length and strain."""
+    cdef Dual zero = elongation, out
+    cdef double inverse, share, width
+    cdef int e
+    zero.v += wire.length_mm
+    for e in range(wire.effects):
+        if wire.formula[e] == THERMAL:
+            zero = times(zero, 1.0 + wire.own[e][0] * warming_K)
+        elif wire.formula[e] == SLIP and hold.order >= wire.number[e]:
+            zero.v += wire.own[e][0]
+    if wire.modified:
+        inverse = 1.0 / hold.position.v
+        out.v = 1.0 - zero.v * inverse
+        share = zero.v * inverse * inverse
+        out.s = share * hold.position.s - inverse * zero.s
+        out.c = share * hold.position.c - inverse * zero.c
+    else:
+        inverse = 1.0 / zero.v
+        out.v = hold.position.v * inverse - 1.0
+        share = hold.position.v * inverse * inverse
+        out.s = inverse * hold.position.s - share * zero.s
+        out.c = inverse * hold.position.c - share * zero.c
+    for e in range(wire.effects):
+        if wire.formula[e] == STIFFENING:
+            width = wire.own[e][0]
+            out = through(out, out.v * (1.0 + width * out.v), 1.0 + 2.0 * width * out.v)
+        elif wire.formula[e] == TOE:
+            width = wire.own[e][0]
+            if width > 0:
+                share = -expm1(-fmax(out.v, 0.0) / width)
+                out = through(out, out.v - width * share, share)
+        elif wire.formula[e] == SERIES:
+            out = times(out, 1.0 / (1.0 + wire.own[e][0] * wire.k1 / wire.length_mm))
+    return out
+
+
+cdef inline Dual tension_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
+    cdef Dual strain = strain_of(wire, hold, elongation, warming_K)
+    return times(strain, wire.k1) if strain.v > 0 else constant(0.0)
+
+
+cdef inline Dual amount_of(Wire* wire, Hold* hold) noexcept nogil:
+    """Creep still to come in a hold, mm."""
+    cdef Dual drive = hold.tension, out
+    cdef double target
+    cdef int e
+    for e in range(wire.effects):
+        if wire.formula[e] == THRESHOLD:
+            drive.v -= wire.own[e][0]
+            if not drive.v > 0:
+                drive = constant(0.0)
+    if drive.v > 0:
+        target = wire.B * pow(drive.v, wire.U)
+        out = through(drive, target, wire.U * target / drive.v)
+    else:
+        out = constant(0.0)
+    out = plus(out, times(hold.carried, -wire.kept))
+    for e in range(wire.effects):
+        if wire.formula[e] == PERMANENT:
+            out = plus(out, times(hold.carried, wire.own[e][0]))
+        elif wire.formula[e] == AGEING:
+            out = times(out, pow(1.0 + hold.index, -wire.own[e][0]))
+    return out
+
+
+cdef inline Dual rate_of(Wire* wire, Hold* hold) noexcept nogil:
+    """k2 in a hold."""
+    cdef Dual out = constant(wire.k2), ratio
+    cdef double power
+    cdef int e
+    for e in range(wire.effects):
+        if wire.formula[e] == RATE_POWER:
+            ratio = times(hold.tension, 1.0 / wire.tension_ref_N)
+            if not ratio.v > LEAST_RATE_RATIO:
+                ratio = constant(LEAST_RATE_RATIO)
+            power = pow(ratio.v, wire.own[e][0])
+            out = product(out, through(ratio, power, wire.own[e][0] * power / ratio.v))
+    return out
+
+
+cdef inline double clock_of(Wire* wire, Hold* hold, double time_s, bint first) noexcept nogil:
+    cdef int e
+    for e in range(wire.effects):
+        if wire.formula[e] == DELAY and first and hold.recorded:
+            time_s += wire.own[e][0]
+    return time_s
+
+
+cdef inline Dual fraction_of(Wire* wire, Dual rate, double time_s) noexcept nogil:
+    """Share of the amount reached after a time, the rate having derivatives."""
+    cdef double reach = pow(time_s, wire.N), gone = expm1(-rate.v * reach)
+    return through(rate, -gone, reach * (1.0 + gone))
+
+
+cdef inline Dual reading_of(Wire* wire, Hold* hold, Dual tension, double time_s) noexcept nogil:
+    """What the sensor says of a tension."""
+    cdef double a
+    cdef int e
+    for e in range(wire.effects):
+        a = wire.own[e][0]
+        if wire.formula[e] == DRIFT:
+            tension.v += a * (hold.start_s + time_s)
+        elif wire.formula[e] == SQUARE:
+            tension = through(tension, tension.v * (1.0 + a * tension.v), 1.0 + 2.0 * a * tension.v)
+        elif wire.formula[e] == TRANSIENT:
+            tension = times(tension, 1.0 + a * exp(-time_s / wire.own[e][1]))
+        elif wire.formula[e] == FRICTION:
+            tension = times(tension, 1.0 + a * hold.direction)
+    return tension
+
+
+cdef class Test:
+    """What was done to a wire, as contiguous arrays (see `wirebayes.wire.protocol.Protocol`)."""
+
+    cdef int holds, width
+    cdef double length_mm
+    cdef double[:, ::1] time_s, warming_K
+    cdef double[::1] displacement_mm, start_s, order, direction, times
+    cdef int[:, ::1] which  # of `times`
+    cdef int[:, :, ::1] which_age  # of `times`: since an earlier hold began, at the start of a hold and at its readings
+    cdef int[::1] last
+    cdef unsigned char[::1] recorded
+
+    def __init__(self, double length_mm, displacement_mm, time_s, warming_K, start_s, order, direction, times, which,
+                 last, recorded, which_age):
+        self.length_mm = length_mm
+        self.displacement_mm, self.time_s, self.warming_K = displacement_mm, time_s, warming_K
+        self.start_s, self.order, self.direction, self.times = start_s, order, direction, times
+        self.which, self.last, self.recorded, self.which_age = which, last, recorded, which_age
+        self.holds, self.width = self.time_s.shape[0], self.time_s.shape[1]
+
+
+cdef inline Dual remembered(
+    Wire* wire, Hold* hold, Test test, double omega, int j, int r, int earlier, double[::1] shares, double[:, ::1] past
+) noexcept:
+    """What the clocks of earlier holds would still have added by a reading of hold `j`."""
+    cdef double total = 0.0, share, age, k2
+    cdef int i
+    for i in range(earlier):
+        if wire.own_time:
+            age, k2 = hold.start_s - past[i, 0], past[i, 2]
+            # a difference of two fractions of the creep
+            share = expm1(-k2 * pow(age, wire.N)) - expm1(-k2 * pow(age + test.time_s[j, r], wire.N))
+        else:
+            share = shares[test.which_age[j, i, r + 1]] - shares[test.which_age[j, i, 0]]
+        total += past[i, 1] * share
+    return constant(omega * total)
+
+
+cdef class Law:
+    """Which wire: law, history, formulas of its effects with a number each, and constants they refer to."""
+
+    cdef bint modified
+    cdef double kept, tension_ref_N, log_length_ratio
+    cdef int effects
+    cdef int formula[_MOST_EFFECTS]
+    cdef int amplitudes[_MOST_EFFECTS]
+    cdef double number[_MOST_EFFECTS]
+
+    def __init__(self, bint modified, double kept, double tension_ref_N, double log_length_ratio, formulas):
+        self.modified, self.kept, self.tension_ref_N = modified, kept, tension_ref_N
+        self.log_length_ratio = log_length_ratio
+        self.effects = len(formulas)
+        for e, (name, amplitudes, number) in enumerate(formulas):
+            self.formula[e] = FORMULAS.index(name)
+            self.amplitudes[e], self.number[e] = amplitudes, number
+
+
+cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ssize_t i, double[::1] shares) noexcept:
+    """The wire of column `i`: parameters k1 B U k2 N preload, then amplitudes; and its creep at the distinct times."""
+    cdef int e, row = 6, a, t
+    cdef double grown
+    wire.k1, wire.B, wire.U, wire.k2, wire.N = theta[0, i], theta[1, i], theta[2, i], theta[3, i], theta[4, i]
+    wire.length_mm, wire.base = test.length_mm, test.length_mm + theta[5, i]
+    wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
+    wire.effects, wire.own_time = law.effects, False
+    for e in range(law.effects):
+        wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], 0.0
+        for a in range(law.amplitudes[e]):
+            wire.own[e][a] = theta[row, i]
+            row += 1
+        if law.formula[e] == RATE_POWER or law.formula[e] == DELAY:
+            wire.own_time = True
+        if law.formula[e] == LENGTH_POWER:
+            grown = exp(law.log_length_ratio * wire.own[e][0])
+            if law.number[e] == 0:
+                wire.k1 *= grown
+            elif law.number[e] == 1:
+                wire.B *= grown
+            elif law.number[e] == 2:
+                wire.U *= grown
+            else:
+                wire.N *= grown
+    if not wire.own_time:
+        for t in range(test.times.shape[0]):
+            shares[t] = -expm1(-wire.k2 * pow(test.times[t], wire.N))
+
+
+cdef void begin(Wire* wire, Hold* hold, Test test, int j, double stretched, double carried) noexcept:
+    """Hold `j` at its first moment."""
+    cdef int e
+    cdef Dual elongation
+    cdef double waited
+    hold.index, hold.order, hold.start_s = j, test.order[j], test.start_s[j]
+    hold.direction, hold.recorded = test.direction[j], test.recorded[j]
+    hold.reversed = test.direction[j] != test.direction[0]
+    hold.position, hold.carried = Dual(stretched, 1.0, 0.0), Dual(carried, 0.0, 1.0)
+    elongation = hold.carried
+    for e in range(wire.effects):
+        if wire.formula[e] == LOST_MOTION and hold.reversed:
+            hold.position.v -= wire.own[e][0] * hold.direction
+        elif wire.formula[e] == SECOND_MODE or wire.formula[e] == FLOW:
+            elongation.v += wire.beside[e]
+    hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+    for e in range(wire.effects):
+        if wire.formula[e] == WAIT and hold.order == wire.number[e]:
+            waited = -expm1(-wire.k2 * pow(wire.own[e][0], wire.N))
+            elongation = times(amount_of(wire, hold), waited)
+            hold.carried = plus(hold.carried, elongation)
+            elongation = hold.carried
+            elongation.v += beside_of(wire)
+            hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+
+
+cdef inline double beside_of(Wire* wire) noexcept nogil:
+    cdef double total = 0.0
+    cdef int e
+    for e in range(wire.effects):
+        if wire.formula[e] == SECOND_MODE or wire.formula[e] == FLOW:
+            total += wire.beside[e]
+    return total
+
+
+cdef Dual follow(
+    Wire* wire, Hold* hold, Test test, int j, int width, int earlier, double[::1] shares, double[:, ::1] past,
+    Dual* readings
+) noexcept:
+    """The first readings of a hold that has begun, `width` of them, after `earlier` ones that it remembers.
+
+    Returns the creep carried out, and leaves what is beside it in `wire`.
+    """
+    cdef Dual amount = amount_of(wire, hold), rate = rate_of(wire, hold), grown, total, course, out
+    cdef double time_s, share, carried_beside[_MOST_EFFECTS]
+    cdef int r, e
+    out = hold.carried
+    for e in range(wire.effects):
+        carried_beside[e] = wire.beside[e]
+    for r in range(width):
+        time_s = test.time_s[j, r]
+        if wire.own_time:
+            grown = product(amount, fraction_of(wire, rate, clock_of(wire, hold, time_s, r == 0)))
+        else:
+            grown = times(amount, shares[test.which[j, r]])
+        grown = plus(hold.carried, grown)
+        for e in range(wire.effects):
+            if wire.formula[e] == MEMORY:
+                grown = plus(grown, remembered(wire, hold, test, wire.own[e][0], j, r, earlier, shares, past))
+            elif wire.formula[e] == FLOW_CARRIED:
+                grown = plus(grown, times(hold.tension, wire.own[e][0] * time_s))
+        total = grown
+        for e in range(wire.effects):
+            if wire.formula[e] == SECOND_MODE:
+                share = -expm1(-time_s / wire.own[e][1])
+                course = times(hold.tension, wire.own[e][0] * share)
+                course.v += carried_beside[e] * (1.0 - share)
+            elif wire.formula[e] == FLOW:
+                course = times(hold.tension, wire.own[e][0] * time_s)
+                course.v += carried_beside[e]
+            else:
+                continue
+            total = plus(total, course)
+            if r == test.last[j]:
+                wire.beside[e] = course.v
+        if r == test.last[j]:
+            out = grown
+        readings[r] = reading_of(wire, hold, tension_of(wire, hold, total, test.warming_K[j, r]), time_s)
+    past[j, 0], past[j, 1], past[j, 2] = hold.start_s, amount.v, rate.v
+    return out
+
+
+def linearise(Test test, Law law, const double[:, ::1] theta):
+    """Staircases (see `wirebayes.wire.staircase.Linearised`), a column of `theta` each."""
+    cdef Py_ssize_t n = theta.shape[1], i
+    cdef int holds = test.holds, width = test.width, j, r
+    each = np.empty((3, holds, width, n))
+    carry = np.empty((2, holds, n))
+    creep = np.zeros((holds + 1, n))
+    cdef double[:, :, :, ::1] y = each
+    cdef double[:, :, ::1] c = carry
+    cdef double[:, ::1] e = creep, past = np.empty((holds, 3))
+    cdef double[::1] shares = np.empty(test.times.shape[0])
+    cdef double[:, ::1] scratch = np.empty((width, 3))
+    cdef Dual* readings = <Dual*> &scratch[0, 0]
+    cdef Wire wire
+    cdef Hold hold
+    cdef Dual out
+    for i in range(n):
+        take(&wire, law, test, theta, i, shares)
+        for j in range(holds):
+            begin(&wire, &hold, test, j, wire.base + test.displacement_mm[j], e[j, i])
+            out = follow(&wire, &hold, test, j, width, j, shares, past, readings)
+            for r in range(width):
+                y[0, j, r, i], y[1, j, r, i], y[2, j, r, i] = readings[r].v, readings[r].s, readings[r].c
+            e[j + 1, i], c[0, j, i], c[1, j, i] = out.v, out.s, out.c
+    return each[0], each[1], each[2], carry[0], carry[1], creep
+
+
+def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] setting_mm):
+    """Noise-free readings (H, R, n); `setting_mm` (H, n)."""
+    cdef Py_ssize_t n = theta.shape[1], i
+    cdef int holds = test.holds, width = test.width, j, r
+    tension = np.empty((holds, width, n))
+    cdef double[:, :, ::1] y = tension
+    cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
+    cdef double[::1] shares = np.empty(test.times.shape[0])
+    cdef Dual* readings = <Dual*> &scratch[0, 0]
+    cdef double creep
+    cdef Wire wire
+    cdef Hold hold
+    for i in range(n):
+        take(&wire, law, test, theta, i, shares)
+        creep = 0.0
+        for j in range(holds):
+            begin(&wire, &hold, test, j, wire.base + test.displacement_mm[j] + setting_mm[j, i], creep)
+            creep = follow(&wire, &hold, test, j, width, j, shares, past, readings).v
+            for r in range(width):
+                y[j, r, i] = readings[r].v
+    return tension
+
+
+
+def courses(Test test, Law law, const double[:, ::1] theta, const double[:, :] first_N, int most_steps):
+    """Tensions and slopes (H, R, n) of holds without a past, each as far stretched as its first reading (H, n) says."""
+    cdef Py_ssize_t n = theta.shape[1], i
+    cdef int holds = test.holds, width = test.width, j, r, step
+    tension, slope = np.zeros((holds, width, n)), np.zeros((holds, width, n))
+    cdef double[:, :, ::1] y = tension, by = slope
+    cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
+    cdef double[::1] shares = np.empty(test.times.shape[0])
+    cdef Dual* readings = <Dual*> &scratch[0, 0]
+    cdef double wanted, stretched, move
+    cdef Wire wire
+    cdef Hold hold
+    for i in range(n):
+        take(&wire, law, test, theta, i, shares)
+        for j in range(holds):
+            if not test.recorded[j]:
+                continue
+            wanted = first_N[j, i] if first_N[j, i] > 0 else 1.0
+            stretched = test.length_mm * (1.0 + wanted / wire.k1)
+            if wire.modified:
+                stretched = test.length_mm / fmax(1.0 - wanted / wire.k1, 0.1)
+            for step in range(most_steps):
+                alone(&wire, &hold, test, j, 1, stretched, shares, past, readings)
+                if readings[0].s > 0:
+                    move = (wanted - readings[0].v) / readings[0].s
+                else:  # a slack guess has no slope: go out until it pulls
+                    move = wanted / wire.k1 * test.length_mm
+                stretched += move
+                if fabs(move) < 1e-12 * test.length_mm:
+                    break
+            alone(&wire, &hold, test, j, width, stretched, shares, past, readings)
+            for r in range(width):
+                y[j, r, i], by[j, r, i] = readings[r].v, readings[r].s
+    return tension, slope
+
+
+cdef void alone(
+    Wire* wire, Hold* hold, Test test, int j, int width, double stretched, double[::1] shares, double[:, ::1] past,
+    Dual* readings
+) noexcept:
+    """The first readings of a hold without a past."""
+    cdef int e
+    for e in range(wire.effects):
+        wire.beside[e] = 0.0
+    begin(wire, hold, test, j, stretched, 0.0)
+    follow(wire, hold, test, j, width, 0, shares, past, readings)
+
+
+cdef struct Read:
+    # What the readings of one hold say: see `wirebayes.model.likelihoods._Read`.
+    double log_density, mean, var, pull_c, pull_s, cc, ss, post_c, post_s
+
+
+cdef inline Read read_hold(
+    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
+    double a, double c, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j, Py_ssize_t i,
+    double m, double p, double weight, double log_variance, double q, double* left
+) noexcept:
+    """Filter one hold: the creep carried into it has mean m and variance p, its setting error variance q."""
+    cdef double cc = 0.0, cs = 0.0, ss = 0.0, cr = 0.0, sr = 0.0, square = 0.0, residual, det, v_cc, v_cs, v_ss
+    cdef int r, count = 0
+    cdef Read out
+    for r in range(mask.shape[1]):
+        if mask[j, r]:
+            residual = readings[j, r, i] - tension[j, r, i] - by_creep[j, r, i] * m
+            left[count] = residual
+            count += 1
+            cc += by_creep[j, r, i] * by_creep[j, r, i]
+            cs += by_creep[j, r, i] * by_setting[j, r, i]
+            ss += by_setting[j, r, i] * by_setting[j, r, i]
+            cr += by_creep[j, r, i] * residual
+            sr += by_setting[j, r, i] * residual
+    cc, cs, ss, cr, sr = cc * weight, cs * weight, ss * weight, cr * weight, sr * weight
+    # the difference of two products may come out below zero by rounding
+    det = 1.0 + p * cc + q * ss + p * q * fmax(cc * ss - cs * cs, 0.0)
+    v_cc, v_cs, v_ss = p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det
+    out.post_c, out.post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
+    out.pull_c = ((1.0 + q * ss) * cr - q * cs * sr) / det
+    out.pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
+    count = 0
+    for r in range(mask.shape[1]):
+        if mask[j, r]:
+            # a sum of squares: the shorter difference of products can turn negative at absurd parameters
+            residual = left[count] - by_creep[j, r, i] * out.post_c - by_setting[j, r, i] * out.post_s
+            left[count] = residual
+            square += residual * residual
+            count += 1
+    square = square * weight + p * out.pull_c * out.pull_c + q * out.pull_s * out.pull_s
+    out.log_density = -0.5 * (square + count * log_variance + log(det))
+    out.mean = a * (m + out.post_c) + c * out.post_s
+    out.var = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
+    out.cc, out.ss = cc, ss
+    return out
+
+
+cdef double LOG_2PI = log(2.0 * np.pi)
+
+
+def chain(
+    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
+    const double[:, ::1] carry_by_setting, const double[:, ::1] carry_by_creep, const double[:, :, :] readings,
+    const unsigned char[:, ::1] mask, const double[::1] variance, const double[::1] setting_sd
+):
+    """Log densities (H, n), means and variances of the carried creep (H + 1, n): `wirebayes.model.likelihoods.chain`."""
+    cdef int holds = mask.shape[0], j
+    cdef Py_ssize_t n = variance.shape[0], i
+    density, carried = np.zeros((holds, n)), np.zeros((2, holds + 1, n))
+    cdef double[:, ::1] out = density
+    cdef double[:, :, ::1] mv = carried
+    cdef unsigned char[::1] read = np.asarray(mask).any(axis=1).view(np.uint8)
+    cdef double[::1] left = np.empty(max(mask.shape[1], 1))
+    cdef double weight, log_variance, q, a, c
+    cdef Read found
+    for i in range(n):
+        weight, log_variance, q = 1.0 / variance[i], log(variance[i]) + LOG_2PI, setting_sd[i] * setting_sd[i]
+        for j in range(holds):
+            a, c = carry_by_creep[j, i], carry_by_setting[j, i]
+            if read[j]:
+                found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, mv[0, j, i], mv[1, j, i],
+                                  weight, log_variance, q, &left[0])
+                out[j, i], mv[0, j + 1, i], mv[1, j + 1, i] = found.log_density, found.mean, found.var
+            else:
+                mv[0, j + 1, i] = a * mv[0, j, i]
+                mv[1, j + 1, i] = a * a * mv[1, j, i] + c * c * q
+    return density, carried[0], carried[1]
+
+
+def standardised(
+    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
+    const double[:, ::1] carry_by_setting, const double[:, ::1] carry_by_creep, const double[:, :, :] readings,
+    const unsigned char[:, ::1] mask, const double[::1] variance, const double[::1] setting_sd
+):
+    """Log-likelihood (n,) and residuals (m, n): `wirebayes.model.likelihoods.standardised`."""
+    cdef int holds = mask.shape[0], j, r, row, count
+    cdef Py_ssize_t n = variance.shape[0], i
+    taken = np.asarray(mask).sum(axis=1).astype(np.intc)
+    total, residuals = np.zeros(n), np.empty((taken.sum() + 5 * np.count_nonzero(taken), n))
+    cdef int[::1] counts = taken
+    cdef double[::1] value = total, left = np.empty(max(mask.shape[1], 1))
+    cdef double[:, ::1] out = residuals
+    cdef double weight, log_variance, q, a, c, m, p, scale, setting_sd_i
+    cdef Read found
+    for i in range(n):
+        weight, log_variance, setting_sd_i = 1.0 / variance[i], log(variance[i]) + LOG_2PI, fabs(setting_sd[i])
+        q, scale, m, p, row = setting_sd_i * setting_sd_i, sqrt(weight), 0.0, 0.0, 0
+        for j in range(holds):
+            a, c, count = carry_by_creep[j, i], carry_by_setting[j, i], counts[j]
+            if not count:
+                m, p = a * m, a * a * p + c * c * q
+                continue
+            found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, m, p, weight, log_variance, q,
+                              &left[0])
+            for r in range(count):
+                out[row + r, i] = left[r] * scale
+            row += count
+            out[row, i], out[row + 1, i] = sqrt(p) * found.pull_c, setting_sd_i * found.pull_s
+            out[row + 2, i] = 0.5 * sqrt(<double> count) * log_variance
+            out[row + 3, i], out[row + 4, i] = 0.5 * log1p(p * found.cc), 0.5 * log1p(q * found.ss)
+            row += 5
+            value[i] += found.log_density
+            m, p = found.mean, found.var
+    return total, residuals
+
+
+def seen(
+    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
+    const double[:, ::1] carry_by_setting, const double[:, ::1] carry_by_creep, const double[:, :, :] readings,
+    const unsigned char[:, ::1] mask, const double[::1] variance, const double[::1] setting_sd,
+    const double[:, ::1] carried_mean, const double[:, ::1] carried_var, const double[:, :, ::1] shapes
+):
+    """Inner products (n, k, k) and (n, k) of shapes that may be added: `wirebayes.model.likelihoods.seen`."""
+    cdef int holds = mask.shape[0], j, r, f, g, k = shapes.shape[2]
+    cdef Py_ssize_t n = variance.shape[0], i
+    square, product = np.zeros((n, k, k)), np.zeros((n, k))
+    # of each hold's shapes with each other, whatever the parameters
+    own = np.einsum("hr,hrf,hrg->hfg", np.asarray(mask, float), shapes, shapes)
+    cdef double[:, :, ::1] gram = square, each = own
+    cdef double[:, ::1] along = product
+    cdef unsigned char[::1] read = np.asarray(mask).any(axis=1).view(np.uint8)
+    cdef double[:, ::1] scratch = np.empty((6, max(k, 1)))
+    cdef double[::1] mean = scratch[0], fc = scratch[1], fs = scratch[2], fr = scratch[3], pc = scratch[4], ps = scratch[5]
+    cdef double weight, q, p, a, c, cc, cs, ss, cr, sr, det, v_cc, v_cs, v_ss, rest, by_c, by_s, shape, moved
+    for i in range(n):
+        weight, q = 1.0 / variance[i], setting_sd[i] * setting_sd[i]
+        for f in range(k):
+            mean[f] = 0.0  # of the carried creep, had the shapes been the readings
+        for j in range(holds):
+            a, c, p = carry_by_creep[j, i], carry_by_setting[j, i], carried_var[j, i]
+            if not read[j]:
+                for f in range(k):
+                    mean[f] *= a
+                continue
+            cc = cs = ss = cr = sr = 0.0
+            for f in range(k):
+                fc[f] = fs[f] = fr[f] = 0.0
+            for r in range(mask.shape[1]):
+                if mask[j, r]:
+                    by_c, by_s = by_creep[j, r, i], by_setting[j, r, i]
+                    rest = readings[j, r, i] - tension[j, r, i] - by_c * carried_mean[j, i]
+                    cc += by_c * by_c
+                    cs += by_c * by_s
+                    ss += by_s * by_s
+                    cr += by_c * rest
+                    sr += by_s * rest
+                    for f in range(k):
+                        shape = shapes[j, r, f]
+                        fc[f] += shape * by_c
+                        fs[f] += shape * by_s
+                        fr[f] += shape * rest
+            cc, cs, ss, cr, sr = cc * weight, cs * weight, ss * weight, cr * weight, sr * weight
+            det = 1.0 + p * cc + q * ss + p * q * fmax(cc * ss - cs * cs, 0.0)
+            v_cc, v_cs, v_ss = p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det
+            for f in range(k):
+                # what is left of a shape beside the creep that it would have carried in
+                fc[f] = fc[f] * weight - cc * mean[f]
+                fs[f] = fs[f] * weight - cs * mean[f]
+                fr[f] = fr[f] * weight - cr * mean[f]
+                pc[f], ps[f] = v_cc * fc[f] + v_cs * fs[f], v_cs * fc[f] + v_ss * fs[f]
+                along[i, f] += fr[f] - pc[f] * cr - ps[f] * sr
+            for f in range(k):
+                for g in range(f + 1):
+                    moved = mean[f] * fc[g] + fc[f] * mean[g] + cc * mean[f] * mean[g]
+                    gram[i, f, g] += each[j, f, g] * weight - moved - fc[f] * pc[g] - fs[f] * ps[g]
+            for f in range(k):
+                mean[f] = a * (mean[f] + pc[f]) + c * ps[f]
+        for f in range(k):
+            for g in range(f):
+                gram[i, g, f] = gram[i, f, g]
+    return square, product

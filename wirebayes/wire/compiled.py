@@ -1,0 +1,74 @@
+"""The compiled twin of the staircase and its filter: whether it was built, and what it is called with.
+
+It computes models whose effects all have a formula in `wirebayes/wire/_kernel.pyx`; numpy computes the others, and
+everything where no C compiler was at hand. Both agree to rounding. Which of the two computes depends on the model and
+on the installation, never on the work, so the same seed gives the same bytes.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from wirebayes.typing import Array
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.protocol import Protocol
+
+if TYPE_CHECKING:
+    from wirebayes.wire.staircase import Model
+
+try:
+    from wirebayes.wire import _kernel
+except ImportError:
+    _kernel = None  # type: ignore[assignment]
+
+kernel = _kernel  # None where it was not built
+
+_PLAIN = ("k1", "B", "U", "k2", "N", "preload")
+
+
+class Call(NamedTuple):
+    """What the kernel's functions of a model are called with."""
+
+    test: Any
+    law: Any
+    theta: Array
+
+
+def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call | None:
+    """What the kernel is called with, or None where numpy has to compute.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    theta : mapping of name to (n,) array
+    model : Model
+    """
+    if kernel is None or len(model.effects) > kernel.MOST_EFFECTS:
+        return None
+    names, formulas = list(_PLAIN), []
+    for effect in model.effects:
+        if not has_formula(effect):
+            return None
+        names += effect.columns()
+        formulas.append((effect.formula, len(effect.amplitudes), effect.formula_constant))
+    rows = [theta[name] for name in names]
+    if any(np.iscomplexobj(row) for row in rows):
+        return None
+    packed = np.empty((len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        packed[i] = row
+    log_ratio = float(np.log(protocol.length_mm / (model.length_ref_mm or protocol.length_mm)))
+    kept = 1.0 if model.history == "saturating" else 0.0
+    law = kernel.Law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
+    remembers = any(name == "memory" for name, _, _ in formulas)
+    test = kernel.Test(**(protocol.flat_with_ages if remembers else protocol.flat))
+    return Call(test, law, packed)
+
+
+def has_formula(effect: Effect) -> bool:
+    """Whether the kernel computes an effect: a subclass with an `apply` of its own has lost its parent's formula."""
+    kinds = type(effect).__mro__
+    return bool(effect.formula) and next(k for k in kinds if "apply" in vars(k)) is next(
+        k for k in kinds if "formula" in vars(k)
+    )
