@@ -52,9 +52,9 @@ class Mixture:
         return np.ascontiguousarray(inverse.transpose(2, 0, 1).reshape(len(inverse[0]), -1)), middle.ravel()
 
     def _distances(self, x: Array) -> Array:
-        """(k, n) squared Mahalanobis distances."""
+        """(k, n) squared Mahalanobis distances, in the precision of the points."""
         (k, d), (product, middle) = self.centres.shape, self._whitening
-        y = (x @ product - middle).reshape(len(x), k, d)
+        y = (x @ product.astype(x.dtype) - middle.astype(x.dtype)).reshape(len(x), k, d)
         return np.einsum("nkd,nkd->kn", y, y)
 
     def _log_parts(self, distances: Array) -> Array:
@@ -62,7 +62,7 @@ class Mixture:
         d, nu = self.centres.shape[1], self.degrees
         constant = gammaln(0.5 * (nu + d)) - gammaln(0.5 * nu) - 0.5 * d * np.log(nu * np.pi)
         constant = constant + np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
-        return np.asarray(constant[:, None] - 0.5 * (nu + d) * np.log1p(distances / nu))
+        return np.asarray(constant[:, None].astype(distances.dtype) - 0.5 * (nu + d) * np.log1p(distances / nu))
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:
@@ -134,6 +134,8 @@ def fit(
 
 
 def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
+    """Expectation-maximisation, in single precision: half the work, and no proposal needs more than a few digits."""
+    x = x.astype(np.float32)
     (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
     last = -np.inf
@@ -149,11 +151,12 @@ def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
         mass = heavy.sum(axis=1)
         centres = (heavy @ x) / mass[:, None]
         scale = (heavy @ squares).reshape(k, d, d) - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
+        centres, scale, members = centres.astype(float), scale.astype(float), share.sum(axis=1, dtype=float)
         # a walker that stayed repeats its point: without a share of all points, a component shrinks onto that
         scale += _OF_THE_WHOLE * np.eye(d)
-        factors = np.linalg.cholesky(scale / (share.sum(axis=1) + _OF_THE_WHOLE)[:, None, None])
-        mixture = Mixture(share.sum(axis=1) / n, centres, factors, degrees)
-        log_likelihood = float(total.sum())
+        factors = np.linalg.cholesky(scale / (members + _OF_THE_WHOLE)[:, None, None])
+        mixture = Mixture(members / members.sum(), centres, factors, degrees)
+        log_likelihood = float(total.sum(dtype=float))
         if log_likelihood - last < 4e-3 * n:
             break
         last = log_likelihood

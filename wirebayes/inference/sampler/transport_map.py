@@ -77,12 +77,13 @@ class Straight:
         mean = self.constant + v @ self.linear.T + np.einsum("njk,nk->nj", slope, v - 0.5 * held)
         log_scale = np.clip(self.log_scale[:, 0] + v @ self.log_scale[:, 1:].T, self.least, self.most)
         u, slopes = _normal((v - mean) * np.exp(-log_scale), self.shape)
-        return u, slopes.sum(axis=1) - log_scale.sum(axis=1) - np.log(self.scale).sum()
+        return u, np.log(slopes.prod(axis=1)) - log_scale.sum(axis=1) - np.log(self.scale).sum()
 
     def inverse(self, u: Array) -> Array:
         """(n, d) points of straightened ones."""
         location, width, skewness = self.shape
-        u = location + width * np.sinh(np.arcsinh(u) + skewness)
+        # the hyperbolic sine of a sum, arcsinh(u) + skewness, written out
+        u = location + width * (u * np.cosh(skewness) + np.sqrt(1.0 + u * u) * np.sinh(skewness))
         v, held = np.zeros_like(u), np.zeros_like(u)
         for j in range(u.shape[1]):
             before, inside = v[:, :j], held[:, :j]
@@ -158,11 +159,12 @@ def _seen_at_once(
 
 
 def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
-    """What is even where x has this shape, and the logarithms of the slopes."""
+    """What is even where x has this shape, sinh(arcsinh w - skewness), and the slopes; w is x in units of the shape."""
     location, width, skewness = shape
+    even, odd = np.cosh(skewness), np.sinh(skewness)
     w = (x - location) / width
-    inner = np.arcsinh(w) - skewness
-    return np.sinh(inner), np.log(np.cosh(inner) / width) - 0.5 * np.log1p(w * w)
+    root = np.sqrt(1.0 + w * w)
+    return w * even - root * odd, (even - w / root * odd) / width
 
 
 def _shapes(x: Array) -> Array:
@@ -195,9 +197,12 @@ def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]
         of_mean = np.linalg.solve(weighted.T @ terms + bend, weighted.T @ y)
         # a point far out says where the scale grows, but no single one decides
         square = np.minimum((y - terms @ of_mean) ** 2 * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0)), 9.0)
-        of_scale = of_scale + np.linalg.solve(information, lines.T @ (square - 1.0))
+        step = np.linalg.solve(information, lines.T @ (square - 1.0))
+        of_scale = of_scale + step
         weight = np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0))
         weight /= weight.mean()
+        if ((lines @ step) ** 2).mean() < _SETTLED**2:
+            break
     weighted = terms * weight[:, None]
     inverse = np.linalg.inv(weighted.T @ terms + bend)
     variance = (weight * (y - terms @ of_mean) ** 2).mean()
@@ -211,6 +216,7 @@ _RIDGE = 1e-3
 _CLEAR = 4.0  # standard errors
 _FEW, _MOST_PAIRS = 12, 30  # dimensions in which rough points settle no bends; bends of a coordinate in more
 _ALTERNATIONS = 6  # of mean and scale; the map need not be the best one, because the sampler is exact with any
+_SETTLED = 0.02  # root mean square change of the log scale: two in a hundred of a width are no worse a map
 # normal scores of the quantiles compared, 0.3 % to 99.7 %: further out a few points decide
 _SCORES = np.linspace(-2.8, 2.8, 15)
 # tried in steps of 0.05; finer ones would gain nothing, as the sampler is exact with any map
