@@ -1,5 +1,5 @@
-"""What a likelihood evaluation costs: against readings, holds, experiments and effects; memory; its share of a fit; and
-how many effective draws it gives on the paper's wires.
+"""What a likelihood evaluation costs: against readings, holds, experiments and effects, and where numpy computes it;
+memory; its share of a fit; and how many effective draws it gives on the paper's wires, with single effects too.
 
     python -m analyses.benchmarks.cost --output out/benchmarks
 
@@ -8,8 +8,11 @@ Times are of processor, the least of several interleaved repeats; costs are prin
 
 import argparse
 import time
+import timeit
 import tracemalloc
+from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -23,8 +26,10 @@ from wirebayes.io.experiment import Experiment, Hold
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import Likelihood, build
+from wirebayes.wire import compiled
 
 BATCH, REPEATS, SEEDS = 256, 7, 20
+BATCHES = (64, 256, 1024)  # the sampler cuts larger ones into pieces
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
 
 
@@ -98,6 +103,37 @@ def share_in_likelihood(problem, seed):
             "sampler": 1.0 - spent["target"] / whole}  # fmt: skip
 
 
+def against_numpy(wire):
+    """Print and return processor time where numpy computes over that of compiled code, by effect and batch."""
+    print(f"\n{'numpy over compiled':28s}" + "".join(f"{n:>8d}" for n in BATCHES))
+    out = {}
+    for key in ("", "toe", "memory"):
+        problem, out[key or "none"] = build([wire], [named(key)] if key else []), []
+        for n in BATCHES:
+            theta = problem.prior.rvs(n, np.random.default_rng(0))
+            compute, best = partial(problem.log_likelihood, theta), []
+            for kernel in (compiled.kernel, None):
+                with patch.object(compiled, "kernel", kernel):
+                    compute()
+                    best.append(min(timeit.repeat(compute, number=5, repeat=REPEATS, timer=time.process_time)))
+            out[key or "none"].append(best[1] / best[0])
+        print(f"  {key or 'none':26s}" + "".join(f"{ratio:8.1f}" for ratio in out[key or "none"]), flush=True)
+    return out
+
+
+def with_effects(keys):
+    """Print and return effective draws per evaluation, all counted, of models with one effect: by wire and effect."""
+    print("\neffective draws per evaluation with one effect, all counted (one seed; ! not converged)")
+    out = {}
+    for wire in experiments():
+        each = {key: ours(build([wire], [named(key)]), 0, 0.0)[0] for key in keys}
+        out[wire.name] = {key: (r["ess_per_evaluation"], r["converged"]) for key, r in each.items()}
+        values = [value for value, _ in out[wire.name].values()]
+        told = (f"{key} {value:.3f}{'' if good else ' !'}" for key, (value, good) in out[wire.name].items())
+        print(f"  {wire.name}: median {np.median(values):.3f}, least {min(values):.3f};", ", ".join(told), flush=True)
+    return out
+
+
 def draws(problem):
     """Effective draws per likelihood evaluation for 20,000 of them: of the kept ones, and of all; over seeds."""
     runs = [ours(problem, seed, 0.0)[0] for seed in range(SEEDS)]
@@ -122,6 +158,7 @@ def main():
     out["effects"] = {k: cost / found[0][0] for k, (cost, _) in zip(["none", *singles], found, strict=True)}
     for key, ratio in out["effects"].items():
         print(f"  {key:28s} {ratio:6.2f}")
+    out["against_numpy"] = against_numpy(wire)
     print("\nshare of a fit")
     out["share"] = {}
     for likelihood in LIKELIHOODS:
@@ -134,6 +171,7 @@ def main():
             found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(build([experiment], likelihood=likelihood))
             cells = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
             print(f"  {experiment.name + ', ' + likelihood:24s} {cells[0]}    {cells[1]}", flush=True)
+    out["with_effects"] = with_effects(singles)
     write_json(options.output / "cost.json", out)
 
 
