@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from wirebayes.discovery.settings import MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+
 from .cases import TOGETHER
-from .rates import Row, closed, comparable, pooled, rate
+from .catalogue import EFFECTS
+from .optimal_sets import SEPARABLE
+from .rates import Row, closed, comparable, pooled, rate, weighted_rate
 
 NOTHING = "nothing-missing"
 CONDITIONAL = 8.0  # delta beside the other effects from which one is expected to be named
+BIN_LEVEL = 0.95  # of the intervals of a calibration
 VISIBLE = 0.8  # share of delta that must survive a refit of the plain model for a case to count as visible
 
 
@@ -52,6 +57,9 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "verdict": spoken["verdict"],
         "remainder": (spoken.get("remainder") or {}).get("probability"),
         "optimal_two": judged.get("optimal_two") or {},
+        "optimal_three": judged.get("optimal_three") or {},
+        "optimal_mixed": judged.get("optimal_mixed") or {},
+        "left_over": judged.get("left_over") or {},
         "right_hold": None if hold is None or found_hold is None else found_hold == hold,
         "separable": judged.get("separable"),
         "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],
@@ -137,9 +145,11 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
         "by_protocol": breakdown(single, "protocol"),
         "pairs": _pairs([r for r in rows if r["kind"] == "pair"]),
         "together": {kind: _together([r for r in rows if r["kind"] == kind]) for kind in TOGETHER},
+        "alone": {kind: left_over([r for r in rows if r["kind"] == kind]) for kind in ("without", "foreign")},
         "false_names": rate(bool(false_names(r)) for r in rows if r["kind"] != "without"),
         "partial_on_single": rate(r["verdict"] == "partial" for r in single),
         "remainder_calibration": calibration(rows),
+        "remainder_calibration_as_expected": calibration(rows, prior_weights(rows)),
         "clean_by_protocol": {
             p: rate(r["any_alarm"] for r in rows if r["kind"] == "clean" and r["protocol"] == p)
             for p in dict.fromkeys(r["protocol"] for r in rows if r["kind"] == "clean")
@@ -172,6 +182,16 @@ def false_names(row: Row) -> list[str]:
     return [name for name in row["accepted"] if not any(name in group for group in row["groups"])]
 
 
+def accepted_of_group(row: Row) -> list[bool]:
+    """For each hidden effect whether it, or one whose signature is nearly the same, was accepted."""
+    return [any(name in group for name in row["accepted"]) for group in row["groups"]]
+
+
+def visible_beside(row: Row) -> list[bool]:
+    """For each hidden effect whether enough of it is left beside the others for it to be named."""
+    return [d is not None and d >= CONDITIONAL for d in row["conditional"]]
+
+
 def _together(rows: list[Row]) -> dict[str, Any]:
     """Several effects at once: which of those that stay visible beside the others are accepted, by protocol."""
     out: dict[str, Any] = {}
@@ -181,35 +201,84 @@ def _together(rows: list[Row]) -> dict[str, Any]:
         ("long", [r for r in rows if r["protocol"] != "paper"]),
     ):
         seen = [r for r in part if r["detected"]]
-        visible = [[d is not None and d >= CONDITIONAL for d in r["conditional"]] for r in part]
-        found = [[any(a in group for a in r["accepted"]) for group in r["groups"]] for r in part]
-        best = [r["optimal_two"]["group"] for r in part if r["optimal_two"]]
         out[label] = {
             "detected": rate(r["detected"] for r in part),
-            "all_accepted": rate(all(f) for f, v in zip(found, visible, strict=True) if all(v)),
-            "known_accepted": rate(f[0] for f, v in zip(found, visible, strict=True) if v[0]),
+            "all_accepted": rate(all(accepted_of_group(r)) for r in part if all(visible_beside(r))),
+            "known_accepted": rate(accepted_of_group(r)[0] for r in part if visible_beside(r)[0]),
             "first_is_one_of_them": rate(
                 any(r["accepted"][0] in g for g in r["groups"]) for r in seen if r["accepted"]
             ),
             "remainder_reported": rate(r["remains"] for r in part),
+            "remainder_or_twin": rate(r["remains"] or all(accepted_of_group(r)) for r in part),
             "false_name": rate(bool(false_names(r)) for r in part),
-            "optimal_both": float(np.mean(best)) if best else None,
+            "optimal_both": _mean(r["optimal_two"].get("group") for r in part),
+            "optimal_three": _mean(r["optimal_three"].get("group") for r in part),
+            "optimal_known": _mean(r["optimal_mixed"].get("known") for r in part),
+            "optimal_remainder": _mean(r["optimal_mixed"].get("remains") for r in part),
+            "left_over": left_over(part),
         }
     return out
 
 
-def calibration(rows: list[Row]) -> list[dict[str, Any]]:
+def left_over(rows: list[Row]) -> dict[str, Any]:
+    """What the best catalogue effects leave of what is hidden, by their number.
+
+    For each the share of cases of which too little is left to be seen, and the mean power of a test of the residuals.
+    """
+    sizes = sorted({size for r in rows for size in r["left_over"]})
+    return {
+        size: {
+            "too_little": rate(r["left_over"][size]["delta"] < SEPARABLE for r in rows if size in r["left_over"]),
+            "power": _mean(r["left_over"][size]["power"] for r in rows if size in r["left_over"]),
+        }
+        for size in sizes
+    }
+
+
+def calibration(rows: list[Row], weights: Mapping[str, float] = {}) -> list[dict[str, Any]]:
     """How often something is left beside the names where its probability is said to lie in each of five bins.
 
     Something is left where an effect is foreign, was removed, or is hidden and neither it nor one like it was accepted.
+
+    Parameters
+    ----------
+    weights : of the cases of each kind, where not all count the same; a kind that is missing counts nothing.
+
+    Returns
+    -------
+    What was said on average, and what was found with its 95 % interval, for each bin.
     """
     out = []
     for low in (0.0, 0.2, 0.4, 0.6, 0.8):
         part = [r for r in rows if r["detected"] and r["remainder"] is not None and r["names"]]
-        part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] == 1.0)]
-        left = [not all(any(a in g for a in r["accepted"]) for g in r["groups"]) for r in part]
-        stated = float(np.mean([r["remainder"] for r in part])) if part else None
-        out.append({"from": low, "said": stated, "found": rate(left)})
+        part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] >= 1.0)]
+        w = [weights.get(r["kind"], 0.0) if weights else 1.0 for r in part]
+        left = [not all(accepted_of_group(r)) for r in part]
+        stated = float(np.average([r["remainder"] for r in part], weights=w)) if sum(w) > 0 else None
+        found = weighted_rate(left, w, BIN_LEVEL) if weights else rate(left, BIN_LEVEL)
+        out.append({"from": low, "said": stated, "found": found})
+    return out
+
+
+def prior_weights(rows: list[Row]) -> dict[str, float]:
+    """Weight of a case of each kind with which the kinds are as frequent as the prior of `discover` expects.
+
+    A single name has weight 1, so all n of them have n; all pairs together have `MORE_EFFECTS` of that, all threes as
+    much of the pairs; a remainder beside one name has `REMAINDER_WEIGHT` of what the name has without, and a remainder
+    alone has `UNKNOWN_WEIGHT`. What the benchmark has no cases of, such as a remainder beside two names, is left out.
+    """
+    n = len(EFFECTS)
+    expected = {
+        ("single",): 1.0 * n,
+        ("pair", "two"): MORE_EFFECTS * n,
+        ("three",): MORE_EFFECTS**2 * n,
+        ("mixed",): REMAINDER_WEIGHT * n,
+        ("without", "foreign"): UNKNOWN_WEIGHT,
+    }
+    out: dict[str, float] = {}
+    for kinds, share in expected.items():
+        count = sum(r["kind"] in kinds for r in rows)
+        out |= {kind: share / count for kind in kinds if count}
     return out
 
 

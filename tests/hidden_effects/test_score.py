@@ -6,8 +6,18 @@ import pytest
 from scipy.stats import binom, norm
 
 from analyses.hidden_effects import pooled as program
-from analyses.hidden_effects.rates import closed, closed_of_oracle, lower_bound, pooled, rate, rmse_ratio, upper_bound
-from analyses.hidden_effects.score import confusion, score
+from analyses.hidden_effects.rates import (
+    closed,
+    closed_of_oracle,
+    lower_bound,
+    pooled,
+    rate,
+    rmse_ratio,
+    upper_bound,
+    weighted_rate,
+)
+from analyses.hidden_effects.score import calibration, confusion, prior_weights, score
+from analyses.hidden_effects.targets import targets
 
 HOLDS = {"sample-1": [9, 10]}
 
@@ -138,3 +148,79 @@ def test_a_case_that_failed_is_counted_as_failed():
     result = score({"a": truth("a")}, {"a": judged()}, {"a": {"answer": None, "error": "boom", "seconds": 0.1}})
     assert result["failed"] == [{"key": "a", "error": "boom"}]
     assert confusion(result["rows"]) == {}
+
+
+def several(kind, accepted, ideal, remains=False, groups=(("toe",), ("yield",))):
+    """A row of a file in which several effects hide, all visible beside the others."""
+    return {
+        "kind": kind,
+        "names": ["toe", "yield"],
+        "groups": [list(g) for g in groups],
+        "accepted": accepted,
+        "conditional": [10.0] * len(groups),
+        "remains": remains,
+        "verdict": "partial" if remains else "named",
+        "delta": 10.0,
+        "detected": True,
+        "optimal": {},
+        "held_out": None,
+        "visible": True,
+        "right": False,
+        "optimal_two": {"group": ideal} if kind == "two" else {},
+        "optimal_three": {},
+        "optimal_mixed": {"known": ideal, "remains": 0.5} if kind == "mixed" else {},
+        "left_over": {"2": {"delta": 2.0, "power": 0.1}} if kind == "mixed" else {},
+    }
+
+
+def test_several_effects_are_measured_against_the_ideal_judge():
+    rows = [several("two", ["toe", "yield"], 0.9), several("two", ["memory"], 0.7)]
+    rows += [several("mixed", ["toe"], 0.9, remains=True), several("mixed", ["ageing", "toe"], 0.7)]
+    found = {row["target"]: row for row in targets(rows)}
+    assert found["two effects: both accepted, relative to optimal"]["found"]["value"] == pytest.approx(0.5 / 0.8)
+    assert found["two effects: the first accepted is one of them"]["found"]["value"] == 0.5
+    assert found["beside a foreign effect: the known one accepted"]["found"]["value"] == 1.0
+    assert found["beside a foreign effect: a remainder reported"]["found"]["value"] == 0.5
+    assert found["an ideal judge would accept it"]["found"]["value"] == pytest.approx(0.8)
+    assert found["a test of what two names leave would see it"]["found"]["value"] == pytest.approx(0.1)
+    assert found["an accepted name that is of no hidden effect's group"]["found"]["k"] == 2
+    hidden = [several("mixed", [], 0.9) | {"conditional": [7.9, 10.0]}]
+    assert not {r["target"]: r for r in targets(hidden)}["beside a foreign effect: the known one accepted"]["found"]
+
+
+def said(kind, probability, accepted=("toe",)):
+    return {"kind": kind, "detected": True, "names": ["toe"], "groups": [["toe"]], "remainder": probability,
+            "accepted": list(accepted)}  # fmt: skip
+
+
+def test_bins_of_a_stated_probability_with_their_95_percent_intervals():
+    rows = [said("single", 0.05)] * 9 + [said("single", 0.15, ())] + [said("single", 1.0, ())]
+    first, *_, last = calibration(rows)
+    assert first["said"] == pytest.approx(0.06)
+    assert (first["found"]["k"], first["found"]["n"]) == (1, 10)
+    assert binom.cdf(1, 10, first["found"]["high"]) == pytest.approx(0.025, abs=1e-6)
+    assert last["found"]["n"] == 1
+
+
+def test_kinds_can_count_as_the_prior_expects_them():
+    """Twenty single names; one of them beside a remainder in half as many files; a remainder alone in one."""
+    rows = [said("single", 0.05)] * 6 + [said("mixed", 0.05, ())] * 3 + [said("foreign", 0.05, ())] * 3
+    weights = prior_weights(rows)
+    assert weights == pytest.approx({"single": 20 / 6, "mixed": 10 / 3, "without": 1 / 3, "foreign": 1 / 3})
+    (bin_, *_) = calibration(rows, weights)
+    assert bin_["found"]["value"] == pytest.approx(11 / 31)
+    assert calibration([said("pair", 0.05)], {"single": 1.0})[0]["found"] is None
+
+
+def test_unequal_weights_are_worth_fewer_cases():
+    equal = weighted_rate([True, False] * 10, [2.0] * 20)
+    plain = rate([True, False] * 10)
+    assert (equal["value"], equal["low"], equal["high"]) == pytest.approx((0.5, plain["low"], plain["high"]))
+    unequal = weighted_rate([True, False] * 10, [1.0, 9.0] * 10)
+    assert unequal["value"] == pytest.approx(0.1)
+    assert unequal["n"] == pytest.approx(100.0**2 / 820.0, abs=0.05)
+    assert weighted_rate([], []) is None
+
+
+def test_intervals_can_have_another_level():
+    assert binom.sf(1, 10, rate([True] * 2 + [False] * 8, 0.95)["low"]) == pytest.approx(0.025, abs=1e-6)
