@@ -202,6 +202,7 @@ def _section(how: str, result: dict[str, Any]) -> str:
             _calibration(result["remainder_calibration"]),
             "<p>The same with the kinds as frequent as the prior expects them:</p>",
             _calibration(result["remainder_calibration_as_expected"]),
+            *(_rates(f"Several wires, {kind}", found) for kind, found in result["several_wires"].items()),
             _rates("False alarms by protocol", result["clean_by_protocol"]),
             _rates("Held-out gap closed, pooled, by delta", result["gap_closed"]),
             _rates("Also", others),

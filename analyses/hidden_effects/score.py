@@ -51,6 +51,7 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "in_set": bool(names) and names[0] in (spoken.get("set") or []),
         "set_size": len(spoken.get("set") or []),
         "accepted": list(spoken.get("accepted") or []),
+        "wires": _wires(truth, groups, answers),
         "groups": groups,
         "conditional": [e.get("conditional_delta") for e in truth["effects"]],
         "remains": spoken["verdict"] in ("partial", "unknown"),
@@ -68,6 +69,23 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "held_out": _held_out(judged, spoken),
         "seconds": record["seconds"],
     }
+
+
+def _wires(truth: dict[str, Any], groups: list[list[str]], answers: dict[str, Any]) -> list[dict[str, bool]]:
+    """What was said of each experiment of a file: whether it carries an effect, and was given one's name or another."""
+    out = []
+    for name, answer in answers.items():
+        own = [g for e, g in zip(truth["effects"], groups, strict=False) if name in e["experiments"]]
+        accepted = list(answer.get("accepted") or [])
+        out.append(
+            {
+                "carries": bool(own),
+                "detected": answer["verdict"] != NOTHING,
+                "named": any(a in g for a in accepted for g in own),
+                "false_name": any(not any(a in g for g in own) for a in accepted),
+            }
+        )
+    return out
 
 
 def _touched(truth: dict[str, Any]) -> set[str]:
@@ -155,6 +173,10 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
             for p in dict.fromkeys(r["protocol"] for r in rows if r["kind"] == "clean")
         },
         "gross_error_alarms": rate(r["any_alarm"] for r in rows if r["kind"] == "gross"),
+        "several_wires": {
+            kind: by_wire([r for r in rows if r["kind"] == kind and r["protocol"] == "several_wires"])
+            for kind in ("single", "some")
+        },
         "innocent_alarms": rate(v for r in single for v in r["innocent"]),
         "event_hold_right": rate(r["right_hold"] for r in single if r["right"] and r["right_hold"] is not None),
         "gap_closed": {
@@ -218,6 +240,19 @@ def _together(rows: list[Row]) -> dict[str, Any]:
             "left_over": left_over(part),
         }
     return out
+
+
+def by_wire(rows: list[Row]) -> dict[str, Any]:
+    """Files of several wires, wire by wire: those that carry the effect, and those that do not."""
+    wires = [w for r in rows for w in r["wires"]]
+    carriers, idle = [w for w in wires if w["carries"]], [w for w in wires if not w["carries"]]
+    return {
+        "carriers: detected": rate(w["detected"] for w in carriers),
+        "carriers: the effect or one of its group accepted": rate(w["named"] for w in carriers),
+        "carriers: another name accepted": rate(w["false_name"] for w in carriers),
+        "others: alarm": rate(w["detected"] for w in idle),
+        "others: a name accepted": rate(w["false_name"] for w in idle),
+    }
 
 
 def left_over(rows: list[Row]) -> dict[str, Any]:

@@ -224,3 +224,24 @@ def test_unequal_weights_are_worth_fewer_cases():
 
 def test_intervals_can_have_another_level():
     assert binom.sf(1, 10, rate([True] * 2 + [False] * 8, 0.95)["low"]) == pytest.approx(0.025, abs=1e-6)
+
+
+def test_wires_of_a_file_are_counted_one_by_one():
+    sealed = truth("a", "some") | {"benches": dict.fromkeys(("sample-1", "sample-2", "sample-3"), {})}
+    sealed["effects"] = [{"name": "toe", "hold": None, "experiments": [s]} for s in ("sample-1", "sample-2")]
+    sealed["protocol"] = "several_wires"
+    spoken = answer("toe")["answer"]["experiments"]["sample-1"]
+    others = {
+        "sample-2": spoken | {"accepted": ["memory"]},
+        "sample-3": answer("toe")["answer"]["experiments"]["sample-1"],
+    }
+    record = {"answer": {"experiments": {"sample-1": spoken, **others}}, "error": None, "seconds": 1.0}
+    result = score({"a": sealed}, {"a": judged() | {"groups": [["toe"], ["toe", "ageing"]]}}, {"a": record})
+    found = {key: (value["k"], value["n"]) for key, value in result["several_wires"]["some"].items()}
+    assert found == {
+        "carriers: detected": (2, 2),
+        "carriers: the effect or one of its group accepted": (1, 2),
+        "carriers: another name accepted": (1, 2),
+        "others: alarm": (1, 1),
+        "others: a name accepted": (1, 1),
+    }
