@@ -115,20 +115,15 @@ def decide(
             break
         sets = [s for s in sets if not best.effects.key <= s.key]
     retest = _retested(best, settings, rng, parallel_map)
-    refuted: set[Key] = set()
     if _fails(retest):
         passing = _complete(found, explored, best, predicts, settings, rng, parallel_map)
         if passing is not None:
-            sets = [s for s in sets if s.key not in passing.useless]
-            refuted = {best.effects.key, *passing.failed}
+            sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
             best, retest = passing.best, passing.retest
-    left_over = _mimicked(explored.left_over, best.effects.key, retest)
-    without, beside = model_space.log_weights(sets, count, copies, left_over)
+    without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
     if retest.p is not None:
         i = next(k for k, s in enumerate(sets) if s.key == best.effects.key)
         beside = _more_beside(sets, beside, i, float(without[i] - P_SLOPE * np.log(retest.p / ALPHA_AFTER)))
-    # the test speaks against a set that is all there is, not against the set with something else
-    without = np.where([s.key in refuted for s in sets], -np.inf, without)
     found = model_space.posterior(sets, without, beside, blocks)
     if not found.best.names:
         return Decision(found, None, retest, {})
@@ -154,12 +149,11 @@ def _fails(retest: Retest) -> bool:
 
 @dataclass(frozen=True)
 class _Passing:
-    """A set that leaves nothing over, and its test; the sets tried before it that failed theirs, or did not predict."""
+    """A set that leaves nothing over, its test, and the sets that were tried before it."""
 
     best: FittedSet
     retest: Retest
     failed: set[Key]
-    useless: set[Key]
 
 
 def _complete(
@@ -173,38 +167,22 @@ def _complete(
 ) -> _Passing | None:
     """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none.
 
-    It must predict as the best one had to; one that does not is useless, and not tested.
+    It must predict as the best one had to; one that does not has failed without a test.
     """
     weights = {s.key: float(w) for s, w in zip(found.sets, found.without + found.beside, strict=True)}
     least = weights[best.effects.key] * np.exp(-GIVE_WAY)
     near = [k for k, w in sorted(weights.items(), key=lambda item: -item[1]) if k in explored.fitted and w > least]
-    failed, useless = set[Key](), set[Key]()
+    failed: set[Key] = set()
     for key in near[:MOST_RETESTS]:
         candidate = explored.fitted[key]
         if candidate is best:
             continue
-        if not predicts(candidate):
-            useless.add(key)
-            continue
-        retest = _retested(candidate, settings, rng, parallel_map)
-        if not _fails(retest):
-            return _Passing(candidate, retest, failed, useless)
+        if predicts(candidate):
+            retest = _retested(candidate, settings, rng, parallel_map)
+            if not _fails(retest):
+                return _Passing(candidate, retest, failed)
         failed.add(key)
     return None
-
-
-def _mimicked(left_over: Mapping[Key, float], tested: Key, retest: Retest) -> dict[Key, float]:
-    """Log Bayes factors of what is left beside each set, after the test of a set that has one effect more.
-
-    That effect may be there, or look like something unknown. If it is there the test's p is uniform; if something else
-    is, p has the density ``(1 - P_SLOPE) p^(-P_SLOPE)``.
-    """
-    out = dict(left_over)
-    if retest.p is not None:
-        density = float(np.log(1.0 - P_SLOPE) - P_SLOPE * np.log(retest.p))
-        for key in out.keys() & {tested - {name} for name in tested}:
-            out[key] += density
-    return out
 
 
 def _gain(
