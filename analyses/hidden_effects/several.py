@@ -30,19 +30,16 @@ def parts(rows: list[Row]) -> dict[str, list[Row]]:
 
 def names_table(rows: list[Row]) -> list[list[str]]:
     """Cells of the table of names and remainders, its head first."""
-    columns = [targets(part) for part in parts(rows).values()]
+    columns = [{row["target"]: row for row in targets(part)} for part in parts(rows).values()]
     table = [["", "target", *parts(rows)]]
-    for row, *others in zip(*columns, strict=True):
-        if not row["found"] or row["target"].startswith(LEFT_OUT):
-            continue
-        cells = [cell(row, row["passed"] is False)]
-        cells += [_other(other) for other in others]
-        table.append([row["target"], row["wanted"], *cells])
+    for name, row in columns[0].items():
+        if row["found"] and not name.startswith(LEFT_OUT):
+            table.append([name, row["wanted"], *(_found(column.get(name)) for column in columns)])
     return table
 
 
-def _other(row: Target) -> str:
-    return cell(row, row["passed"] is False) if row["found"] else ""
+def _found(row: Target | None) -> str:
+    return cell(row, row["passed"] is False) if row and row["found"] else ""
 
 
 def remainder_table(rows: list[Row]) -> list[list[str]]:

@@ -5,7 +5,9 @@ import json
 import pytest
 from scipy.stats import binom, norm
 
+from analyses.hidden_effects import page
 from analyses.hidden_effects import pooled as program
+from analyses.hidden_effects import several as names_and_remainders
 from analyses.hidden_effects.rates import (
     closed,
     closed_of_oracle,
@@ -245,3 +247,36 @@ def test_wires_of_a_file_are_counted_one_by_one():
         "others: alarm": (1, 1),
         "others: a name accepted": (1, 1),
     }
+
+
+def test_tables_for_the_docs_have_a_column_for_each_protocol(tmp_path, capsys, monkeypatch):
+    truths = {k: truth(k, "two") for k in "ab"} | {"c": truth("c", "foreign", "yield") | {"protocol": "dense"}}
+    for k in "ab":
+        truths[k]["effects"] = [{"name": n, "hold": None, "experiments": ["sample-1"]} for n in ("toe", "memory")]
+        truths[k]["effects"] = [e | {"conditional_delta": 10.0} for e in truths[k]["effects"]]
+    answers = {"a": answer("toe", ["toe"]), "b": answer("toe", ["toe"]), "c": answer("ageing", ["ageing"])}
+    spoken = [answers[k]["answer"]["experiments"]["sample-1"] for k in "abc"]
+    spoken[0]["accepted"] = ["toe", "memory"]
+    for one, probability in zip(spoken, (0.1, 0.3, 0.9), strict=True):
+        one["remainder"] = {"probability": probability}
+    two = judged() | {"groups": [["toe"], ["memory"]], "optimal_two": {"group": 1.0}}
+    foreign = judged(("yield",)) | {"left_over": {"1": {"delta": 2.0, "power": 0.1}}}
+    result = score(truths, {"a": two, "b": two, "c": foreign}, answers)
+    (tmp_path / "scores.json").write_text(json.dumps({"api": result}), encoding="utf-8")
+    monkeypatch.setattr("sys.argv", ["several", str(tmp_path / "scores.json")])
+    names_and_remainders.main()
+    names, remainders = capsys.readouterr().out.split(".. list-table::")[1:]
+    both = next(c for c in names.split("\n   * - ") if c.startswith("two effects: both accepted"))
+    assert both.splitlines()[1:] == ["     - ≥ 85 %", *(f"     - {c}" for c in ["**50 %** [3, 97] of 2"] * 2), "     -"]
+    assert "effect in no catalogue" in names and "false alarms" not in names
+    bins = [c.splitlines() for c in remainders.split("\n   * - ")[2:]]
+    assert bins[0][1:3] == ["     - 10 %", "     - 0.0 % [0.0, 97.5] of 1"]
+    assert bins[1][1:3] == ["     - 30 %", "     - 100 % [3, 100] of 1"]
+    assert bins[2][1:] == ["     -"] * 4
+    monkeypatch.setattr("sys.argv", ["several", "--left", str(tmp_path / "scores.json")])
+    names_and_remainders.main()
+    assert capsys.readouterr().out == "foreign, the best 1: less than 3.3 left in 100 % [5, 100] of 1, power 10 %\n"
+    html = page._section("api", result)
+    assert "<td>all_accepted</td><td>0.500 [0.025, 0.975] n=2</td>" in html
+    assert "too little left in 1.000 [0.050, 1.000] n=1 of the cases, power 0.10" in html
+    assert "<td>0.2 to 0.4</td><td>0.30</td><td>1.000 [0.025, 1.000] n=1</td>" in html
