@@ -53,10 +53,18 @@ def targets(rows: list[Row]) -> list[Target]:
         part = [r for r in foreign if r["kind"] == kind]
         found = rate(r["chosen"] == "unknown" or r["right_group"] for r in part)
         table.append(_at_least(f"effect {label}: unknown or its group", found, 0.90))
+        table.append(_no_more(f"its group, or seen beside the best name ({kind})", [_seen_alone(r) for r in part]))
     for delta, wanted in ((10.0, 0.70), (20.0, 0.90)):
         found = pooled([r for r in single if r["delta"] == delta], closed_of_oracle)
         table.append(_at_least(f"gap closed, relative to the oracle, delta {delta:g}", found, wanted))
     return table + _several(rows)
+
+
+def _seen_alone(row: Row) -> float | None:
+    """How often an effect without a name could be answered right: where none is like it, by seeing the rest."""
+    if not row["left_over"]:
+        return None
+    return 1.0 if len(row["groups"][0]) > 1 else float(row["left_over"]["1"]["power"])
 
 
 def _several(rows: list[Row]) -> list[Target]:

@@ -268,6 +268,7 @@ def test_tables_for_the_docs_have_a_column_for_each_protocol(tmp_path, capsys, m
     names, remainders = capsys.readouterr().out.split(".. list-table::")[1:]
     both = next(c for c in names.split("\n   * - ") if c.startswith("two effects: both accepted"))
     assert both.splitlines()[1:] == ["     - ≥ 85 %", *(f"     - {c}" for c in ["**50 %** [3, 97] of 2"] * 2), "     -"]
+    assert "seen beside the best name (foreign)\n     - no more, in %\n     - 10 %" in names
     assert "effect in no catalogue" in names and "false alarms" not in names
     bins = [c.splitlines() for c in remainders.split("\n   * - ")[2:]]
     assert bins[0][1:3] == ["     - 10 %", "     - 0.0 % [0.0, 97.5] of 1"]
