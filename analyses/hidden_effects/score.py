@@ -175,7 +175,7 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
         "gross_error_alarms": rate(r["any_alarm"] for r in rows if r["kind"] == "gross"),
         "several_wires": {
             kind: by_wire([r for r in rows if r["kind"] == kind and r["protocol"] == "several_wires"])
-            for kind in ("single", "some")
+            for kind in ("single", "pair", "some")
         },
         "innocent_alarms": rate(v for r in single for v in r["innocent"]),
         "event_hold_right": rate(r["right_hold"] for r in single if r["right"] and r["right_hold"] is not None),
