@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .catalogue import EFFECTS, FOREIGN, Candidate, draw, effect, fits, members
+from .catalogue import EFFECTS, FOREIGN, Candidate, bench_sets, draw, effect, fits, members
 from .delta import Geometry, conditional, geometry, signature, solve_amplitude, solve_together
 from .files import logged_temperature, write_experiments, write_json
 from .noise import measure
@@ -17,7 +17,7 @@ from .rig import Array, Rig
 from .truth import PROTOCOLS, draw_rig
 
 GENERATION = 1  # raised with every change that makes other data of the same specification: old answers then lapse
-KINDS = ("clean", "single", "pair", "without", "foreign", "gross", "two", "three", "mixed")
+KINDS = ("clean", "single", "pair", "without", "foreign", "gross", "two", "three", "mixed", "some")
 TOGETHER = ("two", "three", "mixed")  # kinds whose delta is conditional on the other effects
 LONG = ("unloading", "dense", "uneven")  # protocols that tell more than the paper's
 DELTAS = (3.0, 5.0, 10.0, 20.0)
@@ -76,12 +76,13 @@ class Plan:
     foreign_protocols: int
     gross: int
     together: int  # of each of two, three, and one known beside one foreign
+    some: int  # several wires, an effect of the material in one, two or all three of them, each with its own amplitude
 
 
 SIZES = {
-    "tiny": Plan(8, (10.0,), 1, 1, 2, (), 0, (), 0, 0, 0),
-    "small": Plan(48, (5.0, 10.0, 20.0), 2, 1, 12, (10.0,), 1, (10.0,), 1, 8, 24),
-    "full": Plan(640, DELTAS, len(PROTOCOLS), 1, 80, (10.0, 20.0), 3, (8.0, 20.0), 4, 40, 160),
+    "tiny": Plan(8, (10.0,), 1, 1, 2, (), 0, (), 0, 0, 0, 0),
+    "small": Plan(48, (5.0, 10.0, 20.0), 2, 1, 12, (10.0,), 1, (10.0,), 1, 8, 24, 9),
+    "full": Plan(640, DELTAS, len(PROTOCOLS), 1, 80, (10.0, 20.0), 3, (8.0, 20.0), 4, 40, 160, 27),
 }
 
 
@@ -132,6 +133,8 @@ def specs(
             if kind == "mixed":
                 drawn[1] = list(FOREIGN)[int(rng.integers(len(FOREIGN)))]
             found.append(Spec(kind, protocol, tuple(drawn), 10.0, i, seed))
+    own = [name for name, e in EFFECTS.items() if e.scope == "material" and able(name, "several_wires")]
+    found += [Spec("some", "several_wires", (own[i % len(own)],), 10.0, i, seed) for i in range(plan.some)]
     chosen = set(names) | set(FOREIGN)
     return [s for s in found if s.kind in kinds and s.protocol in protocols and set(s.names) <= chosen]
 
@@ -145,6 +148,10 @@ def build(spec: Spec) -> Case | None:
             continue
         geo = geometry(rig)
         candidates = [draw(effect(name), rig, rng) for name in spec.names]
+        if spec.kind == "some":
+            wires = bench_sets(effect(spec.names[0]), rig)
+            places = sorted(rng.choice(len(wires), int(rng.integers(len(wires))) + 1, replace=False))
+            candidates = [replace(candidates[0], benches=wires[int(i)]) for i in places]
         if spec.kind in TOGETHER:
             sizes = solve_together(geo, candidates, spec.delta)
         else:

@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
-from .cases import Case
-from .catalogue import Candidate, library, members
+from .cases import TOGETHER, Case
+from .catalogue import EFFECTS, Candidate, library, members
 from .delta import Geometry, delta_curves, signature
 from .fitting import delta_after_refit
 from .generator import simulate
+from .optimal_sets import DELTA_RANGE, SEPARABLE, Directions, left_over, optimal_mixed, optimal_names
 from .rig import Array, Index, Mask
 
 GROUP_COSINE = 0.95
-SEPARABLE = 3.3
-DELTA_RANGE = (2.5, 25.0)  # the prior of log delta is flat here, up to what the effect can reach
 ALPHA = 0.04
 
 
@@ -115,8 +114,8 @@ def judge(case: Case, draws: int = 200) -> dict[str, Any]:
         worst = max(others, default=0.0)
         result["separable"] = bool(np.linalg.norm(z) * np.sqrt(max(1 - worst**2, 0.0)) > SEPARABLE)
     result["bench"] = case.rig.benches[int(np.argmax(share))].name
-    if case.spec.kind == "two":
-        result["optimal_two"] = optimal_two(case, candidates, curves, result["groups"], draws)
+    if case.spec.kind in (*TOGETHER, "without", "foreign") and case.hidden:
+        result |= _several(case, candidates, curves, result["groups"], draws)
     if case.spec.kind in ("single", "without") and case.hidden:
         result["optimal"] = _optimal(case, candidates, sizes, curves, set(result["groups"][0]), draws)
     return result
@@ -151,44 +150,26 @@ def _optimal(
     }
 
 
-def optimal_two(
-    case: Case, candidates: list[Candidate], curves: Array, groups: list[list[str]], draws: int = 200
-) -> dict[str, float]:
-    """How often an ideal judge who knows that two effects hide, and the noise, names both.
-
-    Every pair of candidates, each of its direction at the hidden delta and with an amplitude of any size, integrated in
-    closed form; pairs of names equally likely, then their candidates.
-
-    Returns
-    -------
-    Rate of the right pair, and of one from each group.
-    """
+def _several(
+    case: Case, candidates: list[Candidate], curves: Array, groups: list[list[str]], draws: int
+) -> dict[str, Any]:
+    """What is possible where several effects hide, or one that the judged program does not know."""
     geo, rng = case.geo, np.random.default_rng(int(case.spec.key, 16))
-    units = np.array([nearest_direction(curve, case.spec.delta) for curve in curves])
     names = list(dict.fromkeys(c.name for c in candidates))
-    owner = np.array([names.index(c.name) for c in candidates])
-    first, second = (index for index in np.triu_indices(len(units), 1))
-    apart = owner[first] != owner[second]
-    first, second = first[apart], second[apart]
-    cosine = np.einsum("ar,ar->a", units[first], units[second])
-    left = np.maximum(1.0 - cosine**2, 1e-6)
-    pair = np.minimum(owner[first], owner[second]) * len(names) + np.maximum(owner[first], owner[second])
-    each, where = np.unique(pair, return_inverse=True)
-    weight = -0.5 * np.log(left) - np.log(np.bincount(where)[where])
+    directions = Directions(
+        np.array([nearest_direction(curve, case.spec.delta) for curve in curves]),
+        np.array([names.index(c.name) for c in candidates]),
+        names,
+    )
     z = signature(geo, [list(case.hidden)])[0]
-    right = together = 0
-    hidden = {c.name for c, _ in case.hidden}
-    for _ in range(draws):
-        noise = rng.normal(size=len(z))
-        along = units @ (z + noise - geo.basis @ (geo.basis.T @ noise))
-        a, b = along[first], along[second]
-        height = 0.5 * (a**2 + b**2 - 2.0 * cosine * a * b) / left + weight
-        top = np.full(len(each), -np.inf)
-        np.maximum.at(top, where, height)
-        total = np.bincount(where, np.exp(height - top[where]), len(each))
-        best = int(each[np.argmax(top + np.log(total))])
-        pair = [names[best // len(names)], names[best % len(names)]]
-        right += set(pair) == hidden
-        orders = (pair, pair[::-1])
-        together += any(one in groups[0] and other in groups[1] for one, other in orders)
-    return {"right": right / draws, "group": together / draws}
+    if case.spec.kind in ("two", "three"):
+        return {f"optimal_{case.spec.kind}": optimal_names(geo, directions, z, groups, rng, draws)}
+    if case.spec.kind == "mixed":
+        exact = directions
+        for one in case.hidden:
+            if one[0].name in EFFECTS:
+                exact = exact.with_exact(one[0].name, signature(geo, [[one]])[0])
+        mixed = optimal_mixed(geo, directions, z, groups[0], rng, draws)
+        return {"optimal_mixed": mixed, "left_over": left_over(geo, exact, z, 3)}
+    removed = case.spec.names if case.spec.kind == "without" else ()
+    return {"left_over": left_over(geo, directions.without(removed), z, 2)}

@@ -133,6 +133,43 @@ def _rates(title: str, rates: dict[str, Any]) -> str:
     return f"<h3>{escape(title)}</h3><table>{rows}</table>"
 
 
+def _together(kinds: dict[str, Any]) -> str:
+    """Files in which several effects hide, by kind and protocol: what was accepted and what is possible."""
+    out = []
+    for kind, labels in kinds.items():
+        if not labels["all"]["detected"]:
+            continue
+        keys = [k for k, v in labels["all"].items() if v is not None and k != "left_over"]
+        head = "<tr><th></th>" + "".join(f"<th>{escape(label)}</th>" for label in labels) + "</tr>"
+        rows = []
+        for key in keys:
+            cells = [line[key] for line in labels.values()]
+            shown = [_number(c, 2) if isinstance(c, float) else _interval(c) for c in cells]
+            rows.append(f"<tr><td>{escape(key)}</td>" + "".join(f"<td>{escape(c)}</td>" for c in shown) + "</tr>")
+        out.append(f"<h3>{escape(kind)}</h3><table>{head}{''.join(rows)}</table>{_left(labels['all']['left_over'])}")
+    return "".join(out)
+
+
+def _left(parts: dict[str, Any]) -> str:
+    """What the best names leave of the truth: how often too little to be seen, and the power of a test of it."""
+    lines = [
+        f"<li>the best {escape(size)}: too little left in {escape(_interval(part['too_little']))} of the cases, power"
+        f" {_number(part['power'], 2)}</li>"
+        for size, part in parts.items()
+    ]
+    return f"<p>What the best names leave:</p><ul>{''.join(lines)}</ul>" if lines else ""
+
+
+def _calibration(bins: list[dict[str, Any]]) -> str:
+    """Stated probability of a remainder against how often something was left, 95 % intervals."""
+    rows = "".join(
+        f"<tr><td>{b['from']:g} to {b['from'] + 0.2:g}</td><td>{_number(b['said'], 2)}</td>"
+        f"<td>{escape(_interval(b['found']))}</td></tr>"
+        for b in bins
+    )
+    return f"<table><tr><th>bin</th><th>stated</th><th>something left, 95 % interval</th></tr>{rows}</table>"
+
+
 def _section(how: str, result: dict[str, Any]) -> str:
     others = {
         "clean files with one gross error: alarms": result["gross_error_alarms"],
@@ -158,6 +195,14 @@ def _section(how: str, result: dict[str, Any]) -> str:
             "<h3>By effect</h3>",
             _breakdown(result["by_effect"]),
             _rates("Two effects at once", result["pairs"]),
+            "<h3>Several effects, each visible beside the others</h3>",
+            _together(result["together"]),
+            *(f"<h3>{kind}, alone</h3>{_left(parts)}" for kind, parts in result["alone"].items() if parts),
+            "<h3>Probability of a remainder</h3>",
+            _calibration(result["remainder_calibration"]),
+            "<p>The same with the kinds as frequent as the prior expects them:</p>",
+            _calibration(result["remainder_calibration_as_expected"]),
+            *(_rates(f"Several wires, {kind}", found) for kind, found in result["several_wires"].items()),
             _rates("False alarms by protocol", result["clean_by_protocol"]),
             _rates("Held-out gap closed, pooled, by delta", result["gap_closed"]),
             _rates("Also", others),

@@ -29,6 +29,13 @@ def cell(row: Target, bold: bool = False) -> str:
     return text if low == high else f"{text} [{low}, {high}] of {found['n']}"
 
 
+def signed(text: str) -> str:
+    """With signs for what the targets write in letters."""
+    for plain, sign in SIGNS.items():
+        text = text.replace(plain, sign)
+    return text
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scores", type=Path, nargs="+")
@@ -45,10 +52,7 @@ def main() -> None:
         again = cell(same) if same["found"] and same["found"]["n"] != row["found"]["n"] else ""
         lines.append([row["target"], row["wanted"], cell(row, row["passed"] is False), again])
     for cells in lines:
-        line = "   * - " + "\n     - ".join(cells).rstrip()
-        for plain, sign in SIGNS.items():
-            line = line.replace(plain, sign)
-        print(line)
+        print(signed("   * - " + "\n     - ".join(cells).rstrip()))
 
 
 if __name__ == "__main__":

@@ -11,21 +11,36 @@ from scipy.stats import beta
 Row = dict[str, Any]
 
 
-def upper_bound(k: int, n: int, level: float = 0.95) -> float:
+def upper_bound(k: float, n: float, level: float = 0.95) -> float:
     """One-sided upper Clopper-Pearson bound of a rate."""
     return 1.0 if k >= n else float(beta.ppf(level, k + 1, n - k))
 
 
-def lower_bound(k: int, n: int, level: float = 0.95) -> float:
+def lower_bound(k: float, n: float, level: float = 0.95) -> float:
     """One-sided lower Clopper-Pearson bound of a rate."""
     return 0.0 if k <= 0 else float(beta.ppf(1 - level, k, n - k + 1))
 
 
-def rate(hits: Iterable[bool]) -> dict[str, Any] | None:
-    """Share of true values, their number and a two-sided 90 % interval; None when there are none."""
+def rate(hits: Iterable[bool], level: float = 0.9) -> dict[str, Any] | None:
+    """Share of true values, their number and a two-sided interval of the given level; None when there are none."""
     values = [bool(h) for h in hits]
-    k, n = sum(values), len(values)
-    return {"value": k / n, "k": k, "n": n, "low": lower_bound(k, n), "high": upper_bound(k, n)} if n else None
+    k, n, side = sum(values), len(values), 0.5 * (1.0 + level)
+    return (
+        {"value": k / n, "k": k, "n": n, "low": lower_bound(k, n, side), "high": upper_bound(k, n, side)} if n else None
+    )
+
+
+def weighted_rate(hits: Iterable[bool], weights: Iterable[float], level: float = 0.9) -> dict[str, Any] | None:
+    """The same where cases count differently; the interval is that of as many equal cases as would be as precise.
+
+    These are (sum w)^2 / (sum w^2) cases (Kish's effective number).
+    """
+    values, w = np.array([bool(h) for h in hits], dtype=float), np.array(list(weights), dtype=float)
+    if not w.sum() > 0:
+        return None
+    value, n, side = float(values @ w / w.sum()), float(w.sum() ** 2 / (w @ w)), 0.5 * (1.0 + level)
+    k = value * n
+    return {"value": value, "n": round(n, 1), "low": lower_bound(k, n, side), "high": upper_bound(k, n, side)}
 
 
 def pooled(rows: list[Row], statistic: Callable[[Any, int], float], draws: int = 400) -> dict[str, Any] | None:

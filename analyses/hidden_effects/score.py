@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from wirebayes.discovery.settings import MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+
 from .cases import TOGETHER
-from .rates import Row, closed, comparable, pooled, rate
+from .catalogue import EFFECTS
+from .optimal_sets import SEPARABLE
+from .rates import Row, closed, comparable, pooled, rate, weighted_rate
 
 NOTHING = "nothing-missing"
 CONDITIONAL = 8.0  # delta beside the other effects from which one is expected to be named
+BIN_LEVEL = 0.95  # of the intervals of a calibration
 VISIBLE = 0.8  # share of delta that must survive a refit of the plain model for a case to count as visible
 
 
@@ -46,12 +51,16 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "in_set": bool(names) and names[0] in (spoken.get("set") or []),
         "set_size": len(spoken.get("set") or []),
         "accepted": list(spoken.get("accepted") or []),
+        "wires": _wires(truth, groups, answers),
         "groups": groups,
         "conditional": [e.get("conditional_delta") for e in truth["effects"]],
         "remains": spoken["verdict"] in ("partial", "unknown"),
         "verdict": spoken["verdict"],
         "remainder": (spoken.get("remainder") or {}).get("probability"),
         "optimal_two": judged.get("optimal_two") or {},
+        "optimal_three": judged.get("optimal_three") or {},
+        "optimal_mixed": judged.get("optimal_mixed") or {},
+        "left_over": judged.get("left_over") or {},
         "right_hold": None if hold is None or found_hold is None else found_hold == hold,
         "separable": judged.get("separable"),
         "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],
@@ -60,6 +69,23 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "held_out": _held_out(judged, spoken),
         "seconds": record["seconds"],
     }
+
+
+def _wires(truth: dict[str, Any], groups: list[list[str]], answers: dict[str, Any]) -> list[dict[str, bool]]:
+    """What was said of each experiment of a file: whether it carries an effect, and was given one's name or another."""
+    out = []
+    for name, answer in answers.items():
+        own = [g for e, g in zip(truth["effects"], groups, strict=False) if name in e["experiments"]]
+        accepted = list(answer.get("accepted") or [])
+        out.append(
+            {
+                "carries": bool(own),
+                "detected": answer["verdict"] != NOTHING,
+                "named": any(a in g for a in accepted for g in own),
+                "false_name": any(not any(a in g for g in own) for a in accepted),
+            }
+        )
+    return out
 
 
 def _touched(truth: dict[str, Any]) -> set[str]:
@@ -137,14 +163,20 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
         "by_protocol": breakdown(single, "protocol"),
         "pairs": _pairs([r for r in rows if r["kind"] == "pair"]),
         "together": {kind: _together([r for r in rows if r["kind"] == kind]) for kind in TOGETHER},
+        "alone": {kind: left_over([r for r in rows if r["kind"] == kind]) for kind in ("without", "foreign")},
         "false_names": rate(bool(false_names(r)) for r in rows if r["kind"] != "without"),
         "partial_on_single": rate(r["verdict"] == "partial" for r in single),
         "remainder_calibration": calibration(rows),
+        "remainder_calibration_as_expected": calibration(rows, prior_weights(rows)),
         "clean_by_protocol": {
             p: rate(r["any_alarm"] for r in rows if r["kind"] == "clean" and r["protocol"] == p)
             for p in dict.fromkeys(r["protocol"] for r in rows if r["kind"] == "clean")
         },
         "gross_error_alarms": rate(r["any_alarm"] for r in rows if r["kind"] == "gross"),
+        "several_wires": {
+            kind: by_wire([r for r in rows if r["kind"] == kind and r["protocol"] == "several_wires"])
+            for kind in ("single", "pair", "some")
+        },
         "innocent_alarms": rate(v for r in single for v in r["innocent"]),
         "event_hold_right": rate(r["right_hold"] for r in single if r["right"] and r["right_hold"] is not None),
         "gap_closed": {
@@ -172,6 +204,16 @@ def false_names(row: Row) -> list[str]:
     return [name for name in row["accepted"] if not any(name in group for group in row["groups"])]
 
 
+def accepted_of_group(row: Row) -> list[bool]:
+    """For each hidden effect whether it, or one whose signature is nearly the same, was accepted."""
+    return [any(name in group for name in row["accepted"]) for group in row["groups"]]
+
+
+def visible_beside(row: Row) -> list[bool]:
+    """For each hidden effect whether enough of it is left beside the others for it to be named."""
+    return [d is not None and d >= CONDITIONAL for d in row["conditional"]]
+
+
 def _together(rows: list[Row]) -> dict[str, Any]:
     """Several effects at once: which of those that stay visible beside the others are accepted, by protocol."""
     out: dict[str, Any] = {}
@@ -181,35 +223,97 @@ def _together(rows: list[Row]) -> dict[str, Any]:
         ("long", [r for r in rows if r["protocol"] != "paper"]),
     ):
         seen = [r for r in part if r["detected"]]
-        visible = [[d is not None and d >= CONDITIONAL for d in r["conditional"]] for r in part]
-        found = [[any(a in group for a in r["accepted"]) for group in r["groups"]] for r in part]
-        best = [r["optimal_two"]["group"] for r in part if r["optimal_two"]]
         out[label] = {
             "detected": rate(r["detected"] for r in part),
-            "all_accepted": rate(all(f) for f, v in zip(found, visible, strict=True) if all(v)),
-            "known_accepted": rate(f[0] for f, v in zip(found, visible, strict=True) if v[0]),
+            "all_accepted": rate(all(accepted_of_group(r)) for r in part if all(visible_beside(r))),
+            "known_accepted": rate(accepted_of_group(r)[0] for r in part if visible_beside(r)[0]),
             "first_is_one_of_them": rate(
                 any(r["accepted"][0] in g for g in r["groups"]) for r in seen if r["accepted"]
             ),
             "remainder_reported": rate(r["remains"] for r in part),
+            "remainder_or_twin": rate(r["remains"] or all(accepted_of_group(r)) for r in part),
             "false_name": rate(bool(false_names(r)) for r in part),
-            "optimal_both": float(np.mean(best)) if best else None,
+            "optimal_both": _mean(r["optimal_two"].get("group") for r in part),
+            "optimal_three": _mean(r["optimal_three"].get("group") for r in part),
+            "optimal_known": _mean(r["optimal_mixed"].get("known") for r in part),
+            "optimal_remainder": _mean(r["optimal_mixed"].get("remains") for r in part),
+            "left_over": left_over(part),
         }
     return out
 
 
-def calibration(rows: list[Row]) -> list[dict[str, Any]]:
+def by_wire(rows: list[Row]) -> dict[str, Any]:
+    """Files of several wires, wire by wire: those that carry the effect, and those that do not."""
+    wires = [w for r in rows for w in r["wires"]]
+    carriers, idle = [w for w in wires if w["carries"]], [w for w in wires if not w["carries"]]
+    return {
+        "carriers: detected": rate(w["detected"] for w in carriers),
+        "carriers: the effect or one of its group accepted": rate(w["named"] for w in carriers),
+        "carriers: another name accepted": rate(w["false_name"] for w in carriers),
+        "others: alarm": rate(w["detected"] for w in idle),
+        "others: a name accepted": rate(w["false_name"] for w in idle),
+    }
+
+
+def left_over(rows: list[Row]) -> dict[str, Any]:
+    """What the best catalogue effects leave of what is hidden, by their number.
+
+    For each the share of cases of which too little is left to be seen, and the mean power of a test of the residuals.
+    """
+    sizes = sorted({size for r in rows for size in r["left_over"]})
+    return {
+        size: {
+            "too_little": rate(r["left_over"][size]["delta"] < SEPARABLE for r in rows if size in r["left_over"]),
+            "power": _mean(r["left_over"][size]["power"] for r in rows if size in r["left_over"]),
+        }
+        for size in sizes
+    }
+
+
+def calibration(rows: list[Row], weights: Mapping[str, float] = {}) -> list[dict[str, Any]]:
     """How often something is left beside the names where its probability is said to lie in each of five bins.
 
     Something is left where an effect is foreign, was removed, or is hidden and neither it nor one like it was accepted.
+
+    Parameters
+    ----------
+    weights : of the cases of each kind, where not all count the same; a kind that is missing counts nothing.
+
+    Returns
+    -------
+    What was said on average, and what was found with its 95 % interval, for each bin.
     """
     out = []
     for low in (0.0, 0.2, 0.4, 0.6, 0.8):
         part = [r for r in rows if r["detected"] and r["remainder"] is not None and r["names"]]
-        part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] == 1.0)]
-        left = [not all(any(a in g for a in r["accepted"]) for g in r["groups"]) for r in part]
-        stated = float(np.mean([r["remainder"] for r in part])) if part else None
-        out.append({"from": low, "said": stated, "found": rate(left)})
+        part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] >= 1.0)]
+        w = [weights.get(r["kind"], 0.0) if weights else 1.0 for r in part]
+        left = [not all(accepted_of_group(r)) for r in part]
+        stated = float(np.average([r["remainder"] for r in part], weights=w)) if sum(w) > 0 else None
+        found = weighted_rate(left, w, BIN_LEVEL) if weights else rate(left, BIN_LEVEL)
+        out.append({"from": low, "said": stated, "found": found})
+    return out
+
+
+def prior_weights(rows: list[Row]) -> dict[str, float]:
+    """Weight of a case of each kind with which the kinds are as frequent as the prior of `discover` expects.
+
+    A single name has weight 1, so all n of them have n; all pairs together have `MORE_EFFECTS` of that, all threes as
+    much of the pairs; a remainder beside one name has `REMAINDER_WEIGHT` of what the name has without, and a remainder
+    alone has `UNKNOWN_WEIGHT`. What the benchmark has no cases of, such as a remainder beside two names, is left out.
+    """
+    n = len(EFFECTS)
+    expected = {
+        ("single",): 1.0 * n,
+        ("pair", "two"): MORE_EFFECTS * n,
+        ("three",): MORE_EFFECTS**2 * n,
+        ("mixed",): REMAINDER_WEIGHT * n,
+        ("without", "foreign"): UNKNOWN_WEIGHT,
+    }
+    out: dict[str, float] = {}
+    for kinds, share in expected.items():
+        count = sum(r["kind"] in kinds for r in rows)
+        out |= {kind: share / count for kind in kinds if count}
     return out
 
 

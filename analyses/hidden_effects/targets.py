@@ -53,10 +53,79 @@ def targets(rows: list[Row]) -> list[Target]:
         part = [r for r in foreign if r["kind"] == kind]
         found = rate(r["chosen"] == "unknown" or r["right_group"] for r in part)
         table.append(_at_least(f"effect {label}: unknown or its group", found, 0.90))
+        table.append(_no_more(f"its group, or seen beside the best name ({kind})", [_seen_alone(r) for r in part]))
     for delta, wanted in ((10.0, 0.70), (20.0, 0.90)):
         found = pooled([r for r in single if r["delta"] == delta], closed_of_oracle)
         table.append(_at_least(f"gap closed, relative to the oracle, delta {delta:g}", found, wanted))
+    return table + _several(rows)
+
+
+def _seen_alone(row: Row) -> float | None:
+    """How often an effect without a name could be answered right: where none is like it, by seeing the rest."""
+    if not row["left_over"]:
+        return None
+    return 1.0 if len(row["groups"][0]) > 1 else float(row["left_over"]["1"]["power"])
+
+
+def _several(rows: list[Row]) -> list[Target]:
+    """Several effects at once, one of them perhaps foreign, and what is said too much."""
+    from .score import accepted_of_group, false_names, visible_beside
+
+    kinds = {kind: [r for r in rows if r["kind"] == kind] for kind in ("single", "two", "three", "mixed")}
+    first = [r for r in kinds["two"] if r["accepted"]]
+    known = [r for r in kinds["mixed"] if visible_beside(r)[0]]
+    table = [
+        _at_least("two effects: both accepted, relative to optimal", _relative(kinds["two"], "optimal_two"), 0.85),
+        _at_least(
+            "two effects: the first accepted is one of them",
+            rate(any(r["accepted"][0] in group for group in r["groups"]) for r in first),
+            0.85,
+        ),
+        _row(
+            "three effects: all accepted, relative to optimal",
+            "in %",
+            _relative(kinds["three"], "optimal_three"),
+            None,
+        ),
+        _at_least("beside a foreign effect: the known one accepted", rate(accepted_of_group(r)[0] for r in known), 0.8),
+        _no_more("an ideal judge would accept it", [r["optimal_mixed"].get("known") for r in known]),
+        _at_least("beside a foreign effect: a remainder reported", rate(r["remains"] for r in kinds["mixed"]), 0.8),
+        _no_more("an ideal judge would report it", [r["optimal_mixed"].get("remains") for r in kinds["mixed"]]),
+        _no_more(
+            "a test of what two names leave would see it",
+            [r["left_over"].get("2", {}).get("power") for r in kinds["mixed"]],
+        ),
+        _at_most("single effects: partial", rate(r["verdict"] == "partial" for r in kinds["single"]), 0.05),
+        _at_most(
+            "an accepted name that is of no hidden effect's group",
+            rate(bool(false_names(r)) for r in rows if r["names"] and r["kind"] != "without"),
+            0.10,
+        ),
+    ]
     return table
+
+
+def _relative(rows: list[Row], ideal: str) -> dict[str, Any] | None:
+    """Share of cases with all hidden effects accepted, and its interval, over the ideal judge's share."""
+    from .score import accepted_of_group, visible_beside
+
+    part = [r for r in rows if all(visible_beside(r)) and "group" in r[ideal]]
+    found, most = rate(all(accepted_of_group(r)) for r in part), sum(r[ideal]["group"] for r in part)
+    if not found or not most:
+        return None
+    return found | {key: found[key] * len(part) / most for key in ("value", "low", "high")}
+
+
+def _at_most(name: str, found: dict[str, Any] | None, wanted: float) -> Target:
+    return _row(name, f"<= {100 * wanted:.0f} %", found, found is not None and found["value"] <= wanted)
+
+
+def _no_more(name: str, values: list[float | None]) -> Target:
+    """The mean of what is possible; no more is asked than to print it."""
+    kept = [v for v in values if v is not None]
+    mean = sum(kept) / len(kept) if kept else 0.0
+    found = {"value": mean, "n": len(kept), "low": mean, "high": mean} if kept else None
+    return _row(name, "no more, in %", found, None)
 
 
 def _most(name: str, rows: list[Row]) -> Target:

@@ -60,12 +60,21 @@ def test_a_second_effect_must_predict(monkeypatch: pytest.MonkeyPatch, gain: flo
 def test_what_fails_the_second_test_leaves_something_over(
     monkeypatch: pytest.MonkeyPatch, p: float, remains: bool
 ) -> None:
-    """At .03 a remainder is as likely as none; above it nothing is changed."""
+    """At .03 a remainder is as likely as none; the odds follow the density of p where more is missing."""
     found = decided(monkeypatch, explored({"a": 20.0}), {}, {"a": p})
     assert (found.posterior.remainder[0] > 0.5) == remains
     assert verdict_of(found, 0)[0] == ("partial" if remains else "named")
     odds = found.posterior.remainder[0] / (1.0 - found.posterior.remainder[0])
-    assert odds == pytest.approx((0.03 / p) ** 0.8 if remains else 0.0, abs=1e-3)
+    assert odds == pytest.approx((0.03 / p) ** 0.8, rel=1e-3)
+
+
+@pytest.mark.parametrize("p", [0.05, 0.3, 1.0])
+def test_a_set_that_passes_the_second_test_may_leave_something_too(monkeypatch: pytest.MonkeyPatch, p: float) -> None:
+    """Also where another one gave way to it: the larger its p, the less."""
+    for sets, passing in (({"a": 20.0}, "a"), ({"a": 20.0, "b": 19.5}, "b")):
+        found = decided(monkeypatch, explored(sets), {}, {"a": 0.01} | {passing: p})
+        assert names(found) == passing
+        assert found.posterior.remainder[0] == pytest.approx(1.0 / (1.0 + (p / 0.03) ** 0.8), rel=1e-3)
 
 
 @pytest.mark.parametrize(("behind", "p", "best"), [(1.9, 0.5, "b"), (2.1, 0.5, "a"), (1.9, 0.02, "a")])

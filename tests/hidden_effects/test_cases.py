@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analyses.hidden_effects.baselines import answer
-from analyses.hidden_effects.cases import SIZES, Spec, build, seal, specs
+from analyses.hidden_effects.cases import SIZES, Spec, build, seal, specs, truth
 from analyses.hidden_effects.catalogue import EFFECTS
 from analyses.hidden_effects.optimal import judge
 from analyses.hidden_effects.run import append_line, main, read_lines
@@ -83,6 +83,18 @@ def test_the_ideal_judge_names_what_is_separable_and_tosses_a_coin_for_twins():
     assert 0.25 < np.mean(twin) < 0.8
     grouped = judge(build(Spec("single", "paper", ("strain_stiffening",), 10.0, 0)), draws=10)
     assert "sensor_nonlinearity" in grouped["groups"][0]
+
+
+def test_an_effect_of_some_wires_has_an_amplitude_in_each_of_them():
+    plan = specs(SIZES["full"], kinds=("some",))
+    assert {s.protocol for s in plan} == {"several_wires"}
+    assert {EFFECTS[s.names[0]].scope for s in plan} == {"material"}
+    cases = [case for case in (build(s) for s in plan[:7]) if case is not None]
+    assert {len(case.hidden) for case in cases} == {1, 2, 3}
+    for case in cases:
+        sealed = truth(case)["effects"]
+        assert len({tuple(e["experiments"]) for e in sealed}) == len(case.hidden)
+        assert [e["conditional_delta"] for e in sealed] == pytest.approx([10.0] * len(sealed), rel=0.01)
 
 
 def test_baselines_find_a_large_slip_and_obey_without():

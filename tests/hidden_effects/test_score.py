@@ -5,9 +5,21 @@ import json
 import pytest
 from scipy.stats import binom, norm
 
+from analyses.hidden_effects import page
 from analyses.hidden_effects import pooled as program
-from analyses.hidden_effects.rates import closed, closed_of_oracle, lower_bound, pooled, rate, rmse_ratio, upper_bound
-from analyses.hidden_effects.score import confusion, score
+from analyses.hidden_effects import several as names_and_remainders
+from analyses.hidden_effects.rates import (
+    closed,
+    closed_of_oracle,
+    lower_bound,
+    pooled,
+    rate,
+    rmse_ratio,
+    upper_bound,
+    weighted_rate,
+)
+from analyses.hidden_effects.score import calibration, confusion, prior_weights, score
+from analyses.hidden_effects.targets import targets
 
 HOLDS = {"sample-1": [9, 10]}
 
@@ -138,3 +150,134 @@ def test_a_case_that_failed_is_counted_as_failed():
     result = score({"a": truth("a")}, {"a": judged()}, {"a": {"answer": None, "error": "boom", "seconds": 0.1}})
     assert result["failed"] == [{"key": "a", "error": "boom"}]
     assert confusion(result["rows"]) == {}
+
+
+def several(kind, accepted, ideal, remains=False, groups=(("toe",), ("yield",))):
+    """A row of a file in which several effects hide, all visible beside the others."""
+    return {
+        "kind": kind,
+        "names": ["toe", "yield"],
+        "groups": [list(g) for g in groups],
+        "accepted": accepted,
+        "conditional": [10.0] * len(groups),
+        "remains": remains,
+        "verdict": "partial" if remains else "named",
+        "delta": 10.0,
+        "detected": True,
+        "optimal": {},
+        "held_out": None,
+        "visible": True,
+        "right": False,
+        "optimal_two": {"group": ideal} if kind == "two" else {},
+        "optimal_three": {},
+        "optimal_mixed": {"known": ideal, "remains": 0.5} if kind == "mixed" else {},
+        "left_over": {"2": {"delta": 2.0, "power": 0.1}} if kind == "mixed" else {},
+    }
+
+
+def test_several_effects_are_measured_against_the_ideal_judge():
+    rows = [several("two", ["toe", "yield"], 0.9), several("two", ["memory"], 0.7)]
+    rows += [several("mixed", ["toe"], 0.9, remains=True), several("mixed", ["ageing", "toe"], 0.7)]
+    found = {row["target"]: row for row in targets(rows)}
+    assert found["two effects: both accepted, relative to optimal"]["found"]["value"] == pytest.approx(0.5 / 0.8)
+    assert found["two effects: the first accepted is one of them"]["found"]["value"] == 0.5
+    assert found["beside a foreign effect: the known one accepted"]["found"]["value"] == 1.0
+    assert found["beside a foreign effect: a remainder reported"]["found"]["value"] == 0.5
+    assert found["an ideal judge would accept it"]["found"]["value"] == pytest.approx(0.8)
+    assert found["a test of what two names leave would see it"]["found"]["value"] == pytest.approx(0.1)
+    assert found["an accepted name that is of no hidden effect's group"]["found"]["k"] == 2
+    hidden = [several("mixed", [], 0.9) | {"conditional": [7.9, 10.0]}]
+    assert not {r["target"]: r for r in targets(hidden)}["beside a foreign effect: the known one accepted"]["found"]
+
+
+def said(kind, probability, accepted=("toe",)):
+    return {"kind": kind, "detected": True, "names": ["toe"], "groups": [["toe"]], "remainder": probability,
+            "accepted": list(accepted)}  # fmt: skip
+
+
+def test_bins_of_a_stated_probability_with_their_95_percent_intervals():
+    rows = [said("single", 0.05)] * 9 + [said("single", 0.15, ())] + [said("single", 1.0, ())]
+    first, *_, last = calibration(rows)
+    assert first["said"] == pytest.approx(0.06)
+    assert (first["found"]["k"], first["found"]["n"]) == (1, 10)
+    assert binom.cdf(1, 10, first["found"]["high"]) == pytest.approx(0.025, abs=1e-6)
+    assert last["found"]["n"] == 1
+
+
+def test_kinds_can_count_as_the_prior_expects_them():
+    """Twenty single names; one of them beside a remainder in half as many files; a remainder alone in one."""
+    rows = [said("single", 0.05)] * 6 + [said("mixed", 0.05, ())] * 3 + [said("foreign", 0.05, ())] * 3
+    weights = prior_weights(rows)
+    assert weights == pytest.approx({"single": 20 / 6, "mixed": 10 / 3, "without": 1 / 3, "foreign": 1 / 3})
+    (bin_, *_) = calibration(rows, weights)
+    assert bin_["found"]["value"] == pytest.approx(11 / 31)
+    assert calibration([said("pair", 0.05)], {"single": 1.0})[0]["found"] is None
+
+
+def test_unequal_weights_are_worth_fewer_cases():
+    equal = weighted_rate([True, False] * 10, [2.0] * 20)
+    plain = rate([True, False] * 10)
+    assert (equal["value"], equal["low"], equal["high"]) == pytest.approx((0.5, plain["low"], plain["high"]))
+    unequal = weighted_rate([True, False] * 10, [1.0, 9.0] * 10)
+    assert unequal["value"] == pytest.approx(0.1)
+    assert unequal["n"] == pytest.approx(100.0**2 / 820.0, abs=0.05)
+    assert weighted_rate([], []) is None
+
+
+def test_intervals_can_have_another_level():
+    assert binom.sf(1, 10, rate([True] * 2 + [False] * 8, 0.95)["low"]) == pytest.approx(0.025, abs=1e-6)
+
+
+def test_wires_of_a_file_are_counted_one_by_one():
+    sealed = truth("a", "some") | {"benches": dict.fromkeys(("sample-1", "sample-2", "sample-3"), {})}
+    sealed["effects"] = [{"name": "toe", "hold": None, "experiments": [s]} for s in ("sample-1", "sample-2")]
+    sealed["protocol"] = "several_wires"
+    spoken = answer("toe")["answer"]["experiments"]["sample-1"]
+    others = {
+        "sample-2": spoken | {"accepted": ["memory"]},
+        "sample-3": answer("toe")["answer"]["experiments"]["sample-1"],
+    }
+    record = {"answer": {"experiments": {"sample-1": spoken, **others}}, "error": None, "seconds": 1.0}
+    result = score({"a": sealed}, {"a": judged() | {"groups": [["toe"], ["toe", "ageing"]]}}, {"a": record})
+    found = {key: (value["k"], value["n"]) for key, value in result["several_wires"]["some"].items()}
+    assert found == {
+        "carriers: detected": (2, 2),
+        "carriers: the effect or one of its group accepted": (1, 2),
+        "carriers: another name accepted": (1, 2),
+        "others: alarm": (1, 1),
+        "others: a name accepted": (1, 1),
+    }
+
+
+def test_tables_for_the_docs_have_a_column_for_each_protocol(tmp_path, capsys, monkeypatch):
+    truths = {k: truth(k, "two") for k in "ab"} | {"c": truth("c", "foreign", "yield") | {"protocol": "dense"}}
+    for k in "ab":
+        truths[k]["effects"] = [{"name": n, "hold": None, "experiments": ["sample-1"]} for n in ("toe", "memory")]
+        truths[k]["effects"] = [e | {"conditional_delta": 10.0} for e in truths[k]["effects"]]
+    answers = {"a": answer("toe", ["toe"]), "b": answer("toe", ["toe"]), "c": answer("ageing", ["ageing"])}
+    spoken = [answers[k]["answer"]["experiments"]["sample-1"] for k in "abc"]
+    spoken[0]["accepted"] = ["toe", "memory"]
+    for one, probability in zip(spoken, (0.1, 0.3, 0.9), strict=True):
+        one["remainder"] = {"probability": probability}
+    two = judged() | {"groups": [["toe"], ["memory"]], "optimal_two": {"group": 1.0}}
+    foreign = judged(("yield",)) | {"left_over": {"1": {"delta": 2.0, "power": 0.1}}}
+    result = score(truths, {"a": two, "b": two, "c": foreign}, answers)
+    (tmp_path / "scores.json").write_text(json.dumps({"api": result}), encoding="utf-8")
+    monkeypatch.setattr("sys.argv", ["several", str(tmp_path / "scores.json")])
+    names_and_remainders.main()
+    names, remainders = capsys.readouterr().out.split(".. list-table::")[1:]
+    both = next(c for c in names.split("\n   * - ") if c.startswith("two effects: both accepted"))
+    assert both.splitlines()[1:] == ["     - ≥ 85 %", *(f"     - {c}" for c in ["**50 %** [3, 97] of 2"] * 2), "     -"]
+    assert "seen beside the best name (foreign)\n     - no more, in %\n     - 10 %" in names
+    assert "effect in no catalogue" in names and "false alarms" not in names
+    bins = [c.splitlines() for c in remainders.split("\n   * - ")[2:]]
+    assert bins[0][1:3] == ["     - 10 %", "     - 0.0 % [0.0, 97.5] of 1"]
+    assert bins[1][1:3] == ["     - 30 %", "     - 100 % [3, 100] of 1"]
+    assert bins[2][1:] == ["     -"] * 4
+    monkeypatch.setattr("sys.argv", ["several", "--left", str(tmp_path / "scores.json")])
+    names_and_remainders.main()
+    assert capsys.readouterr().out == "foreign, the best 1: less than 3.3 left in 100 % [5, 100] of 1, power 10 %\n"
+    html = page._section("api", result)
+    assert "<td>all_accepted</td><td>0.500 [0.025, 0.975] n=2</td>" in html
+    assert "too little left in 1.000 [0.050, 1.000] n=1 of the cases, power 0.10" in html
+    assert "<td>0.2 to 0.4</td><td>0.30</td><td>1.000 [0.025, 1.000] n=1</td>" in html

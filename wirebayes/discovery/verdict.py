@@ -120,14 +120,13 @@ def decide(
         if passing is not None:
             sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
             best, retest = passing.best, passing.retest
-            without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
-        else:
-            i = next(k for k, s in enumerate(sets) if s.key == best.effects.key)
-            extra = float(without[i] - P_SLOPE * np.log((retest.p or 1.0) / ALPHA_AFTER))
-            beside = _more_beside(sets, beside, i, extra)
-        found = model_space.posterior(sets, without, beside, blocks)
-        if not found.best.names:
-            return Decision(found, None, retest, {})
+    without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
+    if retest.p is not None:
+        i = next(k for k, s in enumerate(sets) if s.key == best.effects.key)
+        beside = _more_beside(sets, beside, i, float(without[i] - P_SLOPE * np.log(retest.p / ALPHA_AFTER)))
+    found = model_space.posterior(sets, without, beside, blocks)
+    if not found.best.names:
+        return Decision(found, None, retest, {})
     path = [explored.fitted.get(frozenset(best.effects.names[: n + 1])) for n in range(len(best.effects.names))]
     steps = [step for step in path if step is not None]
     for step in steps:
