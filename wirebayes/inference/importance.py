@@ -265,7 +265,10 @@ def _learned(
     known = before if isinstance(before, Proposal) else None
     shares = proposal.EXPLORING if known else proposal.ROUGH_SHARES
     try:
-        return proposal.fit(hot, cold, start, order, rng, shares, most=_COMPONENTS, points=_LEARNED, before=known)
+        # no walker is caught in a tail here, and a map for the middle leaves more effective draws
+        return proposal.fit(
+            hot, cold, start, order, rng, shares, most=_COMPONENTS, points=_LEARNED, before=known, along_tails=False
+        )
     except np.linalg.LinAlgError:
         return before
 

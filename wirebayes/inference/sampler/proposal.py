@@ -82,13 +82,14 @@ def fit(
     most: int,
     points: int = ENOUGH,
     before: Proposal | None = None,
+    along_tails: bool = True,
 ) -> Proposal:
     """The proposal learned from the burn-in.
 
-    The map is fitted to the hot points: along a bent tail, of which draws of the posterior show the beginning alone, a
-    map fitted to those would go on straight. In a funnel, to a power, hardly any mass is where the posterior has it:
-    hot points that are spread so much wider say nothing of its tails, and the map is fitted to the cold ones; so it is
-    at first, when all points are rough.
+    Along a bent tail, of which draws of the posterior show the beginning alone, a map fitted to those goes on straight;
+    one fitted to the hot points follows it. In a funnel, to a power, hardly any mass is where the posterior has it: hot
+    points that are spread so much wider say nothing of its tails, and the map is fitted to the cold ones; so it is at
+    first, when all points are rough.
 
     Parameters
     ----------
@@ -107,6 +108,8 @@ def fit(
         About so many are looked at.
     before : Proposal, optional
         Of nearly these points: where the mixtures are sought from.
+    along_tails : bool
+        Whether the map may be fitted to the hot points.
 
     Raises
     ------
@@ -115,7 +118,7 @@ def fit(
     """
     hot, cold = hot[:: 1 + len(hot) // points], cold[:: 1 + len(cold) // points]
     elsewhere = before is None or (hot.std(axis=0) > _ELSEWHERE * cold.std(axis=0)).any()
-    straight = transport_map.fit(cold if elsewhere else hot, order)
+    straight = transport_map.fit(hot if along_tails and not elsewhere else cold, order)
     (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
     close = mixture.fit(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None)
     wide = mixture.fit(far[::2], rng, most=most // 2, before=before.wide if before else None)
