@@ -287,7 +287,7 @@ def test_a_proposal_is_learned_as_a_close_one_of_few_points(monkeypatch: pytest.
     assert importance._learned(z, z, begin, ORDER, rng, begin) is new
     assert importance._learned(z, z, begin, ORDER, rng, before) is new
     assert importance._learned(z, z, begin, ORDER, rng, before) is before  # points that span nothing
-    few = {"most": 8, "points": 5000}
+    few = {"most": 8, "points": 5000, "along_tails": False}
     assert asked[:2] == [
         (proposal.ROUGH_SHARES, {**few, "before": None}),
         (proposal.EXPLORING, {**few, "before": before}),

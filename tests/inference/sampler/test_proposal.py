@@ -103,6 +103,34 @@ def test_points_that_do_not_span_their_space_are_refused():
         transport_map.fit(np.ones((100, 2)), np.arange(2))
 
 
+@pytest.mark.parametrize(("wider", "along_tails", "before", "followed"), [
+    (4.9, True, True, "hot"), (5.1, True, True, "cold"), (2.0, False, True, "cold"), (2.0, True, False, "cold"),
+])  # fmt: skip
+def test_the_map_follows_tails_that_belong_to_the_posterior(wider, along_tails, before, followed):
+    """Not points spread over five times as much in one coordinate, nor rough ones, nor where tails do not matter."""
+    rng = np.random.default_rng(0)
+    cold = rng.normal(size=(4000, 3))
+    cold = (cold - cold.mean(axis=0)) / cold.std(axis=0)
+    hot = cold * [1.6, wider, 1.6]
+    start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
+    known = proposal.fit(cold, cold, start, np.arange(3), rng, proposal.SHARES, most=2) if before else None
+    found = proposal.fit(
+        hot, cold, start, np.arange(3), rng, proposal.SHARES, most=2, before=known, along_tails=along_tails
+    )
+    points = {"hot": hot, "cold": cold}[followed]
+    assert found.straight.scale == pytest.approx(points.std(axis=0), rel=1e-12)
+
+
+def test_a_mixture_learns_in_single_precision_what_double_precision_says():
+    rng = np.random.default_rng(3)
+    x = np.concatenate([rng.normal(size=(3000, 4)), 3.0 + 0.3 * rng.normal(size=(1500, 4))])
+    found = mixture.fit(x, rng, most=2, degrees=40.0)
+    order = np.argsort(-found.weights)
+    assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert found.weights[order] == pytest.approx([2 / 3, 1 / 3], abs=0.01)
+    assert found.centres[order] == pytest.approx(np.repeat([[0.0], [3.0]], 4, axis=1), abs=0.08)
+
+
 def test_the_density_of_a_proposal_is_that_of_its_draws(points):
     """The mean of 1/q over draws of q inside a box is the box's volume."""
     rng = np.random.default_rng(4)
