@@ -204,3 +204,19 @@ def test_chosen_poses_say_more_than_the_first_ones():
     pick = observability.choose_poses(change, 6, 0.02, 5e-3)
     chosen, first = (observability.observe(change[i], 0.02, 5e-3).sd_m.mean() for i in (pick, list(range(6))))
     assert chosen < 0.8 * first
+
+
+def test_absurd_information_stops_nobody() -> None:
+    """Of 1e40 in one combination, beside a prior's 1e4: their sum has no inverse in floating point."""
+    change = 1e20 * np.ones((1, 3, 3))
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.inv(change[0].T @ change[0] + np.eye(3) / 0.01**2)
+    sd = observability.observe(change, 1.0, 0.01).sd_m
+    assert np.isfinite(sd).all() and (sd <= 0.01).all()
+
+
+def test_the_uncertainty_of_lengths_is_that_of_information_and_prior_together() -> None:
+    change = np.random.default_rng(0).normal(size=(5, 4, 4)) * 1e3
+    information = np.einsum("pij,pik->jk", change, change) / 0.5**2
+    expected = np.sqrt(np.diag(np.linalg.inv(information + np.eye(4) / 0.002**2)))
+    assert observability.observe(change, 0.5, 0.002).sd_m == pytest.approx(expected, rel=1e-9)

@@ -127,7 +127,8 @@ def observe(
     values, vectors = np.linalg.eigh(information)
     alone = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     rank = int((alone < 0.1 * prior_sd_m).sum())
-    sd = np.sqrt(np.diag(np.linalg.inv(information + np.eye(w) / prior_sd_m**2)))
+    # by eigenvectors: where some combinations are known absurdly well, information and prior have no inverse in floats
+    sd = np.sqrt((vectors**2 / (np.maximum(values, 0.0) + prior_sd_m**-2)).sum(axis=1))
     weakest = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
     parts = [f"{weakest[i]:+.2f} of wire {i + 1}" for i in np.argsort(-np.abs(weakest)) if abs(weakest[i]) > 0.2]
     seen = f"The readings show {rank} of {w} combinations of lengths to a tenth of their prior uncertainty"
