@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.resampling import next_power, systematic_rows, truncated_rows
+from wirebayes.resampling import effective_number, next_power, systematic_rows, thinned, truncated_rows
 
 
 def test_a_row_comes_as_often_as_its_weight_says_to_within_one() -> None:
@@ -60,3 +60,29 @@ def test_the_next_power_leaves_as_many_rows_effective_as_asked(share: float) -> 
 def test_a_power_is_never_nothing() -> None:
     log_weight = np.where(np.arange(10) < 1, 0.0, -np.inf)
     assert 0.0 < next_power(log_weight, 1.0, 0.5) < 1e-15
+
+
+def test_thinned_weights_are_the_old_ones_on_average():
+    """Heavy rows stay as they are, light ones are drawn and count as much as the threshold."""
+    weight = np.array([5.0, 0.1, 0.2, 3.0, 0.3, 0.4, 0.05, 0.05])
+    total = np.zeros(len(weight))
+    for seed in range(4000):
+        rows, new = thinned(weight, 4, np.random.default_rng(seed))
+        assert len(rows) == len(np.unique(rows)) == 4
+        assert new.sum() == pytest.approx(weight.sum())
+        assert dict(zip(rows, new, strict=True)).items() >= {0: 5.0, 3: 3.0}.items()
+        assert new[2:] == pytest.approx(1.1 / 2)
+        total[rows] += new
+    assert total / 4000 == pytest.approx(weight, abs=0.02)
+
+
+@pytest.mark.parametrize(("n", "kept"), [(8, 8), (9, 8), (7, 7), (1, 1)])
+def test_no_more_rows_are_kept_than_wanted(n, kept):
+    weight = np.random.default_rng(0).exponential(size=8)
+    rows, new = thinned(weight, n, np.random.default_rng(1))
+    assert len(rows) == kept and new.sum() == pytest.approx(weight.sum())
+    assert (n < 8) or np.array_equal(new, weight)
+
+
+def test_the_effective_number_counts_equal_weights():
+    assert effective_number(np.array([2.0, 2.0, 2.0, 0.0])) == pytest.approx(3.0)

@@ -45,6 +45,17 @@ def truncated_rows(log_weight: Array, n: int, rng: np.random.Generator) -> NDArr
     -------
     (n,) int array
         In random order.
+    """
+    return rng.permutation(systematic_rows(truncated(log_weight), n, rng))
+
+
+def truncated(log_weight: Array) -> Array:
+    """(m,) weights, none of which counts for more than the root of all rows.
+
+    Parameters
+    ----------
+    log_weight : (m,) array
+        -inf for a row without weight.
 
     References
     ----------
@@ -52,8 +63,49 @@ def truncated_rows(log_weight: Array, n: int, rng: np.random.Generator) -> NDArr
     times the root of all rows.
     """
     weight = np.exp(log_weight - log_weight.max())
-    weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
-    return rng.permutation(systematic_rows(weight, n, rng))
+    return np.asarray(np.minimum(weight, np.sqrt(len(weight)) * weight.mean()))
+
+
+def effective_number(weight: Array) -> float:
+    """How many equal weights would know as much as these (m,): (sum w)² / sum w²."""
+    return float(weight.sum() ** 2 / (weight**2).sum())
+
+
+def thinned(weight: Array, n: int, rng: np.random.Generator) -> tuple[NDArray[np.intp], Array]:
+    """At most n rows and new weights, which are the old ones on average.
+
+    Rows above a threshold stay as they are. The others are drawn in proportion to their weights and count as much as
+    the threshold: of all ways to keep n different rows, this one changes weights the least.
+
+    Parameters
+    ----------
+    weight : (m,) array
+        Positive.
+    n : int
+        Positive.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    rows : (k,) int array
+        All rows where there are no more than n.
+    weight : (k,) array
+
+    References
+    ----------
+    P. Fearnhead and P. Clifford, On-line inference for hidden Markov models via particle filters, J. R. Stat. Soc. B
+    65(4), 2003.
+    """
+    if len(weight) <= n:
+        return np.arange(len(weight)), weight
+    order = np.argsort(-weight, kind="stable")
+    falling = weight[order]
+    rest = np.cumsum(falling[::-1])[::-1]  # of each row and all lighter ones
+    sure = np.arange(n)
+    kept = int(np.argmax(falling[:n] * (n - sure) <= rest[:n]))  # the first row that no longer stays as it is
+    drawn = kept + np.unique(systematic_rows(falling[kept:], n - kept, rng))
+    rows = order[np.append(np.arange(kept), drawn)]
+    return rows, np.append(falling[:kept], np.full(len(drawn), rest[kept] / (n - kept)))
 
 
 def next_power(log_weight: Array, most: float, share: float) -> float:
@@ -76,8 +128,7 @@ def next_power(log_weight: Array, most: float, share: float) -> float:
     """
 
     def effective(power: float) -> float:
-        weight = np.exp(power * (log_weight - log_weight.max()))
-        return float(weight.sum() ** 2 / (weight**2).sum())
+        return effective_number(np.exp(power * (log_weight - log_weight.max())))
 
     if effective(most) >= share * len(log_weight):
         return most

@@ -102,23 +102,29 @@ def test_fixed_parameters_are_not_sampled():
     assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9)
 
 
-def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates():
-    """Parameters that lose the same tension in a hold lie at the same coordinate, whatever k2, U and N make of it."""
-    made = draw(
-        [Bench(resolution_N=0.0)], Truth({"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.3}), 1
-    )
+@pytest.mark.parametrize(("effect", "amplitude"), [(None, 0.0), ("permanent_creep.psi", 0.5), ("ageing.a", 0.6)])
+def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates(effect, amplitude):
+    """Parameters that lose the same tension in a hold lie at the same coordinate, whatever k2, U and N make of it.
+
+    So do those of which an effect changes the amount.
+    """
+    truth = {"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.3}
+    effects = () if effect is None else (named(effect.split(".")[0]),)
+    made = draw([Bench(resolution_N=0.0)], Truth(truth | ({effect: amplitude} if effect else {}), effects=effects), 1)
     coordinates, names = Transformation(made.problem), made.problem.names
     rng, column = np.random.default_rng(0), names.index("B")
     theta = np.repeat(made.theta, 200, axis=0)
     for name, spread in (("U", 0.2), ("k2", 0.5), ("N", 0.2)):
         theta[:, names.index(name)] *= np.exp(spread * rng.normal(size=200))
+    if effect:
+        theta[:, names.index(effect)] = rng.uniform(0.0, 1.0, 200)
     z = coordinates.to_sampled(theta)
     z[:, column] = coordinates.to_sampled(made.theta)[0, column]
     level = coordinates.to_natural(z)
 
     def lost(rows):
         own = made.problem.parameters(rows, made.problem.samples[0])
-        tension = simulate(made.problem.samples[0].protocol, own)
+        tension = simulate(made.problem.samples[0].protocol, own, made.problem.samples[0].model)
         return np.sqrt(((tension[:, 0] - tension[:, -1]) ** 2).mean(axis=0))
 
     assert np.log(lost(level)).std() < 0.15 * np.log(lost(theta)).std()

@@ -23,6 +23,7 @@ from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.modes import climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
@@ -87,15 +88,14 @@ class _Past:
             (*self.proposals, current), (*self.counts, len(new.z)),
         )  # fmt: skip
 
-    def points(self, wanted: NDArray[np.bool_], ess: float, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Draws that follow the sum of the wanted densities to a power, and the sum itself.
+    def points(self, wanted: NDArray[np.bool_], ess: float) -> tuple[Points, Points]:
+        """Points of the sum of the wanted densities to a power, and of the sum itself.
 
         Parameters
         ----------
         wanted : (m,) bool array
         ess : float
             Effective draws wanted of each density; those with fewer have greater shares.
-        rng : numpy Generator
         """
         drawn_from = mixture.log_sum(self.log_proposals + np.log(self.counts)[:, None])
         log_weight = self.log_density - drawn_from[:, None]
@@ -104,7 +104,7 @@ class _Past:
         share = np.clip(ess / found[known], 1.0, _MOST_SHARE)
         normalised = self.log_density[:, known] - logsumexp(log_weight[:, known], axis=0)
         together = np.logaddexp.reduce(normalised + np.log(share), axis=1)
-        hot, cold = (self.z[truncated_rows(power * together - drawn_from, _LEARNED, rng)] for power in (_HOT, 1.0))
+        hot, cold = (Points.weighted(self.z, power * together - drawn_from) for power in (_HOT, 1.0))
         return hot, cold
 
 
@@ -144,14 +144,18 @@ def sample(
     Weighted
     """
     known = np.concatenate([draws, near])
-    current = _learned(known, known, start, order, rng, start)
+    rough = Points.equal(known)
+    current = _learned(rough, rough, start, order, rng, start)
     remembered, witness = (points[rng.permutation(len(points))[:_WITNESSES]] for points in (known, draws))
     height = densities(witness)[:, 0]
     fresh = _weighted(densities, current, _FIRST, ess, rng)
     past = _Past(fresh.z, fresh.log_density, fresh.log_proposal[None], (current,), (len(fresh.z),))
     wanted = np.ones(len(fresh.settled), bool)
     for done in range(_ROUNDS):
-        hot, cold = (np.vstack([points, remembered]) for points in past.points(wanted, ess, rng))
+        hot, cold = (
+            each.joined(Points.equal(remembered).worth(_REMEMBERED * each.weight.sum()))
+            for each in past.points(wanted, ess)
+        )
         current = _learned(hot, cold, start, order, rng, current)
         needed = _RESERVE * len(fresh.z) * ess / np.maximum(effective(fresh.log_weight), 1.0)
         if done >= _PATIENCE and len(wanted) > 2:
@@ -254,8 +258,8 @@ def tail(log_weight: Array) -> float:
 
 
 def _learned(
-    hot: Array,
-    cold: Array,
+    hot: Points,
+    cold: Points,
     start: Mixture,
     order: NDArray[np.int64],
     rng: np.random.Generator,
@@ -283,7 +287,8 @@ _PATIENCE = 4  # rounds in which all densities are learned, whatever they need
 _AFFORDABLE = 16_000  # draws for a density among others; alone, one takes some 3,000
 _WITNESSES = 1250  # of the rough points, that are learned from in every round: what they know is not forgotten
 _LEAST_EXPECTED = 0.5  # of the effective draws wanted: what a thousand rough draws promise is known to a factor
-_LEARNED = 5000  # points that a proposal is learned from: it needs not be the best one
+_REMEMBERED = 0.25  # of what all draws are worth
+_LEARNED = 2500  # points that a proposal is learned from: it needs not be the best one
 _HOT = 0.4  # power of the densities that the wide parts of the proposal are fitted to
 _COMPONENTS = 8  # of the close part
 _RESERVE = 1.3  # draws beyond those that seem to be enough

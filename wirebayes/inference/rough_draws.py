@@ -11,6 +11,7 @@ from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture
 from wirebayes.inference.sampler.ensemble import sample
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
@@ -61,7 +62,7 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
         log_weight = height - drawn_from
         if effective(log_weight[:, None])[0] >= _ENOUGH and tail(log_weight) <= LARGEST_K:
             return z[truncated_rows(log_weight, n, rng)]
-        points = z[truncated_rows(_HOT * height - drawn_from, _LEARNED, rng)]
+        points = Points.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
         try:
             proposals.append(mixture.fit(points, rng, most=_COMPONENTS))
         except np.linalg.LinAlgError:

@@ -7,7 +7,8 @@ deviations of their prior. Then, one after the other,
 - log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
 - log B becomes the log tension lost in a hold, root mean square over the holds of the test, with the first readings
   taken as the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
-  creep is linear in B, so G does not depend on B and takes one pass along the holds.
+  creep is linear in B, so G does not depend on B and takes one pass along the holds. Effects on the amount of creep
+  belong to G.
 
 The map is triangular and these two steps have unit Jacobian. Values of partially pooled specimens come last
 (`wirebayes.inference.specimens`).
@@ -17,7 +18,7 @@ columns are ordered: errors before what they widen, the shape of the creep befor
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from wirebayes.inference.edges import edge
 from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
+from wirebayes.wire.compiled import has_formula
+from wirebayes.wire.effect import Effect, HoldContext, Placed
 
 # of points (m, d) and row numbers (m,): log densities (m,), and the same with their residuals (k, m)
 Density = Callable[[Array, Array], Array]
@@ -40,7 +43,10 @@ _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays i
 
 @dataclass(frozen=True)
 class _Ridge:
-    """Columns of one material's parameters (or fixed values), which of them are shifted, and the map's constants."""
+    """Columns of one material's parameters (or fixed values), which of them are shifted, and the map's constants.
+
+    `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured.
+    """
 
     where: dict[str, int]
     fixed: dict[str, float]
@@ -52,14 +58,22 @@ class _Ridge:
     kept: float
     hold_s: float
     log_length: float
+    effects: tuple[Effect, ...]
+    holds: tuple[HoldContext, ...]
 
-    def log_creep(self, U: Array, k2: Array, N: Array) -> Array:
+    def get(self, theta: Array, name: str) -> Any:
+        """(n,) a parameter of the material, or the number that it is fixed at."""
+        return theta[:, self.where[name]] if name in self.where else self.fixed[name]
+
+    def log_creep(self, U: Array, k2: Array, N: Array, theta: Array) -> Array:
         """log G: root mean square of the elongation gained in a hold, for B = 1.
 
         Parameters
         ----------
         U, k2, N : (n,) arrays
             Natural parameters.
+        theta : (n, d) array
+            Of all natural parameters, for the amplitudes of effects.
 
         Returns
         -------
@@ -70,8 +84,13 @@ class _Ridge:
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
         carried, square = 0.0 * reached[0], 0.0 * drive[0]
+        effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
         for j, time in enumerate(self.which_time):
-            gained = (drive[j] - self.kept * carried) * reached[time]
+            amount = drive[j] - self.kept * carried
+            if self.effects:
+                hold = replace(self.holds[j], carried=carried[None])
+                amount = effects.change("amount", amount[None], hold)[0]
+            gained = amount * reached[time]
             carried = carried + gained
             square = square + gained * gained
         # the floor keeps the logarithm finite
@@ -116,7 +135,14 @@ class Transformation:
             moved = frozenset({"k2", "B"} & {name for name in where if columns[name] not in shifted})
             shifted |= {columns[name] for name in moved}
             if moved:
-                self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood))
+                effects = tuple(e for e in sample.model.at("amount") if has_formula(e))  # others may ask for B
+                for column in (c for e in effects for c in e.columns()):
+                    name = problem.column(column, sample)
+                    if name in names:
+                        where[column] = names.index(name)
+                    else:
+                        fixed[column] = problem.prior.fixed[name]
+                self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood, effects))
 
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
@@ -176,16 +202,13 @@ class Transformation:
             out[:, self.specimens.own] = np.log(own / lines) / spreads
         return np.asarray(out.T)
 
-    def _get(self, theta: Array, ridge: _Ridge, name: str) -> Any:
-        return theta[:, ridge.where[name]] if name in ridge.where else ridge.fixed[name]
-
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
-        return np.asarray(self._get(theta, ridge, "N") * np.log(0.5 * ridge.hold_s))
+        return np.asarray(ridge.get(theta, "N") * np.log(0.5 * ridge.hold_s))
 
     def _shifts(self, theta: Array, ridge: _Ridge) -> tuple[Array, Array]:
-        k1, U, k2, N = (self._get(theta, ridge, name) for name in ("k1", "U", "k2", "N"))
+        k1, U, k2, N = (ridge.get(theta, name) for name in ("k1", "U", "k2", "N"))
         with np.errstate(all="ignore"):
-            creep = ridge.log_creep(U, k2, N) + np.log(k1) - ridge.log_length
+            creep = ridge.log_creep(U, k2, N, theta) + np.log(k1) - ridge.log_length
         return creep, self._hazard(theta, ridge)
 
 
@@ -201,6 +224,7 @@ def _ridge(
     steepest: float,
     sample: Sample,
     likelihood: str,
+    effects: tuple[Effect, ...],
 ) -> _Ridge:
     recorded = np.flatnonzero(sample.protocol.recorded)
     first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
@@ -211,7 +235,15 @@ def _ridge(
     times, which = np.unique(np.where(duration > 0, duration, hold_s), return_inverse=True)
     kept = 1.0 if sample.model.history == "saturating" and likelihood == "chain" else 0.0
     length = sample.model.length_ref_mm or sample.protocol.length_mm
-    return _Ridge(where, fixed, shifted, steepest, np.log(tension), times, which, kept, hold_s, float(np.log(length)))
+    holds = tuple(
+        HoldContext(**hold, length_ref_mm=length, tension_ref_N=sample.model.tension_ref_N, theta={},
+                    initial_tension=np.full((1, 1), first))
+        for hold, first in zip(sample.protocol.holds, tension, strict=True)
+    )  # fmt: skip
+    return _Ridge(
+        where, fixed, shifted, steepest, np.log(tension), times, which, kept, hold_s, float(np.log(length)),
+        effects, holds,
+    )  # fmt: skip
 
 
 def _spread(distribution: Any) -> float:

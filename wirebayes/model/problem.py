@@ -77,18 +77,27 @@ class Problem:
     def names(self) -> tuple[str, ...]:
         return self.prior.names
 
+    def column(self, name: str, sample: Sample) -> str:
+        """The column, or fixed parameter, that holds a parameter of one sample: the most specific one.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        """
+        for candidate in (f"{name}[{sample.name}]", f"{name}[{sample.material}]", name):
+            if candidate in self.prior.distributions or candidate in self.prior.fixed:
+                return candidate
+        raise KeyError(name)
+
     def parameters(self, theta: Array, sample: Sample) -> dict[str, Array]:
         """The parameters of one sample, each (n,), from an (n, d) array of all columns."""
         columns = dict(zip(self.names, np.ascontiguousarray(theta.T), strict=True))
         n = len(theta)
 
         def find(name: str) -> Array:
-            for candidate in (f"{name}[{sample.name}]", f"{name}[{sample.material}]", name):
-                if candidate in columns:
-                    return columns[candidate]
-                if candidate in self.prior.fixed:
-                    return np.full(n, self.prior.fixed[candidate])
-            raise KeyError(name)
+            column = self.column(name, sample)
+            return columns[column] if column in columns else np.full(n, self.prior.fixed[column])
 
         wanted = MATERIAL + (SAMPLE if self.likelihood == "chain" else ("sensor_sd",))
         out = {name: find(name) for name in wanted}

@@ -12,10 +12,16 @@ from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
+from wirebayes.resampling import effective_number
 
 D = 3
 NORMAL = Mixture(np.ones(1), np.zeros((1, D)), np.eye(D)[None], 1e6)
+
+
+def mean(points: Points) -> float:
+    return float(np.average(points.z[:, 0], weights=points.weight))
 
 
 def test_ensembles_begin_at_places_of_their_own_by_weight() -> None:
@@ -33,11 +39,27 @@ def test_warm_and_cold_draws_follow_their_densities() -> None:
     """Two places as often as each other, one three times as dense: the warm density is the power 0.4 of that."""
     z = np.repeat([[0.0], [1.0]], 500, axis=0)
     value = np.log(3.0) * z[:, 0]
-    hot, cold = burn_in._resampled_twice(z, value, np.zeros(1000), np.random.default_rng(2))
-    assert cold.mean() == pytest.approx(0.75, abs=0.002)
-    assert hot.mean() == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4), abs=0.002)
-    cold = burn_in._resampled_twice(z, value, value, np.random.default_rng(2))[1]  # places that came by weight
-    assert cold.mean() == pytest.approx(0.5, abs=0.002)
+    hot, cold = burn_in._weighted_twice(z, value, np.zeros(1000))
+    assert mean(cold) == pytest.approx(0.75)
+    assert mean(hot) == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4))
+    cold = burn_in._weighted_twice(z, value, value)[1]  # places that came by weight
+    assert mean(cold) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("share", "power"), [(0.12, 1.0), (0.08, None)])
+def test_where_few_places_have_all_the_weight_they_stand_for_a_density_on_the_way(
+    share: float, power: float | None
+) -> None:
+    """A tenth of the places is effective at least; of more the weights are taken as they are."""
+    z = np.arange(4000.0)[:, None]
+    value = np.where(z[:, 0] < share * 4000, 6.0, 0.0)
+    _, cold = burn_in._weighted_twice(z, value, np.zeros(4000))
+    exact = Points.weighted(z, value)
+    assert np.array_equal(cold.weight, exact.weight) is (power is not None)
+    assert effective_number(exact.weight) == pytest.approx(4000 * share, rel=0.2)
+    if power is None:
+        assert effective_number(cold.weight) == pytest.approx(400, rel=1e-6)
+        assert np.log(np.unique(cold.weight)[-1] / cold.weight[-1]) < 6.0
 
 
 def test_the_start_has_no_walker_where_the_density_is_zero() -> None:
@@ -173,9 +195,9 @@ def test_kept_draws_are_learned_from_as_burn_in(
     overlooked: float, rounds_left: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One more round; four where places were overlooked, which are rare."""
-    seen: dict[str, np.ndarray] = {}
+    seen: dict[str, Points] = {}
 
-    def fitted(target: object, state: BurnIn, policy: Policy, hot: np.ndarray, cold: np.ndarray) -> BurnIn:
+    def fitted(target: object, state: BurnIn, policy: Policy, hot: Points, cold: Points) -> BurnIn:
         seen.update(hot=hot, cold=cold)
         return state
 
@@ -189,8 +211,8 @@ def test_kept_draws_are_learned_from_as_burn_in(
     found = burn_in.again(None, state, policy)  # type: ignore[arg-type]
     assert (found.learned.again, found.evaluations) == (3, 11)
     assert (policy.most_rounds if overlooked else policy.rounds) - found.round == rounds_left
-    assert len(seen["cold"]) == 1000 and seen["cold"].mean() == 0.75
-    assert seen["hot"].mean() == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4), abs=0.002)
+    assert seen["cold"].weight.sum() == pytest.approx(1000) and mean(seen["cold"]) == pytest.approx(0.75)
+    assert mean(seen["hot"]) == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4))
 
 
 def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:
@@ -239,10 +261,8 @@ class Watched:
         z = np.arange(len(weight), dtype=float)[:, None]
         walk = np.full((4, 1), -1.0), np.zeros(4), np.zeros(4)
 
-        def fitted(
-            target: object, state: BurnIn, policy: Policy, hot: np.ndarray, cold: np.ndarray, **more: int
-        ) -> BurnIn:
-            self.did.append(("learned from the walk" if (cold < 0).all() else "learned", more))
+        def fitted(target: object, state: BurnIn, policy: Policy, hot: Points, cold: Points, **more: int) -> BurnIn:
+            self.did.append(("learned from the walk" if (cold.z < 0).all() else "learned", more))
             return state
 
         def frozen(target: object, state: BurnIn, policy: Policy, drawn: object, steps: int) -> int:
@@ -271,7 +291,7 @@ def test_a_walk_teaches_while_hardly_a_draw_would_be_accepted(
     state = burn_in.step(None, burning().knowing(acceptance=acceptance), Policy(rounds=5))  # type: ignore[arg-type]
     assert isinstance(state, BurnIn) and state.round == 1 and state.learned.acceptance > 0.5
     first = ["walked", ("learned from the walk", {})] if walks else []
-    assert watched.did == [*first, ("learned", {"points": 5000})]
+    assert watched.did == [*first, ("learned", {"points": 4000})]
 
 
 @pytest.mark.parametrize(
@@ -292,7 +312,7 @@ def test_after_the_last_round_walkers_have_the_steps_that_great_weights_take(
     watched = Watched(monkeypatch, tenth(gap))
     state = replace(burning(), round=round_)
     found = burn_in.step(None, state, Policy(rounds=3, most_rounds=9, tail=1.5))  # type: ignore[arg-type]
-    assert watched.did == [("learned", {"points": 5000 if steps is None else 12000})]
+    assert watched.did == [("learned", {"points": 4000 if steps is None else 12000})]
     assert isinstance(found, BurnIn) if steps is None else found == steps
 
 
@@ -317,14 +337,14 @@ def test_the_proposal_is_fitted_to_this_round_and_the_one_before(monkeypatch: py
     asked: list[dict[str, object]] = []
     new = object()
 
-    def fit(hot: np.ndarray, cold: np.ndarray, *given: object, **more: object) -> object:
-        asked.append({"hot": hot.tolist(), "cold": cold.tolist(), "given": given, **more})
+    def fit(hot: Points, cold: Points, *given: object, **more: object) -> object:
+        asked.append({"hot": hot.z.tolist(), "cold": cold.z.tolist(), "given": given, **more})
         if len(asked) == 4:
             raise np.linalg.LinAlgError("points do not span their space")
         return new
 
     monkeypatch.setattr(burn_in.proposal, "fit", fit)
-    target, rows = gaussian(1), [np.full((1, 1), float(i)) for i in range(6)]
+    target, rows = gaussian(1), [Points.equal(np.full((1, 1), float(i))) for i in range(6)]
     state = burning()
     for modes, (hot, cold) in zip((7, 2, 99), zip(rows[::2], rows[1::2], strict=True), strict=True):
         state = burn_in._fitted(target, state.knowing(modes=modes), Policy(components=6), hot, cold)  # type: ignore[arg-type]
@@ -345,8 +365,8 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
     target = gaussian(D)
     taught: list[tuple[object, ...]] = []
 
-    def fit(hot: np.ndarray, cold: np.ndarray, start: Mixture, *given: object, **more: object) -> object:
-        taught.append((hot, cold, given[2]))
+    def fit(hot: Points, cold: Points, start: Mixture, *given: object, **more: object) -> object:
+        taught.append((hot.z.tolist(), cold.z.tolist(), given[2]))
         return "proposal"
 
     monkeypatch.setattr(burn_in.proposal, "fit", fit)
@@ -354,7 +374,7 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
     curvature = np.stack([np.eye(D), 0.5 * np.eye(D)])
     height = evidence + 0.5 * np.linalg.slogdet(curvature)[1]
     known = Optimum(np.stack([target.mean, target.mean + 1.0]), height, curvature, np.ones(2, bool))
-    rough = target.mean + np.zeros((5, D))
+    rough = target.mean + np.arange(5.0)[:, None]
     policy = Policy(ensembles=2, walkers=40)
     plain, learned = (burn_in.init(target, 1, policy, known, None, points) for points in (None, rough))  # type: ignore[arg-type]
     start = plain.learned.start
@@ -365,4 +385,4 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
     assert plain.learned.witness is None and plain.evaluations == learned.evaluations == target.evaluations / 2 > 0
     assert len(plain.walkers.positions) == 2 * 10 and plain.round == 0  # a quarter of the walkers
     assert learned.learned.proposal == "proposal" and learned.learned.acceptance == 1.0 and learned.seen is None
-    assert taught == [(rough, rough, proposal.ROUGH_SHARES)]
+    assert taught == [(rough.tolist(), rough.tolist(), proposal.ROUGH_SHARES)]

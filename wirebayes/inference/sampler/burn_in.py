@@ -20,10 +20,11 @@ from wirebayes.inference.modes import Optimum, search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.inference.sampler.state import BurnIn, Learned, Pair, Sampling, Walkers, advance, move_of
+from wirebayes.inference.sampler.state import BurnIn, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.resampling import truncated_rows
+from wirebayes.resampling import next_power, truncated_rows
 from wirebayes.typing import Array
 
 
@@ -54,11 +55,11 @@ def init(
     spawned = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
-    seen: Pair | None = None if rough is None else (rough, rough)
-    witness: Pair | None = None
+    seen = None if rough is None else (Points.equal(rough), Points.equal(rough))
+    witness = None
     if found is None:
         searched = search(target, rng, extra=near)
-        found, seen = searched.modes, seen or (searched.warm, searched.cold)
+        found, seen = searched.modes, seen or (Points.equal(searched.warm), Points.equal(searched.cold))
         witness = searched.cold, searched.height
     known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
     random = np.random.RandomState(np.random.MT19937(spawned[1]))
@@ -90,7 +91,7 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
     state = replace(state, round=state.round + 1)
     if state.learned.acceptance < _USEFUL:
         state, walk = _walked(target, state, policy)
-        state = _fitted(target, state, policy, *_resampled_twice(*walk, state.generator))
+        state = _fitted(target, state, policy, *_weighted_twice(*walk))
     state, (z, value, base) = _drawn(target, state, policy)
     weight = value - base
     typical = weight[truncated_rows(weight, len(weight), state.generator)]
@@ -100,7 +101,7 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
     settled = acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
     last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
     if acceptance >= _USEFUL:
-        seen = _resampled_twice(z, value, base, state.generator)
+        seen = _weighted_twice(z, value, base)
         state = _fitted(target, state, policy, *seen, points=proposal.ENOUGH if last else _PASSING)
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
     steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
@@ -137,8 +138,8 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     done = policy.rounds - 1
     if learned.overlooked:  # few rounds of many draws: what is overlooked is rare
         done = max(done, policy.most_rounds - _FEW_ROUNDS)
-    hot = z[truncated_rows((_HOT - 1.0) * value, len(z), state.generator)]
-    return _fitted(target, BurnIn(state.walkers, learned, state.generator, state.evaluations, done), policy, hot, z)
+    seen = _weighted_twice(z, value, value)
+    return _fitted(target, BurnIn(state.walkers, learned, state.generator, state.evaluations, done), policy, *seen)
 
 
 def overlooked(learned: Learned, z: Array, value: Array) -> float:
@@ -198,15 +199,15 @@ def _fitted(
     target: LogPosterior,
     state: BurnIn,
     policy: Policy,
-    hot: Array,
-    cold: Array,
+    hot: Points,
+    cold: Points,
     shares: tuple[float, float, float, float] = proposal.EXPLORING,
     points: int = proposal.ENOUGH,
 ) -> BurnIn:
-    """Fit the proposal to draws of the warm density and of the density, and to those of the round before."""
+    """Fit the proposal to points of the warm density and of the density, and to those of the round before."""
     learned, before, state = state.learned, state.seen, replace(state, seen=(hot, cold))
     if before is not None:
-        hot, cold = np.vstack([before[0], hot]), np.vstack([before[1], cold])
+        hot, cold = before[0].joined(hot), before[1].joined(cold)
     try:
         new = proposal.fit(
             hot, cold, learned.start, target.coordinates.order, state.generator, shares,
@@ -218,9 +219,19 @@ def _fitted(
     return state.knowing(proposal=new)
 
 
-def _resampled_twice(z: Array, value: Array, base: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Draws of the warm density and of the density, from places whose log density of being there is `base`."""
-    hot, cold = (z[truncated_rows(power * value - base, len(z), rng)] for power in (_HOT, 1.0))
+def _weighted_twice(z: Array, value: Array, base: Array) -> tuple[Points, Points]:
+    """Points of the warm density and of the density, from places whose log density of being there is `base`.
+
+    Where a few of them would have all the weight, they stand for a density between the two instead, the one they came
+    from and the one wanted: weights are taken to the largest power that leaves a tenth of the places effective. The
+    next round goes on from there, while a mixture learned from a dozen points would be no better than the last.
+
+    References
+    ----------
+    A. Korba and F. Portier, Adaptive importance sampling meets mirror descent: a bias-variance tradeoff, AISTATS 2022.
+    """
+    wanted = [power * value - base for power in (_HOT, 1.0)]
+    hot, cold = (Points.weighted(z, next_power(weight, 1.0, _EFFECTIVE) * weight) for weight in wanted)
     return hot, cold
 
 
@@ -254,9 +265,10 @@ def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> 
 _OVERDISPERSED = 1.7
 _WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the longer the more often it has to
 _HOT = 0.4  # power of the density that the wide part of the proposal is fitted to
+_EFFECTIVE = 0.1  # of the places that a proposal is learned from
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
 _GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, independent draws are some 7 steps apart
-_PASSING = 5000  # points for a proposal that only the next round draws from
+_PASSING = 4000  # points for a proposal that only the next round draws from
 _IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are the full number of draws; the fewest before
 _TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where the last proposal overlooked places
 # steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8

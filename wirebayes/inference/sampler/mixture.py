@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln
 
+from wirebayes.inference.sampler.points import Points
 from wirebayes.typing import Array
 
 DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
@@ -84,14 +85,18 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
 
 
 def fit(
-    x: Array, rng: np.random.Generator, *, most: int = 8, degrees: float = DEGREES, before: Mixture | None = None
+    points: Points,
+    rng: np.random.Generator,
+    *,
+    most: int = 8,
+    degrees: float = DEGREES,
+    before: Mixture | None = None,
 ) -> Mixture:
     """The mixture of as many components as points can hold apart.
 
     Parameters
     ----------
-    x : (n, d) array
-        Points of equal weight.
+    points : Points
     rng : numpy.random.Generator
         Draws the starts.
     most : int
@@ -110,9 +115,11 @@ def fit(
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    d = x.shape[1]
-    middle = x.mean(axis=0)
-    root = np.linalg.cholesky(np.cov(x.T).reshape(d, d) + 1e-9 * np.diag(x.var(axis=0)))
+    x, d = points.z, points.z.shape[1]
+    share = points.weight / points.weight.sum()
+    middle = share @ x
+    scale = ((x - middle) * share[:, None]).T @ (x - middle)
+    root = np.linalg.cholesky(scale + 1e-9 * np.diag(np.diag(scale)))
     x = np.linalg.solve(root, (x - middle).T).T
 
     def starts() -> Iterator[Mixture]:
@@ -120,22 +127,22 @@ def fit(
             centres = np.linalg.solve(root, (before.centres - middle).T).T
             yield Mixture(before.weights, centres, np.linalg.solve(root, before.factors), degrees)
         for k in range(most, 0, -1):
-            centres = x[spread_rows(x, k, rng)]
+            centres = x[spread_rows(x, k, rng, share)]
             if len(centres) == k:
                 yield Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0), degrees)
 
     for start in starts():
         try:
-            found = _em(x, start)
+            found = _em(x, points.weight, start)
         except np.linalg.LinAlgError:
             continue
         return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors, degrees)
     raise np.linalg.LinAlgError("the points do not span their space")
 
 
-def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
+def _em(x: Array, weight: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
     """Expectation-maximisation, in single precision: half the work, and no proposal needs more than a few digits."""
-    x = x.astype(np.float32)
+    x, weight = x.astype(np.float32), weight.astype(np.float32)
     (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
     last = -np.inf
@@ -143,27 +150,28 @@ def _em(x: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
         distances = mixture._distances(x)
         logs = mixture._log_parts(distances)
         total = log_sum(logs)
-        share = np.exp(logs - total)
+        share = np.exp(logs - total) * weight
+        members = share.sum(axis=1, dtype=float)
         # A component that holds too few points for its own covariance takes the others with it: stop there.
-        if (share.sum(axis=1) < 3.0 * d).any():
+        if not (members >= 3.0 * d).all():
             raise np.linalg.LinAlgError("empty component")
         heavy = share * (degrees + d) / (degrees + distances)
         mass = heavy.sum(axis=1)
         centres = (heavy @ x) / mass[:, None]
         scale = (heavy @ squares).reshape(k, d, d) - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
-        centres, scale, members = centres.astype(float), scale.astype(float), share.sum(axis=1, dtype=float)
-        # a walker that stayed repeats its point: without a share of all points, a component shrinks onto that
+        centres, scale = centres.astype(float), scale.astype(float)
+        # without a share of all points, a component that holds few of them shrinks onto those
         scale += _OF_THE_WHOLE * np.eye(d)
         factors = np.linalg.cholesky(scale / (members + _OF_THE_WHOLE)[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
-        log_likelihood = float(total.sum(dtype=float))
-        if log_likelihood - last < 4e-3 * n:
+        log_likelihood = float(weight @ total)
+        if log_likelihood - last < 4e-3 * members.sum():
             break
         last = log_likelihood
     return mixture
 
 
-def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
+def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None = None) -> list[int]:
     """Rows far from one another, for a start (k-means++).
 
     Parameters
@@ -172,16 +180,19 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator) -> list[int]:
     k : int
         How many rows.
     rng : numpy.random.Generator
+    weight : (n,) array, optional
+        Of the rows, summing to one.
 
     Returns
     -------
     list of int
         Fewer than `k` where there are not so many different points.
     """
-    chosen = [int(rng.integers(len(x)))]
+    share = np.full(len(x), 1.0 / len(x)) if weight is None else weight
+    chosen = [int(rng.choice(len(x), p=share))]
     nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)
     while len(chosen) < k and nearest.any():
-        chosen.append(int(rng.choice(len(x), p=nearest / nearest.sum())))
+        chosen.append(int(rng.choice(len(x), p=share * nearest / (share @ nearest))))
         nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
     return chosen
 

@@ -6,7 +6,7 @@ coordinates where the straightening map extrapolates badly. The mixture of the s
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.transport_map import Straight
 from wirebayes.typing import Array
 
@@ -72,8 +73,8 @@ class Proposal:
 
 
 def fit(
-    hot: Array,
-    cold: Array,
+    hot: Points,
+    cold: Points,
     start: Mixture,
     order: NDArray[np.int64],
     rng: np.random.Generator,
@@ -93,8 +94,8 @@ def fit(
 
     Parameters
     ----------
-    hot, cold : (n, d) arrays
-        Points of the posterior to a power below one, which reach its tails, and of the posterior itself.
+    hot, cold : Points
+        Of the posterior to a power below one, which reach its tails, and of the posterior itself.
     start : Mixture
         What was known before any walk.
     order : (d,) array of int
@@ -105,7 +106,7 @@ def fit(
     most : int
         The most components of the close mixture; the wide ones, which need not resemble anything, have half as many.
     points : int
-        About so many are looked at.
+        At most so many are looked at.
     before : Proposal, optional
         Of nearly these points: where the mixtures are sought from.
     along_tails : bool
@@ -116,14 +117,18 @@ def fit(
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    hot, cold = hot[:: 1 + len(hot) // points], cold[:: 1 + len(cold) // points]
-    elsewhere = before is None or (hot.std(axis=0) > _ELSEWHERE * cold.std(axis=0)).any()
+    hot, cold = hot.thinned(points, rng), cold.thinned(points, rng)
+    elsewhere = before is None or (hot.spread > _ELSEWHERE * cold.spread).any()
     straight = transport_map.fit(hot if along_tails and not elsewhere else cold, order)
-    (near, _), (far, _) = straight.forward(cold), straight.forward(hot)
-    close = mixture.fit(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None)
-    wide = mixture.fit(far[::2], rng, most=most // 2, before=before.wide if before else None)
-    plain = mixture.fit(hot[::2], rng, most=most // 2, before=before.plain if before else None)
-    return Proposal(shares, straight, close, wide, plain, start)
+    near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
+    far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
+    return Proposal(
+        shares, straight,
+        mixture.fit(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None),
+        mixture.fit(far, rng, most=most // 2, before=before.wide if before else None),
+        mixture.fit(plain, rng, most=most // 2, before=before.plain if before else None),
+        start,
+    )  # fmt: skip
 
 
 _MIXTURES = ("close", "wide", "plain", "start")

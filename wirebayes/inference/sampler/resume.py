@@ -9,6 +9,7 @@ import numpy as np
 
 from wirebayes.inference.sampler import checkpoint
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, State, Walkers
 from wirebayes.io.run_folder import stored_results
@@ -70,7 +71,8 @@ def to_arrays(state: State) -> dict[str, Any]:
         "witness": _numbered(learned.witness),
     }
     if isinstance(state, BurnIn):
-        return out | {"walk": _numbered(state.walk), "seen": _numbered(state.seen)}
+        seen = {} if state.seen is None else {"hot": asdict(state.seen[0]), "cold": asdict(state.seen[1])}
+        return out | {"walk": _numbered(state.walk), "seen": seen}
     kept = state.kept
     blocks = {name: np.concatenate(v) for name, v in (("z", kept.z), ("log_density", kept.log_density)) if v}
     return out | {"kept": blocks} | (asdict(state.diagnostics) if state.diagnostics else {})
@@ -92,7 +94,8 @@ def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
     walkers = Walkers(arrays["positions"], arrays["values"], random)
     run = walkers, learned, generator, values["evaluations"]
     if values["stage"] == "burn-in":
-        return BurnIn(*run, values["round"], _tuple(arrays, "walk"), _tuple(arrays, "seen"))
+        seen = (Points(**arrays["seen"]["hot"]), Points(**arrays["seen"]["cold"])) if "seen" in arrays else None
+        return BurnIn(*run, values["round"], _tuple(arrays, "walk"), seen)
     blocks = arrays.get("kept", {})
     z, log_density = ((blocks[name],) if name in blocks else () for name in ("z", "log_density"))
     kept = Kept(z, log_density, **values["kept"])

@@ -15,11 +15,11 @@ from emcee.moves.move import Move
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
+from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
 
-Pair = tuple[Array, Array]
 POOL = 64  # steps of which one does not trust the proposal; more gain little
 _EXPLORING = 3  # the same in burn-in, which looks for what the proposal leaves out
 
@@ -68,7 +68,7 @@ class Learned:
     proposal: Mixture | Proposal
     start: Mixture
     modes: int
-    witness: Pair | None = None
+    witness: tuple[Array, Array] | None = None
     trusted: bool = True
     acceptance: float = 0.0
     walks: int = 0
@@ -90,8 +90,8 @@ class BurnIn:
     round : int
     walk : tuple of arrays, optional
         Places that the last walk came by, their log densities, and the log density walked.
-    seen : tuple of arrays, optional
-        What the proposal was last fitted to.
+    seen : tuple of Points, optional
+        Hot and cold points that the proposal was last fitted to.
     """
 
     walkers: Walkers
@@ -100,7 +100,7 @@ class BurnIn:
     evaluations: int
     round: int = 0
     walk: tuple[Array, Array, Array] | None = None
-    seen: Pair | None = None
+    seen: tuple[Points, Points] | None = None
 
     def knowing(self, **changes: Any) -> "BurnIn":
         """The state with something else learned."""

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from wirebayes.inference.sampler.points import Points
 from wirebayes.typing import Array
 
 
@@ -97,50 +98,60 @@ class Straight:
         return x
 
 
-def fit(x: Array, order: NDArray[np.int64]) -> Straight:
-    """The map that straightens points (n, d): weighted regressions, coordinate by coordinate.
+def fit(points: Points, order: NDArray[np.int64]) -> Straight:
+    """The map that straightens points: weighted regressions, coordinate by coordinate.
+
+    Parameters
+    ----------
+    points : Points
+    order : (d,) array of int
+        In which coordinates are straightened.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    x = x[:, order]
-    n, d = x.shape
-    centre, scale = x.mean(axis=0), x.std(axis=0)
+    x, weight = points.z[:, order], points.weight
+    (n, d), worth = x.shape, weight.sum()
+    centre = weight @ x / worth
+    scale = np.sqrt(weight @ (x - centre) ** 2 / worth)
     if not (scale > 0).all():
         raise np.linalg.LinAlgError("the points do not span their space")
     v = (x - centre) / scale
     constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
-    clear = _CLEAR * np.sqrt(n / len(np.unique(x[:, 0])))  # rows that repeat know no more
-    every = d**3 / 6.0 < n / _POINTS_A_TERM
+    clear = _CLEAR * np.sqrt(worth / points.distinct)  # draws that repeat know no more
+    every = d**3 / 6.0 < worth / _POINTS_A_TERM
     spread, left = np.zeros((n, d)), np.zeros((n, d))
     for j in range(d):
         lines = np.column_stack([np.ones(n), v[:, :j]])
         one, other = np.triu_indices(j if every or d > _FEW else 0)
         if not every and d > _FEW:
-            one, other = _seen_at_once(v, lines, one, other, v[:, j], clear)
+            one, other = _seen_at_once(v, lines, one, other, v[:, j], weight, clear)
         terms = np.column_stack([lines, v[:, one] * v[:, other]])
-        _, _, t = _regress(terms, lines, v[:, j])
+        of_mean, of_scale, t = _regress(terms, lines, v[:, j], weight)
         # Far out a bend that is only noise throws everything aside: none without evidence.
         kept = np.abs(t[j + 1 :]) > clear
-        one, other = one[kept], other[kept]
-        terms = terms[:, np.concatenate([np.ones(j + 1, bool), kept])]
-        of_mean, of_scale, _ = _regress(terms, lines, v[:, j])
+        if not kept.all():
+            one, other = one[kept], other[kept]
+            terms = terms[:, np.concatenate([np.ones(j + 1, bool), kept])]
+            of_mean, of_scale, _ = _regress(terms, lines, v[:, j], weight, of_scale)
         constant[j], linear[j, :j] = of_mean[0], of_mean[1 : j + 1]
         np.add.at(quadratic[j], (one, other), of_mean[j + 1 :])
         np.add.at(quadratic[j], (other, one), of_mean[j + 1 :])
         log_scale[j, : j + 1] = of_scale
         spread[:, j] = lines @ of_scale
         left[:, j] = (v[:, j] - terms @ of_mean) * np.exp(-spread[:, j])
+    if not np.isfinite(left).all():
+        raise np.linalg.LinAlgError("the points do not settle the scales")
     return Straight(
         order, centre, scale, v.min(axis=0), v.max(axis=0), constant, linear, quadratic, log_scale,
-        spread.min(axis=0), spread.max(axis=0), _shapes(left),
+        spread.min(axis=0), spread.max(axis=0), _shapes(left, weight),
     )  # fmt: skip
 
 
 def _seen_at_once(
-    v: Array, lines: Array, one: NDArray[np.int64], other: NDArray[np.int64], y: Array, clear: float
+    v: Array, lines: Array, one: NDArray[np.int64], other: NDArray[np.int64], y: Array, weight: Array, clear: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The pairs whose product, alone, clearly explains what straight lines leave of y; the clearest few.
 
@@ -148,11 +159,12 @@ def _seen_at_once(
     """
     if not len(one):
         return one, other
-    products = v[:, one] * v[:, other]
-    both, basis = np.column_stack([products, y]), np.linalg.qr(lines)[0]
+    root = np.sqrt(weight)[:, None]
+    both = root * np.column_stack([v[:, one] * v[:, other], y])
+    basis = np.linalg.qr(root * lines)[0]
     left = both - basis @ (basis.T @ both)
     size = np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
-    t = np.abs(left[:, :-1].T @ left[:, -1]) / (size[:-1] * size[-1]) * np.sqrt(len(y))
+    t = np.abs(left[:, :-1].T @ left[:, -1]) / (size[:-1] * size[-1]) * np.sqrt(weight.sum())
     best = np.argsort(-t, kind="stable")[:_MOST_PAIRS]
     best = np.sort(best[t[best] > clear])
     return one[best], other[best]
@@ -167,14 +179,15 @@ def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
     return w * even - root * odd, (even - w / root * odd) / width
 
 
-def _shapes(x: Array) -> Array:
-    """(3, m) shapes of points (n, m), by which their quantiles come nearest to those of a normal.
+def _shapes(x: Array, weight: Array) -> Array:
+    """(3, m) shapes of weighted points (n, m), by which their quantiles come nearest to those of a normal.
 
     For each of many skewnesses location and width are a weighted straight-line fit; the weights, slopes of the map,
     make of a distance between quantiles one between scores.
     """
-    middle, spread = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
-    quantiles = (np.quantile(x, ndtr(_SCORES), axis=0) - middle) / spread
+    middle = weight @ x / weight.sum()
+    spread = np.maximum(np.sqrt(weight @ (x - middle) ** 2 / weight.sum()), 1e-12)
+    quantiles = (_quantiles(x, weight, ndtr(_SCORES)) - middle) / spread
     inner = np.arcsinh(_SCORES) + _SKEWNESSES[:, None]
     curve, slope = np.sinh(inner), np.cosh(inner) / np.sqrt(1.0 + _SCORES**2)
     lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope[..., None]
@@ -186,32 +199,48 @@ def _shapes(x: Array) -> Array:
     return np.array([middle + spread * location[best, m], spread * width[best, m], _SKEWNESSES[best]])
 
 
-def _regress(terms: Array, lines: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Coefficients of the mean and of the log scale of y, each fitted in turn given the other; the mean's t values."""
-    n = len(y)
-    of_scale, weight = np.zeros(lines.shape[1]), np.ones(n)
-    bend = _RIDGE * n * np.eye(terms.shape[1])
-    information = 2.0 * lines.T @ lines + _RIDGE * n * np.eye(lines.shape[1])
+def _quantiles(x: Array, weight: Array, shares: Array) -> Array:
+    """(k, m) quantiles of weighted points (n, m)."""
+    rows = np.argsort(x, axis=0)
+    until = np.cumsum(weight[rows], axis=0)
+    until = (until - 0.5 * weight[rows]) / until[-1]
+    return np.stack([np.interp(shares, until[:, j], x[rows[:, j], j]) for j in range(x.shape[1])], axis=1)
+
+
+def _regress(
+    terms: Array, lines: Array, y: Array, points: Array, of_scale: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """Coefficients of the mean and of the log scale of y, each fitted in turn given the other; the mean's t values.
+
+    `points` (n,) are weights of the rows, `of_scale` is what the log scale is sought from.
+    """
+    worth = points.sum()
+    of_scale = np.zeros(lines.shape[1]) if of_scale is None else of_scale
+    bend = _RIDGE * worth * np.eye(terms.shape[1])
+    information = 2.0 * (lines.T * points) @ lines + _RIDGE * worth * np.eye(lines.shape[1])
+
+    def weights() -> Array:
+        weight = points * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0))
+        return np.asarray(weight * (worth / weight.sum()))
+
     for _ in range(_ALTERNATIONS):
-        weighted = terms * weight[:, None]
-        of_mean = np.linalg.solve(weighted.T @ terms + bend, weighted.T @ y)
+        weighted = terms.T * weights()
+        of_mean = np.linalg.solve(weighted @ terms + bend, weighted @ y)
         # a point far out says where the scale grows, but no single one decides
         square = np.minimum((y - terms @ of_mean) ** 2 * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0)), 9.0)
-        step = np.linalg.solve(information, lines.T @ (square - 1.0))
+        step = np.linalg.solve(information, lines.T @ (points * (square - 1.0)))
         of_scale = of_scale + step
-        weight = np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0))
-        weight /= weight.mean()
-        if ((lines @ step) ** 2).mean() < _SETTLED**2:
+        if points @ (lines @ step) ** 2 < _SETTLED**2 * worth:
             break
-    weighted = terms * weight[:, None]
-    inverse = np.linalg.inv(weighted.T @ terms + bend)
-    variance = (weight * (y - terms @ of_mean) ** 2).mean()
+    weight = weights()
+    inverse = np.linalg.inv((terms.T * weight) @ terms + bend)
+    variance = weight @ (y - terms @ of_mean) ** 2 / worth
     return of_mean, of_scale, of_mean / np.sqrt(variance * np.diag(inverse))
 
 
 # a usual figure for regressions; with fewer the d³/6 bends are tried one by one instead of together
 _POINTS_A_TERM = 20
-# of the information in n points: terms that say nearly the same stay solvable, and others lose a thousandth
+# of the information in all points: terms that say nearly the same stay solvable, and others lose a thousandth
 _RIDGE = 1e-3
 _CLEAR = 4.0  # standard errors
 _FEW, _MOST_PAIRS = 12, 30  # dimensions in which rough points settle no bends; bends of a coordinate in more
