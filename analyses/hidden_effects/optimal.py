@@ -17,6 +17,7 @@ from .catalogue import EFFECTS, Candidate, library, members
 from .delta import Geometry, delta_curves, signature
 from .fitting import delta_after_refit
 from .generator import simulate
+from .optimal_blind import answers
 from .optimal_sets import DELTA_RANGE, SEPARABLE, Directions, left_over, optimal_mixed, optimal_names
 from .rig import Array, Index, Mask
 
@@ -162,14 +163,15 @@ def _several(
         names,
     )
     z = signature(geo, [list(case.hidden)])[0]
+    removed = case.spec.names if case.spec.kind == "without" else ()
+    result: dict[str, Any] = {"blind": answers(geo, directions.without(removed), z, rng).rates(groups)}
     if case.spec.kind in ("two", "three"):
-        return {f"optimal_{case.spec.kind}": optimal_names(geo, directions, z, groups, rng, draws)}
+        return result | {f"optimal_{case.spec.kind}": optimal_names(geo, directions, z, groups, rng, draws)}
     if case.spec.kind == "mixed":
         exact = directions
         for one in case.hidden:
             if one[0].name in EFFECTS:
                 exact = exact.with_exact(one[0].name, signature(geo, [[one]])[0])
         mixed = optimal_mixed(geo, directions, z, groups[0], rng, draws)
-        return {"optimal_mixed": mixed, "left_over": left_over(geo, exact, z, 3)}
-    removed = case.spec.names if case.spec.kind == "without" else ()
-    return {"left_over": left_over(geo, directions.without(removed), z, 2)}
+        return result | {"optimal_mixed": mixed, "left_over": left_over(geo, exact, z, 3)}
+    return result | {"left_over": left_over(geo, directions.without(removed), z, 2)}

@@ -71,6 +71,10 @@ class Sets:
     @staticmethod
     def of(directions: Directions, size: int) -> Sets:
         """All sets of `size` candidates whose directions differ."""
+        if size == 0:
+            return Sets(
+                np.zeros((1, 0), int), np.zeros((1, 0, 0)), np.zeros(1), np.zeros(1, int), np.zeros((1, 0), int)
+            )
         members = np.array(list(combinations(range(len(directions.units)), size)), dtype=np.int64).reshape(-1, size)
         effects = np.sort(directions.owner[members], axis=1)
         different = np.all(np.diff(effects, axis=1) > 0, axis=1)
@@ -114,7 +118,7 @@ def _log_amplitude() -> float:
     return float(0.5 * np.log(2 * np.pi) - np.log(2 * DELTA_RANGE[1]))
 
 
-def _noise(geo: Geometry, rng: np.random.Generator, draws: int) -> Array:
+def noise_draws(geo: Geometry, rng: np.random.Generator, draws: int) -> Array:
     noise = rng.normal(size=(draws, len(geo.plain)))
     return noise - (noise @ geo.basis) @ geo.basis.T
 
@@ -122,7 +126,7 @@ def _noise(geo: Geometry, rng: np.random.Generator, draws: int) -> Array:
 def optimal_names(
     geo: Geometry, directions: Directions, z: Array, groups: list[list[str]], rng: np.random.Generator, draws: int = 200
 ) -> dict[str, float]:
-    """How often a judge who knows how many effects hide names all of them.
+    """How often a judge who knows how many effects hide, and the noise, names all of them.
 
     All sets of as many effects are equally likely, then their candidates; amplitudes are integrated in closed form.
 
@@ -136,11 +140,9 @@ def optimal_names(
     Rate of one name from each group.
     """
     sets = Sets.of(directions, len(groups))
-    right = 0
-    for noise in _noise(geo, rng, draws):
-        best = sets.effects[np.argmax(sets.log_evidence(directions.units @ (z + noise)))]
-        right += _one_of_each([directions.names[i] for i in best], groups)
-    return {"group": right / draws}
+    along = (z + noise_draws(geo, rng, draws)) @ directions.units.T
+    best = [sets.effects[np.argmax(sets.log_evidence(a))] for a in along]
+    return {"group": float(np.mean([_one_of_each([directions.names[i] for i in line], groups) for line in best]))}
 
 
 def _one_of_each(names: list[str], groups: list[list[str]]) -> bool:
@@ -164,7 +166,7 @@ def optimal_mixed(
     -------
     Rate at which the most probable set holds one of the group, and rate at which a remainder is more likely than not.
     """
-    data = z + _noise(geo, rng, draws)
+    data = z + noise_draws(geo, rng, draws)
     along = data @ directions.units.T
     beside = _beside_remainder(geo, directions, data)
     choices = [Sets.of(directions, size) for size in (2, 3)]

@@ -61,6 +61,7 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
         "optimal_three": judged.get("optimal_three") or {},
         "optimal_mixed": judged.get("optimal_mixed") or {},
         "left_over": judged.get("left_over") or {},
+        "blind": judged.get("blind") or {},
         "right_hold": None if hold is None or found_hold is None else found_hold == hold,
         "separable": judged.get("separable"),
         "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],

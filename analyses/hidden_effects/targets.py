@@ -9,6 +9,7 @@ from .rates import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ra
 
 Target = dict[str, Any]
 ALPHA = 0.04
+BLIND = "an ideal judge who has to estimate the noise"
 
 
 def _row(name: str, wanted: str, found: dict[str, Any] | None, passed: bool | None) -> Target:
@@ -54,6 +55,7 @@ def targets(rows: list[Row]) -> list[Target]:
         found = rate(r["chosen"] == "unknown" or r["right_group"] for r in part)
         table.append(_at_least(f"effect {label}: unknown or its group", found, 0.90))
         table.append(_no_more(f"its group, or seen beside the best name ({kind})", [_seen_alone(r) for r in part]))
+        table.append(_no_more(f"{BLIND} ({kind})", [r["blind"].get("right") for r in part]))
     for delta, wanted in ((10.0, 0.70), (20.0, 0.90)):
         found = pooled([r for r in single if r["delta"] == delta], closed_of_oracle)
         table.append(_at_least(f"gap closed, relative to the oracle, delta {delta:g}", found, wanted))
@@ -72,10 +74,13 @@ def _several(rows: list[Row]) -> list[Target]:
     from .score import accepted_of_group, false_names, visible_beside
 
     kinds = {kind: [r for r in rows if r["kind"] == kind] for kind in ("single", "two", "three", "mixed")}
+    apart = {kind: [r for r in kinds[kind] if all(visible_beside(r))] for kind in ("two", "three")}
     first = [r for r in kinds["two"] if r["accepted"]]
     known = [r for r in kinds["mixed"] if visible_beside(r)[0]]
     table = [
         _at_least("two effects: both accepted, relative to optimal", _relative(kinds["two"], "optimal_two"), 0.85),
+        _at_least("two effects: both accepted", rate(all(accepted_of_group(r)) for r in apart["two"]), 0.60),
+        _no_more(f"{BLIND}: both", [r["blind"].get("all") for r in apart["two"]]),
         _at_least(
             "two effects: the first accepted is one of them",
             rate(any(r["accepted"][0] in group for group in r["groups"]) for r in first),
@@ -87,10 +92,14 @@ def _several(rows: list[Row]) -> list[Target]:
             _relative(kinds["three"], "optimal_three"),
             None,
         ),
+        _row("three effects: all accepted", "in %", rate(all(accepted_of_group(r)) for r in apart["three"]), None),
+        _no_more(f"{BLIND}: all three", [r["blind"].get("all") for r in apart["three"]]),
         _at_least("beside a foreign effect: the known one accepted", rate(accepted_of_group(r)[0] for r in known), 0.8),
         _no_more("an ideal judge would accept it", [r["optimal_mixed"].get("known") for r in known]),
+        _no_more(f"{BLIND} would accept it", [r["blind"].get("known") for r in known]),
         _at_least("beside a foreign effect: a remainder reported", rate(r["remains"] for r in kinds["mixed"]), 0.8),
         _no_more("an ideal judge would report it", [r["optimal_mixed"].get("remains") for r in kinds["mixed"]]),
+        _no_more(f"{BLIND} would report it", [r["blind"].get("remains") for r in kinds["mixed"]]),
         _no_more(
             "a test of what two names leave would see it",
             [r["left_over"].get("2", {}).get("power") for r in kinds["mixed"]],
@@ -100,6 +109,15 @@ def _several(rows: list[Row]) -> list[Target]:
             "an accepted name that is of no hidden effect's group",
             rate(bool(false_names(r)) for r in rows if r["names"] and r["kind"] != "without"),
             0.10,
+        ),
+        _row(
+            "the same, of files with several effects or a foreign one",
+            "in %",
+            rate(bool(false_names(r)) for r in rows if r["blind"] and r["kind"] != "without"),
+            None,
+        ),
+        _no_more(
+            f"{BLIND}: a name of no group", [r["blind"]["other"] for r in rows if r["blind"] and r["kind"] != "without"]
         ),
     ]
     return table

@@ -170,6 +170,7 @@ def several(kind, accepted, ideal, remains=False, groups=(("toe",), ("yield",)))
         "right": False,
         "optimal_two": {"group": ideal} if kind == "two" else {},
         "optimal_three": {},
+        "blind": {"all": 0.5, "known": 0.7, "remains": 0.2, "right": 0.8, "other": 0.1},
         "optimal_mixed": {"known": ideal, "remains": 0.5} if kind == "mixed" else {},
         "left_over": {"2": {"delta": 2.0, "power": 0.1}} if kind == "mixed" else {},
     }
@@ -184,6 +185,15 @@ def test_several_effects_are_measured_against_the_ideal_judge():
     assert found["beside a foreign effect: the known one accepted"]["found"]["value"] == 1.0
     assert found["beside a foreign effect: a remainder reported"]["found"]["value"] == 0.5
     assert found["an ideal judge would accept it"]["found"]["value"] == pytest.approx(0.8)
+    assert found["two effects: both accepted"]["found"]["value"] == 0.5
+    blind = "an ideal judge who has to estimate the noise"
+    for what, value in (
+        (": both", 0.5),
+        (" would accept it", 0.7),
+        (" would report it", 0.2),
+        (": a name of no group", 0.1),
+    ):
+        assert found[blind + what]["found"]["value"] == pytest.approx(value)
     assert found["a test of what two names leave would see it"]["found"]["value"] == pytest.approx(0.1)
     assert found["an accepted name that is of no hidden effect's group"]["found"]["k"] == 2
     hidden = [several("mixed", [], 0.9) | {"conditional": [7.9, 10.0]}]

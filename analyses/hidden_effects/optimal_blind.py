@@ -1,0 +1,169 @@
+"""The ideal judge of `optimal_sets` once more, who knows neither the noise nor how many effects hide.
+
+It still knows the true parameters, how the readings of each bench err relative to each other, and the direction of
+every signature. How large errors are, and how large the setting errors among them, it does not: both are integrated
+out, as `discover` does. A hold that is out of place may then be a slip or a setting error, and a file of a dozen holds
+hardly says which. The prior over numbers of effects is that of `discover`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import gammaln, logsumexp
+
+from wirebayes.discovery.settings import MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+
+from .baselines import gaussian_process
+from .delta import Geometry, derivatives
+from .optimal_sets import DELTA_RANGE, REMAINDER_SIZES, Directions, Sets, noise_draws
+from .rig import Array, Mask
+
+# variance of setting errors in true ones, half a decade apart: from none to all
+SETTING = np.logspace(-3.0, 3.0, 13)
+LARGEST_SET = 3
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Directions and data in the metric of one guess of the noise, what the plain parameters absorb taken out.
+
+    Attributes
+    ----------
+    log_volume : of the noise and of the plain parameters.
+    units : directions (c, R).
+    data : data sets (m, R).
+    """
+
+    log_volume: float
+    units: Array
+    data: Array
+
+
+def metrics(geo: Geometry, units: Array, data: Array, remainder: bool = False) -> Iterator[Metric]:
+    """One metric for each size of setting errors, or for each and each smooth remainder beside them.
+
+    Parameters
+    ----------
+    units, data : rows (c, R) and (m, R), whitened by the true noise.
+    remainder : whether there is a smooth remainder, of several shapes and sizes.
+    """
+    by_eta = derivatives(geo.rig)[2]
+    sd = np.concatenate([np.full(len(b.holds), b.setting_sd) for b in geo.rig.benches])
+    setting = solve_triangular(geo.chol, by_eta * sd, lower=True)
+    setting = setting @ setting.T
+    for factor in SETTING:
+        noise = np.eye(len(setting)) + (factor - 1.0) * setting
+        for more in _remainders(geo) if remainder else [np.zeros_like(noise)]:
+            chol = np.linalg.cholesky(noise + more)
+            basis, u, y = (solve_triangular(chol, rows.T, lower=True) for rows in (geo.basis.T, units, data))
+            q, triangle = np.linalg.qr(basis)
+            u, y = u - q @ (q.T @ u), y - q @ (q.T @ y)
+            volume = np.log(np.diag(chol)).sum() + np.log(np.abs(np.diag(triangle))).sum()
+            yield Metric(-float(volume), u.T, y.T)
+
+
+def _remainders(geo: Geometry) -> Iterator[Array]:
+    """Covariances (R, R) of smooth remainders, whitened, of the sizes that the judge of known noise considers."""
+    for kernel in gaussian_process(geo.rig, np.ones(len(geo.plain), dtype=bool)):
+        inner = solve_triangular(geo.chol, solve_triangular(geo.chol, kernel, lower=True).T, lower=True)
+        left = inner - geo.basis @ (geo.basis.T @ inner)
+        left = left - (left @ geo.basis) @ geo.basis.T
+        for delta in np.geomspace(*DELTA_RANGE, REMAINDER_SIZES):
+            yield delta**2 / np.trace(left) * 0.5 * (inner + inner.T)
+
+
+def log_evidence(found: list[Metric], sets: Sets, degrees: int) -> Array:
+    """(m, n) of each choice of effects: amplitudes and noise integrated out, candidates averaged.
+
+    Parameters
+    ----------
+    found : metrics, equally likely.
+    sets : sets of candidates.
+    degrees : readings less plain parameters.
+    """
+    k = sets.members.shape[1]
+    left = degrees - k
+    # of amplitudes flat up to the largest delta, and of a noise whose logarithm is flat
+    constant = k * (0.5 * np.log(2 * np.pi) - np.log(2 * DELTA_RANGE[1])) + gammaln(0.5 * left) - gammaln(0.5 * degrees)
+    heights = []
+    for metric in found:
+        gram = (metric.units @ metric.units.T)[sets.members[:, :, None], sets.members[:, None, :]]
+        inverse = np.asarray(np.linalg.inv(gram), dtype=np.float64)
+        half_log_det = 0.5 * np.log(np.asarray(np.linalg.det(gram), dtype=np.float64))
+        own = Sets(sets.members, inverse, half_log_det, sets.first, sets.effects)
+        whole = (metric.data**2).sum(axis=1)
+        along = metric.data @ metric.units.T
+        rows = []
+        for a, square in zip(along, whole, strict=True):
+            explained = own.explained(a)
+            rest = np.maximum(square - np.maximum(explained, 0.0), 1e-9)
+            height = constant + metric.log_volume - half_log_det - 0.5 * left * np.log(0.5 * rest)
+            rows.append(np.where(np.isfinite(explained), height, -np.inf))
+        heights.append(np.array(rows))
+    total = logsumexp(heights, axis=0) - np.log(len(heights))
+    counts = np.diff(np.append(sets.first, total.shape[1]))
+    ends = [*sets.first[1:], total.shape[1]]
+    with np.errstate(divide="ignore"):
+        sums = [logsumexp(total[:, i:j], axis=1) for i, j in zip(sets.first, ends, strict=True)]
+    return np.stack(sums, axis=1) - np.log(counts)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What the judge says of some data sets: the names of the most probable set, and whether a remainder is likely."""
+
+    names: list[list[str]]
+    remains: Mask
+
+    def rates(self, groups: list[list[str]]) -> dict[str, float]:
+        """How often what counts is said, as shares of the data sets.
+
+        Parameters
+        ----------
+        groups : for each hidden effect the names that count as right.
+
+        Returns
+        -------
+        ``all``: a name from every group, ``known``: one from the first; ``remains``: a remainder; ``right``: a
+        remainder or a name from the first group; ``other``: no remainder and a name from no group.
+        """
+        named = np.array([[any(n in group for n in names) for group in groups] for names in self.names])
+        other = np.array([any(not any(n in g for g in groups) for n in names) for names in self.names])
+        said = {
+            "all": named.all(axis=1),
+            "known": named[:, 0],
+            "remains": self.remains,
+            "right": self.remains | named[:, 0],
+            "other": other & ~self.remains,
+        }
+        return {key: float(value.mean()) for key, value in said.items()}
+
+
+def answers(geo: Geometry, directions: Directions, z: Array, rng: np.random.Generator, draws: int = 50) -> Answers:
+    """The most probable set of up to three effects, and a remainder alone or beside one, with the prior of `discover`.
+
+    Parameters
+    ----------
+    z : signature of everything hidden, (R,).
+    """
+    data = z + noise_draws(geo, rng, draws)
+    degrees = len(z) - geo.basis.shape[1]
+    bare, more = (list(metrics(geo, directions.units, data, remainder)) for remainder in (False, True))
+    every = [Sets.of(directions, size) for size in range(LARGEST_SET + 1)]
+    names = [[directions.names[i] for i in line] for sets in every for line in sets.effects]
+    without = [np.full((draws, 1), -np.inf)]  # nothing at all is no answer
+    for sets in every[1:]:
+        size = sets.members.shape[1]
+        prior = (size - 1) * np.log(MORE_EFFECTS) + np.log(len(every[1].effects) / len(sets.effects))
+        without.append(log_evidence(bare, sets, degrees) + prior)
+    weights = UNKNOWN_WEIGHT, REMAINDER_WEIGHT  # of a remainder alone, and beside one effect
+    beside = [log_evidence(more, sets, degrees) + np.log(w) for sets, w in zip(every, weights, strict=False)]
+    alone, remainder = np.concatenate(without, axis=1), np.concatenate(beside, axis=1)
+    either = alone.copy()
+    either[:, : remainder.shape[1]] = np.logaddexp(alone[:, : remainder.shape[1]], remainder)
+    remains = logsumexp(remainder, axis=1) > logsumexp(alone, axis=1)
+    return Answers([names[i] for i in np.argmax(either, axis=1)], np.asarray(remains))

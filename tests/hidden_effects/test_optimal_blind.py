@@ -1,0 +1,81 @@
+"""The ideal judge who has to estimate the noise: its integrals by quadrature, and cases with a known answer."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from analyses.hidden_effects.cases import Spec, build
+from analyses.hidden_effects.delta import derivatives
+from analyses.hidden_effects.optimal import judge
+from analyses.hidden_effects.optimal_blind import SETTING, Answers, Metric, answers, log_evidence, metrics
+from analyses.hidden_effects.optimal_sets import DELTA_RANGE, Directions, Sets
+
+UNITS = np.array([[1.0, 0, 0, 0, 0], [0.6, 0.8, 0, 0, 0]])
+TWO = Directions(UNITS, np.array([0, 1]), ["a", "b"])
+DATA = np.array([[4.0, 5.0, 0.5, -0.8, 0.6]])
+
+
+def by_quadrature(members: list[int]) -> float:
+    """Log evidence, amplitudes on a grid and the logarithm of the noise on another, against a constant for any set."""
+    amplitudes, sizes = np.linspace(-DELTA_RANGE[1], DELTA_RANGE[1], 201), np.linspace(-4.0, 5.0, 181)
+    grids = np.meshgrid(*[amplitudes] * len(members), indexing="ij")
+    left = DATA[0] - sum(g[..., None] * UNITS[i] for g, i in zip(grids, members, strict=True))
+    each = [multivariate_normal.logpdf(left, np.zeros(5), np.exp(2.0 * s) * np.eye(5)) for s in sizes]
+    return float(np.log(np.mean(np.exp(each))))
+
+
+def test_amplitudes_and_noise_are_integrated_out():
+    metric = [Metric(0.0, UNITS, DATA)]
+    found = [float(log_evidence(metric, Sets.of(TWO, size), 5)[0, 0]) for size in (0, 1, 2)]
+    expected = [by_quadrature([]), by_quadrature([0]), by_quadrature([0, 1])]
+    assert np.diff(found) == pytest.approx(np.diff(expected), abs=0.03)
+
+
+def test_metrics_are_equally_likely():
+    sets = Sets.of(TWO, 1)
+    one, other = Metric(0.0, UNITS, DATA), Metric(-2.0, UNITS, 1.3 * DATA)
+    single = [log_evidence([m], sets, 5) for m in (one, other)]
+    assert log_evidence([one, other], sets, 5) == pytest.approx(np.logaddexp(*single) - np.log(2.0))
+
+
+def test_each_metric_is_that_of_the_dense_covariance():
+    geo = build(Spec("two", "paper", ("toe", "memory"), 10.0, 0)).geo
+    rows = np.random.default_rng(0).normal(size=(3, len(geo.plain)))
+    (bench,), by_eta = geo.rig.benches, derivatives(geo.rig)[2]
+    true = geo.chol @ geo.chol.T
+    errors = (by_eta * bench.setting_sd**2) @ by_eta.T
+    basis, raw = geo.chol @ geo.basis, rows @ geo.chol.T  # in newtons
+    for metric, factor in zip(metrics(geo, rows, rows), SETTING, strict=True):
+        noise = true + (factor - 1.0) * errors
+        inner = basis.T @ np.linalg.solve(noise, basis)
+        volume = np.linalg.slogdet(noise)[1] - np.linalg.slogdet(true)[1] + np.linalg.slogdet(inner)[1]
+        assert metric.log_volume == pytest.approx(-0.5 * volume, abs=1e-6)
+        side = basis.T @ np.linalg.solve(noise, raw.T)
+        left = raw @ np.linalg.solve(noise, raw.T) - side.T @ np.linalg.solve(inner, side)
+        assert metric.units @ metric.data.T == pytest.approx(left, rel=1e-6)
+
+
+def test_what_counts_as_said():
+    said = Answers([["a", "c"], ["b"], ["c"], ["b"]], np.array([False, False, False, True]))
+    found = said.rates([["a", "b"], ["c"]])
+    assert found == {"all": 0.25, "known": 0.75, "remains": 0.25, "right": 0.75, "other": 0.0}
+    assert said.rates([["a"]])["other"] == 0.75
+
+
+def test_a_slip_may_be_a_setting_error_where_its_size_is_unknown():
+    found = judge(build(Spec("two", "dense", ("grip_slip", "sensor_drift"), 10.0, 2)), draws=40)
+    assert found["optimal_two"]["group"] > 0.9 > found["blind"]["all"] + 0.1
+
+
+def test_a_foreign_form_that_no_name_resembles_is_left_over():
+    found = judge(build(Spec("foreign", "unloading", ("screw_thread",), 20.0, 0)), draws=4)["blind"]
+    assert found["right"] == found["remains"]
+
+
+def test_the_answers_follow_the_random_stream_alone():
+    case = build(Spec("two", "paper", ("toe", "memory"), 10.0, 0))
+    z = np.zeros(len(case.geo.plain))
+    some = Directions(np.eye(len(z))[:4], np.arange(4), ["a", "b", "c", "d"])
+    one, other = (answers(case.geo, some, z, np.random.default_rng(1), draws=6) for _ in range(2))
+    assert one.names == other.names
+    assert (one.remains == other.remains).all()
