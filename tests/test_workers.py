@@ -5,10 +5,14 @@ import sys
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from wirebayes.effects import catalogue
-from wirebayes.workers import workers
+from wirebayes.io import paper
+from wirebayes.workers import computing, workers
+from wirebayes.workflows.check import check
 
 OWN = Path(__file__).parents[1] / "docs" / "own_effect.py"
 
@@ -76,3 +80,30 @@ with workers(2) as parallel_map:
     print(*parallel_map(abs, [-1, -2]))
 """
     assert _run(script, tmp_path) == "1 2"
+
+
+def test_while_computing_linear_algebra_has_one_thread_and_then_what_it_had() -> None:
+    np.linalg.eigh(np.eye(3))
+
+    def threads() -> list[int]:
+        return [library["num_threads"] for library in threadpool_info()]
+
+    with threadpool_limits(2):
+        before = threads()
+        with computing():
+            assert set(threads()) == {1}
+        assert threads() == before
+        assert max(before) == 2  # else this machine has nothing to limit
+
+
+def test_a_script_that_loaded_numpy_first_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+
+    def look(*given: object) -> None:
+        seen.extend(library["num_threads"] for library in threadpool_info())
+        raise InterruptedError
+
+    monkeypatch.setattr("wirebayes.workflows.check.preview", look)
+    with threadpool_limits(2), pytest.raises(InterruptedError):
+        check(paper.experiments()[2])
+    assert set(seen) == {1}

@@ -67,18 +67,25 @@ def _prepared(preload: list[str]) -> None:
 
 
 @contextmanager
-def without_script() -> Iterator[None]:
-    """Processes that start within the block do not import the user's script, so it need not guard its top level.
+def computing() -> Iterator[None]:
+    """Compute within the block, whoever called: with one thread for linear algebra, and apart from the user's script.
 
-    A new process imports the main module of its parent in case that work was defined there. Ours never is, and a script
-    whose top level calls the package would start itself again in each process.
+    Matrices here are small, and several threads only wait for each other: beside other work on the machine everything
+    took five times as long. Environment variables say nothing to a numpy that a user's script has loaded before.
+
+    Processes that start within the block do not import that script, so it need not guard its top level. A new process
+    imports the main module of its parent in case that work was defined there. Ours never is, and a script whose top
+    level calls the package would start itself again in each process.
     """
+    from threadpoolctl import threadpool_limits  # only for what computes: it looks through all loaded libraries
+
     main = sys.modules["__main__"]
     known = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
     for name in known:
         setattr(main, name, None)
     try:
-        yield
+        with threadpool_limits(1):
+            yield
     finally:
         for name, value in known.items():
             setattr(main, name, value)

@@ -22,7 +22,7 @@ from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.problem import MATERIAL, SAMPLE, build
 from wirebayes.results.outliers import outliers
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import as_finished, executor, without_script
+from wirebayes.workers import as_finished, computing, executor
 from wirebayes.workflows.one_experiment import QUANTITIES, Done, Task, do, first_columns, packed
 from wirebayes.workflows.options import (
     PathLike,
@@ -141,7 +141,7 @@ def batch(
     place = Place.at(output)
     if check_run(place.path, configuration) == "done":
         return Batch(place, own, computed=False)
-    with without_script():
+    with computing():
         _compute(read, task, place.path, configuration, scheduler, progress or silent)
     with open_run(place.path, configuration) as run:
         rows: list[Row] = [read_json(place.path / e.name / _ROW) for e, _ in read]

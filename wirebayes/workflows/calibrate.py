@@ -18,6 +18,7 @@ from wirebayes.robot.self_calibration import session_file
 from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.workers import computing
 from wirebayes.workflows.options import PathLike, above_zero, check_seed, path_of
 from wirebayes.workflows.results import Calibration, Place
 from wirebayes.workflows.tables import as_csv, row_place
@@ -122,7 +123,7 @@ def calibrate(
     with open_run(place.path, decides) as run:
         if run.state != "done":
             prior = Prior(line, 1e-3 * reference_sd, typical_spread(line, specimen_spread), bias_sd_N=bias)
-            with np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
+            with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
                 found, known = answer(machine, prior, session, values, seed)
             write_json(run.directory / "calibrate.json", found)
             if found["with_creep_model"]["converged"]:

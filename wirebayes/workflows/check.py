@@ -10,6 +10,7 @@ from wirebayes.io import data_checks
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
+from wirebayes.workers import computing
 from wirebayes.workflows.options import PathLike, Progress, Source, check_seed, experiments_of, path_of, silent
 from wirebayes.workflows.results import CHECKED, Check, Place
 
@@ -78,7 +79,8 @@ def check(
             found: dict[str, CheckedExperiment] = {}
             for done, e in enumerate(experiments):
                 report("check", done, len(experiments))
-                previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
+                with computing():
+                    previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
                 warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *previewed.warnings]
                 found[e.name] = {
                     **_understood(e), "warnings": warnings, "parameters": previewed.parameters,

@@ -17,7 +17,7 @@ from wirebayes.io.run_folder import open_run, read_json, stored_results, write_j
 from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.problem import Likelihood
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import without_script
+from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     PathLike,
     Progress,
@@ -210,7 +210,7 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
     with open_run(place.path, plan.configuration) as opened:
         if opened.state == "done":
             return Comparison(place, plan.own_effects, computed=False, warnings=plan.warnings)
-        with without_script():
+        with computing():
             run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
         from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
 

@@ -23,7 +23,7 @@ from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.results.store import load
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import without_script, workers
+from wirebayes.workers import computing, workers
 from wirebayes.workflows.options import (
     PathLike,
     Progress,
@@ -120,7 +120,7 @@ def discover(
         if opened.state == "done":
             return Findings(place, own, computed=False)
         settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
-        with without_script():
+        with computing():
             with workers(prepare=partial(catalogue, own)) as parallel_map:
                 found = investigate(experiments, settings, seed, progress or silent, parallel_map)
             jobs = jobs_of(found, elastic_law, history, own)

@@ -18,7 +18,7 @@ from wirebayes.model.problem import Likelihood, build
 from wirebayes.results.jobs import Job, run
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import without_script
+from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     PathLike,
     Progress,
@@ -143,7 +143,7 @@ def fit(
     place = Place.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state != "done":
-            with without_script():
+            with computing():
                 alone = check and len(jobs) == 1
                 with checked_meanwhile(jobs[0], place.path, seed) if alone else nullcontext():
                     run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)

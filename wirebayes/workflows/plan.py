@@ -33,7 +33,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import drift
 from wirebayes.simulation.synthetic import Bench
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import without_script
+from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     PathLike,
     Progress,
@@ -156,7 +156,7 @@ def plan(
         report = progress or silent
         judged: list[Judged] = []
         tension: float | None = None  # of the first test: all state their creep for it
-        with without_script():
+        with computing():
             for done, (test, words) in enumerate(request.tests):
                 report("protocols", done, len(request.tests))
                 guess = request.guess.at(test.length_mm)

@@ -16,6 +16,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     Numbers,
     PathLike,
@@ -189,7 +190,7 @@ def pose(
     mapped = () if slices is LEVEL else (plain(asdict(slices)),)
     place, posterior = Place.at(output), posterior_of(wires, experiment)
     decides = configuration("pose", robot, posterior, draws, seed, own, *options, *mapped)
-    with open_run(place.path, decides) as run:
+    with open_run(place.path, decides) as run, computing():
         if run.state == "done":
             return Pose(place, own, computed=False)
         found = answer(machine, line, request, other)

@@ -16,6 +16,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration.calibrated import to_dict
 from wirebayes.typing import Floats
+from wirebayes.workers import computing
 from wirebayes.workflows.calibrate import calibrated_of
 from wirebayes.workflows.options import PathLike, Progress, above_zero
 from wirebayes.workflows.results import Calibration, Place, Pose
@@ -151,7 +152,7 @@ def pose_history(
     with open_run(place.path, decides | {"history": [option[2:], read, *spread, *known]}) as run:
         if run.state == "done":
             return Pose(place, own_effects, computed=False)
-        with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
+        with computing(), np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
             found = answer(robot, line, history, errors, start, seed, progress)
         write_json(run.directory / "pose.json", found.content)
         for name, (header, rows) in found.tables.items():

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.workers import without_script
+from wirebayes.workers import computing
 from wirebayes.workflows.options import PathLike, Progress, check_seed, silent
 from wirebayes.workflows.results import Place, Reproduction
 
@@ -41,6 +41,6 @@ def reproduce_paper(
     from wirebayes.reproduce.run import reproduce  # matplotlib only where it is needed
 
     place = Place(Path(output))
-    with without_script():
+    with computing():
         lines = reproduce(place.path, check_seed(seed), progress or silent, policy or DEFAULT)
     return Reproduction(place, not_converged=tuple(lines))
