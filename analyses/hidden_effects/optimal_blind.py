@@ -89,7 +89,7 @@ def log_evidence(found: list[Metric], sets: Sets, degrees: int) -> Array:
     left = degrees - k
     # of amplitudes flat up to the largest delta, and of a noise whose logarithm is flat
     constant = k * (0.5 * np.log(2 * np.pi) - np.log(2 * DELTA_RANGE[1])) + gammaln(0.5 * left) - gammaln(0.5 * degrees)
-    heights = []
+    total = np.full((len(found[0].data), len(sets.members)), -np.inf)
     for metric in found:
         gram = (metric.units @ metric.units.T)[sets.members[:, :, None], sets.members[:, None, :]]
         inverse = np.asarray(np.linalg.inv(gram), dtype=np.float64)
@@ -97,19 +97,16 @@ def log_evidence(found: list[Metric], sets: Sets, degrees: int) -> Array:
         own = Sets(sets.members, inverse, half_log_det, sets.first, sets.effects)
         whole = (metric.data**2).sum(axis=1)
         along = metric.data @ metric.units.T
-        rows = []
-        for a, square in zip(along, whole, strict=True):
-            explained = own.explained(a)
+        for i, square in enumerate(whole):
+            explained = own.explained(along[i])
             rest = np.maximum(square - np.maximum(explained, 0.0), 1e-9)
             height = constant + metric.log_volume - half_log_det - 0.5 * left * np.log(0.5 * rest)
-            rows.append(np.where(np.isfinite(explained), height, -np.inf))
-        heights.append(np.array(rows))
-    total = logsumexp(heights, axis=0) - np.log(len(heights))
+            total[i] = np.logaddexp(total[i], np.where(np.isfinite(explained), height, -np.inf))
     counts = np.diff(np.append(sets.first, total.shape[1]))
     ends = [*sets.first[1:], total.shape[1]]
     with np.errstate(divide="ignore"):
         sums = [logsumexp(total[:, i:j], axis=1) for i, j in zip(sets.first, ends, strict=True)]
-    return np.stack(sums, axis=1) - np.log(counts)
+    return np.stack(sums, axis=1) - np.log(counts * len(found))
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
 Report = Callable[[str, float, float], None]
-PLAIN_TO_SEE = 0.002  # p of the linear scan at which no test from larger effects could change the verdict
+PLAIN_TO_SEE = 0.002  # p of the linear scan at which naming needs no look from larger effects either
 # Risk on either side that a p on the level itself gives so few, or so many, exceedances: three standard errors, as the
 # ranks of names add some error to the binomial one.
 CLOSE = 0.00135
@@ -125,7 +125,9 @@ def examine(
         if beyond_linear:
             report("larger effects", 0, 1)
             larger = larger or Continuation(blocks, trials, candidates, data, parallel_map)
-            test = larger.test(simulated, test)
+            # They only make p smaller: nothing is gained where it is below the level beyond doubt.
+            if test.p > alpha or is_close(test.p, alpha, len(test.null)):
+                test = larger.test(simulated, test)
             report("larger effects", 1, 1)
         if len(test.null) >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
             break
