@@ -188,6 +188,21 @@ def test_larger_effects_count_where_they_are_clear(as_high: int, counts: bool, m
     assert found.surprises == ({"a": height, "b": 5.0} if counts else test.surprises)
 
 
+@pytest.mark.parametrize(("rank", "led"), [(18, ["a"]), (20, [])])
+def test_what_could_not_become_clear_is_not_led_through_the_simulations(
+    rank: int, led: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A path only raises the simulations: a value that so many exceed in the scan already is no more surprising."""
+    chance = np.linspace(-2.0, 4.0, 999)
+    null = np.log(1000.0) - np.log(np.arange(1.0, 1000.0))  # of one name alone: the k-th is as surprising as k in 1,000
+    larger = Continuation.__new__(Continuation)
+    larger._values = {"a": float(chance[-1 - rank])}
+    tried: list[str] = []
+    monkeypatch.setattr(Continuation, "_chance", lambda self, name, *given: tried.append(name) or np.full(999, 9.0))
+    larger.test([], GlobalTest({"a": chance}, {"a": 0.0}, null))
+    assert tried == led
+
+
 @pytest.mark.parametrize(("value", "climbed"), [(0.0, 40), (2.9, 200), (9.0, 999)])
 def test_no_more_simulations_climb_than_it_takes(value: float, climbed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once several are as high as the data, these cannot be surprising enough."""

@@ -54,7 +54,7 @@ _LARGE = 1e200  # above any sum of squares, and its square root finite
 _PIECE = 64  # rows weighed at once: what stays in the cache
 _FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
 _TRIED = 3  # names
-_LEVEL = 0.95  # of chance, above which a name is worth a try
+_LEVEL = 0.95  # of chance, which a name has to exceed by most to be tried first
 
 
 @dataclass(frozen=True)
@@ -578,18 +578,20 @@ class Continuation:
     def test(self, simulated: Sequence[Replicates], test: GlobalTest) -> GlobalTest:
         """The global test again, with what the ladders add, where that makes the result clear; else as it was.
 
-        Only names that come above the linear scan's own level are tried in the simulations: others do not decide. How
-        often the most surprising of all names is that surprising is known from the linear scan of the same simulations.
-        This holds in the far tail, where one name alone decides. Nearer the middle, ladders of a few names would be
-        compared with scans of all names, and p would not be uniform; so ladders count up to p = `BY_LARGER`, or where p
-        is as small as it can be. Simulations are those of an earlier call, and more.
+        Only names that might become that surprising are tried in the simulations: others do not decide. How often the
+        most surprising of all names is that surprising is known from the linear scan of the same simulations. This
+        holds in the far tail, where one name alone decides. Nearer the middle, ladders of a few names would be compared
+        with scans of all names, and p would not be uniform; so ladders count up to p = `BY_LARGER`, or where p is as
+        small as it can be. Simulations are those of an earlier call, and more.
         """
         values, count = self._values, len(test.null)
         clear = max(BY_LARGER, 1.0 / (1 + count))
         needed = float(np.quantile(test.null, 1.0 - clear))  # below it no surprise can make p so small
+        # Simulations come out no lower along the paths than in the scan, so a value is no more surprising than there.
+        most = {name: surprise(v, test.chance[name]) for name, v in values.items()}
         lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in values.items()}
         surprises = dict(test.surprises)
-        for name in sorted((n for n in lead if lead[n] > 0), key=lambda n: -lead[n])[:_TRIED]:
+        for name in sorted((n for n in lead if most[n] >= needed), key=lambda n: -lead[n])[:_TRIED]:
             chance = self._chance(name, test.chance[name], simulated, needed)
             surprises[name] = max(surprises[name], surprise(values[name], chance))
             if surprises[name] > test.null.max():
