@@ -44,10 +44,10 @@ def explored(
     monkeypatch.setattr(stepwise, "_fit", fit)
     known = {name: np.array([value]) for name, value in (credits or {}).items()}
     monkeypatch.setattr(stepwise, "_credits", lambda expansions, trials: known)
-    scans: Any = [SimpleNamespace(flexible=np.array([smooth]))]
+    monkeypatch.setattr(stepwise, "_remainder", lambda block: smooth)
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
     found = stepwise.explore(
-        [None], evidence(singles), [], [], scans, settings, np.random.default_rng(0), map  # type: ignore[list-item]
+        [None], evidence(singles), [], [], settings, np.random.default_rng(0), map  # type: ignore[list-item]
     )  # fmt: skip
     return found, order
 
@@ -228,12 +228,13 @@ class Fits:
             self.did.append(("weighed", most, forms_a_name))
             return self.evidence
 
-        scans = {"e0": 3.0, "e1": 4.0, 0: 5.0, 1: 6.0}
+        remainders = {"e0": 3.0, "e1": 4.0, 0: 5.0, 1: 6.0}
         monkeypatch.setattr(stepwise, "fitted", fitted)
         monkeypatch.setattr(stepwise, "informed", informed)
         monkeypatch.setattr(stepwise, "weigh_names", weighed)
-        monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: scans[target])
-        monkeypatch.setattr(stepwise, "scan", lambda x: SimpleNamespace(flexible=[x]))
+        monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: None)
+        monkeypatch.setattr(stepwise, "scan", lambda x: None)
+        monkeypatch.setattr(stepwise, "_remainder", lambda block: remainders[block.target])
         monkeypatch.setattr(stepwise.screening, "candidate_probes", lambda blocks, kinds: (["probe"], ["candidate"]))
         monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
 

@@ -20,6 +20,7 @@ from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
+from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import linearise, simulate
 
 # of setting to sensor error, squared: from one that does not matter to one beside which the sensor's does not; steps of
@@ -99,7 +100,7 @@ class Tangent:
 
     def of(self, rows: Array) -> Self:
         """That of some parameter sets."""
-        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "one_sided"}
+        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("one_sided", "processes")}
         return replace(self, **{name: value[rows] for name, value in every.items()})
 
     @property
@@ -129,11 +130,15 @@ class Expansion(Tangent):
         What each probe adds, per unit amplitude.
     one_sided : (m,) bool
     flexible : (n, N, q)
+        Functions of the flexible reference, one process after the other.
+    processes : tuple of int
+        How many functions each process has.
     """
 
     signatures: Array
     one_sided: Array
     flexible: Array
+    processes: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -145,7 +150,7 @@ class Scan:
     effects : (n, m)
         Of each probe, its amplitude at its best.
     flexible : (n,)
-        Of the flexible reference, its size summed over `SIZES`.
+        Of the flexible reference, averaged over its processes and `SIZES`.
     amplitude : (n, m)
         Best amplitude (distance from neutral).
     norm : (n, m)
@@ -271,6 +276,7 @@ def expand(
     readings: Sequence[Array] | None = None,
     columns: Callable[[Problem, int, Array, Array], Array] | None = None,
     shapes: Sequence[Array] | None = None,
+    reference: Callable[[Protocol], Sequence[Array]] = lambda protocol: [smooth_reference.basis(protocol, 1.0)],
 ) -> Expansion:
     """Linearise a block at some parameters, with the signatures of the probes.
 
@@ -288,6 +294,8 @@ def expand(
         its derivatives (H, R, n, p), it returns (H, R, n, more), N.
     shapes : sequence of (H, R, m) arrays, optional
         Signatures from `forms`, used for all rows: an effect's form hardly differs between refits.
+    reference : function of Protocol to list of (H, R, q) arrays, optional
+        Functions of each process of the flexible reference, N.
 
     Returns
     -------
@@ -295,7 +303,8 @@ def expand(
     """
     problem = target.problem
     points = list(_points(target, z, readings, moving_columns(problem)))
-    added, functions = [], []
+    added: list[Array] = []
+    functions: list[list[Array]] = []
     for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
         mask = sample.protocol.mask
         shape = (shapes or forms(target, z[:1], trials))[at][mask]
@@ -304,13 +313,15 @@ def expand(
             more = columns(problem, at, point.tension, point.slopes)
             each.append(np.stack([point.rows(more[..., i], mask) for i in range(more.shape[-1])], axis=-1))
         added.append(np.concatenate(each, axis=-1))
-        functions.append(smooth_reference.basis(sample.protocol, 1.0)[mask][None] / point.sd[:, None, None])
+        functions.append([f[mask][None] / point.sd[:, None, None] for f in reference(sample.protocol)])
     signatures = np.concatenate(added, axis=1)
     one_sided = [i < len(trials) and trials[i].one_sided for i in range(signatures.shape[-1])]
     plain = _tangent(target, z, points, moving_columns(problem))
+    processes = [_block_diagonal(each) for each in zip(*functions, strict=True)]
     return Expansion(
-        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool), flexible=_block_diagonal(functions)
-    )
+        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool),
+        flexible=np.concatenate(processes, axis=2), processes=tuple(f.shape[2] for f in processes),
+    )  # fmt: skip
 
 
 def moving_columns(problem: Problem) -> list[int]:
@@ -487,15 +498,16 @@ def _scan_few(x: Expansion) -> Scan:
     plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
     left = np.maximum(rss[..., None] - positive**2 / c, least[..., None])
     effects = shared[..., None] - 0.5 * degrees * np.log(left)
-    loose = []
-    for size in SIZES:
-        log_volume, less = _taken_by(found.smooth_square, found.smooth_along, size)
-        # The process is measured in units of the noise that is left beside it.
-        loose.append(shared - log_volume - 0.5 * degrees * np.log(np.maximum(rss - less, least)))
+    loose, ends = [], np.cumsum(x.processes)
+    for own in (slice(last - count, last) for last, count in zip(ends, x.processes, strict=True)):
+        for size in SIZES:
+            log_volume, less = _taken_by(found.smooth_square[..., own, own], found.smooth_along[..., own], size)
+            # The process is measured in units of the noise that is left beside it.
+            loose.append(shared - log_volume - 0.5 * degrees * np.log(np.maximum(rss - less, least)))
     reference = logsumexp(plain, axis=1)
     seen = np.isfinite(reference)
     reference = np.where(seen, reference, 0.0)
-    flexible_value = logsumexp(np.concatenate(loose, axis=1), axis=1) - np.log(len(SIZES)) - reference
+    flexible_value = logsumexp(np.concatenate(loose, axis=1), axis=1) - np.log(len(loose)) - reference
     best = np.argmax(effects, axis=1)[:, None]
     amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
     norm = np.sqrt(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best)

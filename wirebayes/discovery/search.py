@@ -169,7 +169,7 @@ def _named(
 ) -> tuple[Explored, Decision]:
     """The sets of effects that were looked at, past the global test, and what they say."""
     found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map)
-    explored = explore(gate.blocks, found, expansions, gate.trials, gate.data, settings, rng, parallel_map)
+    explored = explore(gate.blocks, found, expansions, gate.trials, settings, rng, parallel_map)
     copies = power.copies(expansions, gate.trials, [float(x.ratio[0]) for x in gate.expansions])
     return explored, decide(gate.blocks, explored, copies, settings, rng, parallel_map)
 

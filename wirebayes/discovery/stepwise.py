@@ -13,7 +13,7 @@ from itertools import repeat
 
 import numpy as np
 
-from wirebayes.discovery import screening
+from wirebayes.discovery import screening, smooth_reference
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
@@ -155,7 +155,6 @@ def explore(
     found: NameEvidence,
     expansions: Sequence[Expansion],
     trials: Sequence[Probe],
-    scans: Sequence[Scan],
     settings: Settings,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
@@ -167,7 +166,7 @@ def explore(
     plain : list of LaplaceFit
     found : NameEvidence
         Of single effects.
-    expansions, trials, scans
+    expansions, trials
         Of the plain blocks, as the global test has them.
     settings : Settings
     rng : numpy Generator
@@ -175,7 +174,7 @@ def explore(
         The built-in `map`, or one over processes; the sets are the same.
     """
     units = _units(found)
-    smooth = np.array([float(s.flexible[0]) for s in scans])
+    smooth = np.array([_remainder(block) for block in plain])
     root = EffectSet((), 0.0, {}, smooth)
     frontier = _Frontier(len(settings.kinds))
     credits = _credits(expansions, trials)
@@ -260,12 +259,17 @@ def _fit(parent: FittedSet, name: str, settings: Settings, units: _Units, rng: n
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
             further = None
-    remainder = np.array([float(s.flexible[0]) for s in scans])
+    remainder = np.array([_remainder(block) for block in blocks])
     accepted = (*parent.accepted, Accepted(name, tuple(effects), effects))
     return FittedSet(
         EffectSet((*parent.effects.names, name), 0.0, {}, remainder), blocks, accepted, further,
         (trials, candidates, scans),
     )  # fmt: skip
+
+
+def _remainder(block: LaplaceFit) -> float:
+    """Log Bayes factor of something smooth but unknown beside the effects of a block, local or global."""
+    return float(scan(expand(block.target, block.modes.z[:1], [], reference=smooth_reference.family)).flexible[0])
 
 
 def _to_plain_prior(found: Refit, blocks: Sequence[LaplaceFit], units: _Units) -> float:

@@ -1,0 +1,68 @@
+"""The smooth remainder: its processes against their covariances, and what they find that one process does not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from wirebayes.discovery import smooth_reference
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.stepwise import _remainder
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.io import paper
+from wirebayes.io.experiment import read_experiments
+from wirebayes.simulation.synthetic import Bench, Truth, write
+
+WIRE = paper.experiments()[2]
+QUIET = {"k1": 800.0, "B": 0.1, "U": 1.2, "k2": 0.02, "N": 0.8, "sensor_sd": 0.01, "setting_sd": 0.003, "preload": 0.5}
+
+
+def covariance(functions: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    rows = functions[mask]
+    return np.asarray(rows @ rows.T)
+
+
+def test_the_processes_are_products_of_one_over_holds_and_one_over_time() -> None:
+    protocol = WIRE.train(4).protocol()  # few enough readings that no function is left out
+    mask = protocol.mask
+    assert mask.sum() <= smooth_reference.SHORT_FUNCTIONS
+    hold, reading = np.nonzero(mask)
+    time = np.log1p(
+        protocol.time_s[hold, reading] / (0.2 * np.median(protocol.time_s[mask][protocol.time_s[mask] > 0]))
+    )
+    lengths = [(a, b) for a in (1.5, 4.0, 10.0) for b in (0.7, 2.0, 50.0)]
+    for (a, b), functions in zip(lengths, smooth_reference.family(protocol)[1:], strict=True):
+        expected = np.exp(
+            -0.5 * (np.subtract.outer(hold, hold) / a) ** 2 - 0.5 * (np.subtract.outer(time, time) / b) ** 2
+        )
+        assert covariance(functions, mask) == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_evidence_of_several_processes_is_the_mean_of_theirs() -> None:
+    block = fitted([WIRE], (), "hooke", "saturating", np.random.default_rng(0))
+    z, family = block.modes.z[:1], smooth_reference.family(WIRE.protocol())
+    each = [scan(expand(block.target, z, [], reference=lambda p, f=f: [f])).flexible[0] for f in family]
+    together = scan(expand(block.target, z, [], reference=lambda p: family)).flexible[0]
+    assert np.ptp(each) > 1.0
+    assert together == pytest.approx(logsumexp(each) - np.log(len(each)))
+
+
+def disturbed(folder: Path, size_N: float) -> LaplaceFit:
+    """The fit of a simulated test in which three holds began with a tension that was off."""
+    folder.mkdir()
+    write(folder, [Bench(resolution_N=0.01)], Truth(QUIET), seed=3)
+    (clean,) = read_experiments(folder / "experiments.toml")
+    holds = list(clean.holds)
+    for j, share in ((5, 0.6), (6, 1.0), (7, 0.6)):
+        off = size_N * share * np.exp(-np.asarray(holds[j].time_s) / 40.0)
+        holds[j] = replace(holds[j], tension_N=np.asarray(holds[j].tension_N) + off)
+    return fitted([replace(clean, holds=tuple(holds))], (), "hooke", "saturating", np.random.default_rng(0))
+
+
+def test_a_local_deviation_is_a_remainder_that_one_global_process_does_not_see(tmp_path: Path) -> None:
+    block = disturbed(tmp_path / "off", 0.12)
+    alone = scan(expand(block.target, block.modes.z[:1], [])).flexible[0]
+    assert alone < 1.0 < 8.0 < _remainder(block)
+    assert _remainder(disturbed(tmp_path / "clean", 0.0)) < 0.0
