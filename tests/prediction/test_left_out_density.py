@@ -123,8 +123,8 @@ def test_what_is_given_up_is_begun_near_the_posterior_without_its_hold(
         asked.append(near)
         settled = [True, False, True, False] if near is None else [len(asked) == 2, True]
         drawn = lambda density, n, rng: (density, n)  # noqa: E731
-        integral = np.array([1.0, 2.0, 3.0, 4.0]) if near is None else np.array([10.0, 4.0])
-        return SimpleNamespace(log_integral=integral, settled=np.array(settled), drawn=drawn)
+        ratio = np.array([0.0, 1.0, 2.0, 3.0]) if near is None else np.array([0.0, -6.0])
+        return SimpleNamespace(log_ratio=ratio, settled=np.array(settled), drawn=drawn)
 
     monkeypatch.setattr(importance, "from_draws", found)
     elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]

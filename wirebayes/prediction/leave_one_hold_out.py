@@ -16,8 +16,9 @@ from scipy.optimize import brentq
 from scipy.special import expit, logsumexp
 
 from wirebayes.inference.array_statistics import array_statistics
-from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
+from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.model.problem import Problem
 from wirebayes.prediction.left_out_density import log_densities
 from wirebayes.typing import Floats
@@ -83,7 +84,7 @@ def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
 
 
 def smoothed_leave_one_hold_out(
-    fitted: Fit,
+    fitted: Posterior,
     seed: int = 0,
     *,
     policy: Policy = REFIT,
@@ -98,7 +99,7 @@ def smoothed_leave_one_hold_out(
 
     Parameters
     ----------
-    fitted : Fit
+    fitted : Fit or WeightedPosterior
         With a likelihood hold by hold, a hold's first reading stays given.
     seed : int
         Of what is sampled without holds.

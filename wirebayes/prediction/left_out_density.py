@@ -38,12 +38,12 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     target = LogPosterior(problem)
     z = target.coordinates.to_sampled(draws)
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
-    elpd, settled = pool.log_integral[0] - pool.log_integral[1:], pool.settled[0] & pool.settled[1:]
+    elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
     for m in np.flatnonzero(~settled).tolist():
         near = pool.drawn(1 + m, len(z), rng)
         both = joined(target, [holds[m]])
         own = importance.from_draws(both, z, target.coordinates.order, rng, _ESS, near)
-        elpd[m], settled[m] = own.log_integral[0] - own.log_integral[1], own.settled.all()
+        elpd[m], settled[m] = -own.log_ratio[1], own.settled.all()
     return elpd, settled
 
 
