@@ -44,7 +44,8 @@ def searching(monkeypatch: pytest.MonkeyPatch, *found: tuple[int, ...]) -> Calla
     """Searches find these hills, one after the other, the last of them from then on; how many were made."""
     made: list[tuple[int, ...]] = []
 
-    def search(target: object, rng: np.random.Generator) -> SimpleNamespace:
+    def search(target: object, rng: np.random.Generator, starts: int) -> SimpleNamespace:
+        assert starts == 32
         made.append(found[min(len(made), len(found) - 1)])
         return SimpleNamespace(modes=modes(*made[-1]))
 
@@ -107,8 +108,8 @@ def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyP
     problem = build([experiments()[0]])
     true, made = module.search, []
 
-    def search(target: object, rng: np.random.Generator) -> object:
-        found = true(target, rng)  # type: ignore[arg-type]
+    def search(target: object, rng: np.random.Generator, starts: int) -> object:
+        found = true(target, rng, starts=starts)  # type: ignore[arg-type]
         made.append(len(found.modes.z))
         if len(made) > 1:
             return found

@@ -93,14 +93,14 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
     def density(z: Array) -> Array:
         return target(z)[:, None]
 
-    known = search(target, rng).modes
+    known = search(target, rng, starts=_STARTS).modes
     nothing = known.z[:0]
     for _ in range(_SEARCHES):
         start = importance.widened(known)
         pool = importance.sample(density, start, nothing, nothing, target.coordinates.order, rng, ess)
         if not pool.settled[0]:
             break
-        others = search(target, rng).modes
+        others = search(target, rng, starts=_STARTS).modes
         if overlooked(target, pool, importance.widened(others), rng) <= _NEXT_TO_NOTHING:
             return pool
         known = distinct([known, others])
@@ -127,6 +127,7 @@ def overlooked(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.ra
 
 
 _DRAWS = 4000  # as many as predictions take
+_STARTS = 32  # of climbs, four times as many as before a walk: walkers still find what a search misses, weights do not
 _SEARCHES = 3  # that may contradict, before it is left to walkers
 _WITNESSES = 2000  # a hill with a hundredth of the mass has some twenty of them, where a search found it
 _HARDLY = 3.0  # nats of posterior over proposal: a place drawn twenty times too seldom
