@@ -124,7 +124,6 @@ def sample(
     densities: Callable[[Array], Array],
     start: Mixture,
     draws: Array,
-    near: Array,
     order: NDArray[np.int64],
     rng: np.random.Generator,
     ess: float,
@@ -133,9 +132,8 @@ def sample(
 
     A proposal takes longer to learn than thousands of draws to be made, so from the third round on there are as many as
     seem to be needed. A density is settled by the draws of one round, so its integral has no bias from the learning;
-    those of the rounds before only teach. From then on the proposal is learned for the others. Among more than two
-    densities, some may be given up: once the first rounds are over, those that would need too many draws. Each is
-    better sampled with the first alone, which is never given up.
+    those of the rounds before only teach. From then on the proposal is learned for the others. Once the first rounds
+    are over, those that would need too many draws are given up, except the first: each is better sampled by itself.
 
     Parameters
     ----------
@@ -145,8 +143,6 @@ def sample(
         Reaches every mode.
     draws : (n, d) array
         Points that roughly follow the first density; none where the start is all that is known of it.
-    near : (k, d) array
-        Points near the others, none if there are none or they are like the first.
     order : (d,) array of int
         In which coordinates are straightened (see `wirebayes.inference.sampler.transport_map`).
     rng : numpy Generator
@@ -157,12 +153,11 @@ def sample(
     -------
     Weighted
     """
-    known = np.concatenate([draws, near])
-    remembered, witness = (points[rng.permutation(len(points))[:_WITNESSES]] for points in (known, draws))
+    witness = draws[rng.permutation(len(draws))[:_WITNESSES]]
     height = densities(witness)[:, 0] if len(witness) else np.empty(0)
     current: Mixture | Proposal = start
-    if len(known):
-        rough = Points.equal(known)
+    if len(draws):
+        rough = Points.equal(draws)
         current = _learned(rough, rough, start, order, rng, start)
     n, past = _LEAST, None
     log_ratio, settled = np.zeros(1), np.zeros(1, bool)
@@ -173,7 +168,7 @@ def sample(
         settled = settled | fresh.settled & fresh.settled[0]
         needed = _RESERVE * n * ess / np.maximum(effective(fresh.log_weight), 1.0)
         wanted = ~settled
-        if done >= _PATIENCE and len(wanted) > 2:
+        if done >= _PATIENCE:
             wanted[1:] &= needed[1:] <= _AFFORDABLE
         if done == _ROUNDS or not wanted.any():
             break
@@ -181,8 +176,8 @@ def sample(
         n = _LEAST if done == 1 else int(np.clip(needed[wanted].max(), _LEAST, _AFFORDABLE))
         past = _Past.first(fresh) if past is None else past.joined(fresh)
         hot, cold = past.points(wanted, ess)
-        if len(remembered):
-            hot, cold = (p.joined(Points.equal(remembered).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold))
+        if len(witness):
+            hot, cold = (p.joined(Points.equal(witness).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold))
         current = _learned(hot, cold, start, order, rng, current)
     return replace(fresh, settled=settled, log_ratio=log_ratio)
 
@@ -193,7 +188,6 @@ def from_draws(
     order: NDArray[np.int64],
     rng: np.random.Generator,
     ess: float,
-    near: Array | None = None,
 ) -> Weighted:
     """`sample`, begun from draws: modes are climbed to from the highest ones, those of the first also from others.
 
@@ -205,22 +199,18 @@ def from_draws(
     order : (d,) array of int
     rng : numpy Generator
     ess : float
-    near : (k, d) array, optional
-        Points near the other densities.
     """
-    near = draws[:0] if near is None else near
-    known = np.concatenate([draws, near])
-    height = densities(known)
+    height = densities(draws)
     width = draws.std(axis=0)
     spread = mixture.spread_rows(draws / np.where(width > 0, width, 1.0), _STARTS, rng)
     which = np.append(np.arange(height.shape[1]), np.zeros(len(spread), int))
-    begin = known[np.append(np.argmax(height, axis=0), spread)]
+    begin = draws[np.append(np.argmax(height, axis=0), spread)]
     found = climb(
         lambda z, rows: densities(z)[np.arange(len(rows)), which[rows]], begin, iterations=_STEPS, tolerance=1e-2
     )
     found = distinct([found])
     start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
-    return sample(densities, start, draws, near, order, rng, ess)
+    return sample(densities, start, draws, order, rng, ess)
 
 
 def widened(modes: Optimum) -> Mixture:
@@ -305,7 +295,7 @@ _STEPS = 40  # to a mode; the proposal learns the rest
 _WIDER = 1.7  # times the covariance at a mode
 LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
 _LEAST = 4096  # draws of a round: a proposal takes longer to learn than these to be drawn
-_ROUNDS = 9  # at most, some 100,000 draws: what has not settled by then has a proposal that never fits
+_ROUNDS = 8  # at most, some 100,000 draws: what has not settled by then, walkers sample sooner
 _PATIENCE = 3  # rounds in which all densities are learned, whatever they need
 _AFFORDABLE = 16_000  # draws for a density among others; alone, one takes some 3,000
 _WITNESSES = 1250  # of the rough points, that are learned from in every round: what they know is not forgotten

@@ -97,7 +97,7 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
     nothing = known.z[:0]
     for _ in range(_SEARCHES):
         start = importance.widened(known)
-        pool = importance.sample(density, start, nothing, nothing, target.coordinates.order, rng, ess)
+        pool = importance.sample(density, start, nothing, target.coordinates.order, rng, ess)
         if not pool.settled[0]:
             break
         others = search(target, rng, starts=_STARTS).modes
