@@ -20,6 +20,8 @@ def cost_of(wire: int, model: str) -> dict[str, Any]:
     from wirebayes.comparison.compare import Task, judge
     from wirebayes.io.paper import experiments
 
+    import arviz_stats  # noqa: F401  # a process loads it once, for all models
+
     candidate = next(c for c in known(wire) if c.name == model)
     begin = time.process_time()
     found = judge(Task(experiments()[wire], candidate), 0)

@@ -60,6 +60,18 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     assert found.elpd == pytest.approx([1.0, 2.0, 7.0, 4.0] if sampled else known)
 
 
+def test_weights_that_are_no_numbers_ask_for_sampling(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build([experiments()[1].train(4)])
+    log_p = np.random.default_rng(0).normal(size=(4, 500))
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
+    smoothed = SimpleNamespace(psislw=lambda values: (np.nan * values, 0.1))
+    monkeypatch.setattr(module, "array_statistics", lambda: smoothed)
+    monkeypatch.setattr(module, "log_densities", lambda *given: (np.arange(4.0), np.ones(4, bool)))
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert found.refitted.all() and found.elpd.tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
 def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bridge between its draws and those of the full posterior; one that did not converge is said."""
     log_p = np.random.default_rng(0).normal(size=(4, 500))

@@ -122,7 +122,8 @@ def smoothed_leave_one_hold_out(
         # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
         log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else array_statistics().psislw(log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
-    refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K), True
+    # smoothing can fail where draws repeat, with a k that looks well
+    refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True
     poor = alone = np.flatnonzero(refitted).tolist()
     if poor and not exact:
         elpd[poor], settled = log_densities(problem, [where[i] for i in poor], theta, seed_of(seed, "left out"))
