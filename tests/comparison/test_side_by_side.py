@@ -102,19 +102,31 @@ def test_a_judgement_says_what_was_scored(likelihood: str, scored: str, monkeypa
     assert found["scored"].startswith(scored) and found["failed"] is None and found["parameters"] == 8
 
 
+@pytest.mark.parametrize("settled", [True, False])
 @pytest.mark.parametrize(("train_holds", "fits", "early"), [(None, [12, 8], 8), (6, [6], 6)])
-def test_the_last_third_is_predicted_from_a_fit_of_the_others(
-    train_holds: int | None, fits: list[int], early: int, monkeypatch: pytest.MonkeyPatch
+def test_the_last_third_is_predicted_from_a_posterior_of_the_others(
+    train_holds: int | None, fits: list[int], early: int, settled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All holds are left out in turn, and the last four of twelve held out; a given number of holds serves both."""
+    """All holds are left out in turn, and the last four of twelve held out; a given number of holds serves both.
+
+    What importance sampling does not settle is fitted.
+    """
     made: list[int] = []
+    asked: list[float] = []
     received: dict[str, object] = {}
 
-    def fit(problem: object, seed: int, policy: object) -> object:
+    def posterior(problem: object, converged: bool, why: str) -> object:
         holds = int(problem.samples[0].protocol.recorded.sum())  # type: ignore[attr-defined]
-        made.append(holds)
-        chains = SimpleNamespace(converged=True, why="message")
-        return SimpleNamespace(problem=problem, chains=chains, holds=holds)
+        return SimpleNamespace(problem=problem, converged=converged, why=why, holds=holds)
+
+    def weighted(problem: object, seed: int, ess: float) -> object:
+        asked.append(ess)
+        found = posterior(problem, settled, "weights")
+        made.append(found.holds)  # type: ignore[attr-defined]
+        return found
+
+    def fit(problem: object, seed: int, policy: object) -> object:
+        return posterior(problem, True, "fit")
 
     def leave(full: object, seed: int) -> object:
         received.update(full=full.holds)  # type: ignore[attr-defined]
@@ -122,14 +134,17 @@ def test_the_last_third_is_predicted_from_a_fit_of_the_others(
         return SimpleNamespace(hold=np.array([1, 2]), total=3.0, se=1.0, elpd=nothing, pareto_k=nothing,
                                refitted=np.array([False, True]), converged=False)  # fmt: skip
 
+    monkeypatch.setattr(compare, "weighted_posterior", weighted)
     monkeypatch.setattr(compare, "fit", fit)
     monkeypatch.setattr(compare, "smoothed_leave_one_hold_out", leave)
     monkeypatch.setattr(compare, "held_out", lambda early, whole, rng: (early.holds, len(whole.recorded_holds)))
     monkeypatch.setattr(compare, "_held_out", lambda result, trained: {"found": result})
     found = compare._scores(Task(experiments()[1], PLAIN, train_holds), 0, Policy(ess=600.0, most_steps=1000))
+    assert set(asked) == {300.0}  # half of what is asked of a fit
     assert made == fits and found["held_out"]["found"] == (early, 12)
     assert received == {"full": fits[0]}
     assert found["leave_one_hold_out"]["refitted"].tolist() == [2]
+    assert found["convergence"] == ("weights" if settled else "fit")
     assert found["converged"] is False  # one of three samplings was not
     assert found["effects"] == [] and found["parameters"] == 8
     for candidate, listed in (("memory", ["memory"]), ("logarithmic", [])):  # a rival law is no effect of the catalogue
@@ -317,11 +332,11 @@ def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
 def test_a_judgement_has_seeds_of_its_own_for_every_model_and_number_of_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     seeds: list[int] = []
 
-    def fit(problem: object, seed: int, policy: object) -> object:
+    def weighted(problem: object, seed: int, ess: float) -> object:
         seeds.append(seed)
         raise InterruptedError("enough")
 
-    monkeypatch.setattr(compare, "fit", fit)
+    monkeypatch.setattr(compare, "weighted_posterior", weighted)
     for seed, name, train in ((0, "a", None), (0, "a", 6), (0, "b", None), (1, "a", None), (0, "a", None)):
         found = judge(Task(experiments()[1], replace(PLAIN, name=name), train), seed)
         assert found["failed"] == "InterruptedError: enough" and found["name"] == name
@@ -331,11 +346,11 @@ def test_a_judgement_has_seeds_of_its_own_for_every_model_and_number_of_holds(mo
 def test_without_the_holds_that_were_not_recorded_there_is_one_less(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
 
-    def fit(problem: object, seed: int, policy: object) -> object:
+    def weighted(problem: object, seed: int, ess: float) -> object:
         seen.append(len(problem.samples[0].protocol.number))  # type: ignore[attr-defined]
         raise InterruptedError
 
-    monkeypatch.setattr(compare, "fit", fit)
+    monkeypatch.setattr(compare, "weighted_posterior", weighted)
     for unrecorded in (True, False):
         judge(Task(experiments()[0], replace(PLAIN, unrecorded=unrecorded)), 0)
     assert seen == [13, 12]

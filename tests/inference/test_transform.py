@@ -8,11 +8,12 @@ from scipy import stats
 
 from tests.statistical.targets import Silent
 from wirebayes.effects import named
+from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.transform import LogPosterior, Transformation
 from wirebayes.model.pooling import pooled
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
-from wirebayes.wire.staircase import simulate
+from wirebayes.wire.staircase import Model, simulate
 
 LINE = [Bench("a", "line", 1000.0), Bench("b", "line", 1710.0, unrecorded=frozenset({4}))]
 PROBLEMS = {
@@ -100,6 +101,23 @@ def test_fixed_parameters_are_not_sampled():
     assert (problem.parameters(theta, problem.samples[0])["N"] == 1.0).all()
     coordinates = Transformation(problem)
     assert coordinates.to_natural(coordinates.to_sampled(theta)) == pytest.approx(theta, rel=1e-9)
+
+
+def test_wires_that_are_as_stiff_after_their_creep_lie_at_the_same_coordinate():
+    """All creep at once and in proportion to the tension: readings see 1 / (1 / k1 + B / L0) and nothing of k1."""
+    bench = Bench(resolution_N=0.0)
+    problem = build([bench.experiment()], [RIVALS["at_once"](), RIVALS["not_in_time"]()])
+    theta = problem.prior.rvs(200, np.random.default_rng(6))
+    column = {name: problem.names.index(name) for name in ("k1", "B", "U", "k2", "N")}
+    theta[:, [column["U"], column["k2"], column["N"]]] = 1.0
+    softness = theta[:, column["B"]] / bench.length_mm
+    theta[:, column["k1"]] = 1.0 / (1.0 / 500.0 - np.minimum(softness, 0.9 / 500.0))
+    theta[:, column["B"]] = np.minimum(softness, 0.9 / 500.0) * bench.length_mm
+    readings = simulate(problem.samples[0].protocol, problem.parameters(theta, problem.samples[0]), Model())
+    seen = replace(problem, samples=(replace(problem.samples[0], readings=readings[..., :1]),))
+    z = Transformation(seen).to_sampled(theta)
+    assert np.ptp(np.log(theta[:, column["k1"]])) > 1.0
+    assert z[:, column["k1"]] == pytest.approx(np.log(500.0), abs=0.01)
 
 
 @pytest.mark.parametrize(("effect", "amplitude"), [(None, 0.0), ("permanent_creep.psi", 0.5), ("ageing.a", 0.6)])

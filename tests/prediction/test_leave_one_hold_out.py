@@ -20,15 +20,19 @@ from wirebayes.prediction.leave_one_hold_out import (
     smoothed_leave_one_hold_out,
     standard_error,
     thinned,
-    without_hold,
 )
+from wirebayes.prediction.left_out_density import without_hold
 
 
+@pytest.mark.parametrize("converging", [True, False])
 @pytest.mark.parametrize(("tail", "sampled"), [(0.49, False), (0.5, False), (0.51, True), (np.nan, True)])
 def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
-    tail: float, sampled: bool, monkeypatch: pytest.MonkeyPatch
+    tail: float, sampled: bool, converging: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Above Pareto k of 0.5, or where it is not defined; what was not sampled counts as converged."""
+    """Above Pareto k of 0.5, or where it is not defined; what was not sampled counts as converged.
+
+    What is not settled by weights is fitted.
+    """
     rng = np.random.default_rng(0)
     log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
     problem = build([experiments()[1].train(4)])
@@ -40,12 +44,32 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
         assert holds == [(0, j) for j in range(4)] and len(draws) == 500
         return np.array([1.0, 2.0, 3.0, 4.0]), np.array([True, True, False, True])
 
+    def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
+        fitted.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
+        return SimpleNamespace(flat=np.zeros((500, 8)), converged=converging)
+
+    fitted: list[int] = []
+    monkeypatch.setattr(module, "fit", fit_without)
+    monkeypatch.setattr(module, "log_mean", lambda low, high: 7.0)
     monkeypatch.setattr(module, "log_densities", ratios)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
     found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
-    assert list(found.refitted) == [sampled] * 4 and found.converged is not sampled and shares == [1.0]
-    assert found.elpd == pytest.approx([1.0, 2.0, 3.0, 4.0] if sampled else known)
+    assert list(found.refitted) == [sampled] * 4 and found.converged is (converging or not sampled)
+    assert fitted == [2] * sampled and shares == [0.0] * sampled + [1.0]
+    assert found.elpd == pytest.approx([1.0, 2.0, 7.0, 4.0] if sampled else known)
+
+
+def test_weights_that_are_no_numbers_ask_for_sampling(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build([experiments()[1].train(4)])
+    log_p = np.random.default_rng(0).normal(size=(4, 500))
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
+    smoothed = SimpleNamespace(psislw=lambda values: (np.nan * values, 0.1))
+    monkeypatch.setattr(module, "array_statistics", lambda: smoothed)
+    monkeypatch.setattr(module, "log_densities", lambda *given: (np.arange(4.0), np.ones(4, bool)))
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert found.refitted.all() and found.elpd.tolist() == [0.0, 1.0, 2.0, 3.0]
 
 
 def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,7 +81,7 @@ def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch
 
     def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
         asked.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
-        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=len(asked) != 2))
+        return SimpleNamespace(flat=np.zeros((500, 8)), converged=len(asked) != 2)
 
     monkeypatch.setattr(module, "fit", fit_without)
     monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
@@ -188,7 +212,7 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
 
     def alone(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
         asked.append((seed, policy))
-        return SimpleNamespace(flat=np.zeros((500, 8)), chains=SimpleNamespace(converged=True))
+        return SimpleNamespace(flat=np.zeros((500, 8)), converged=True)
 
     monkeypatch.setattr(module, "log_densities", together)
     monkeypatch.setattr(module, "fit", alone)

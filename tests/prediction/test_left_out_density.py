@@ -14,8 +14,8 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
 from wirebayes.prediction import left_out_density as module
-from wirebayes.prediction.leave_one_hold_out import log_mean, smoothed_leave_one_hold_out, without_hold
-from wirebayes.prediction.left_out_density import joined, log_densities
+from wirebayes.prediction.leave_one_hold_out import log_mean, smoothed_leave_one_hold_out
+from wirebayes.prediction.left_out_density import joined, log_densities, without_hold
 
 
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
@@ -93,48 +93,49 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 DRAWS = np.random.default_rng(5).normal(size=(4000, 2))
 
 
-def test_ratios_of_integrals_are_found_also_where_a_posterior_is_apart(pools: list[int]) -> None:
-    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
-    assert settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
-    assert pools[0] == 4
+def by_themselves(monkeypatch: pytest.MonkeyPatch, converged: bool = True) -> list[int]:
+    """The holds whose posteriors without them are sampled by themselves, of `Normals`."""
+    asked: list[int] = []
+
+    def alone(hold: int, seed: int, ess: float) -> SimpleNamespace:
+        asked.append(hold)
+        assert ess == 1000.0
+        # the full one's integral is 2 pi, as it is there
+        return SimpleNamespace(log_evidence=np.log(2.0 * np.pi) - Normals.elpd[hold], converged=converged)
+
+    monkeypatch.setattr(module, "without_hold", lambda problem, sample, hold: hold)
+    monkeypatch.setattr(module, "weighted_posterior", alone)
+    return asked
 
 
-def test_what_is_given_up_is_sampled_with_the_full_posterior_alone(
+def test_ratios_of_integrals_are_found_also_where_a_posterior_is_apart(
     pools: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """From one proposal, even one that is thirty standard deviations away."""
+    asked = by_themselves(monkeypatch)
+    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+    assert settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
+    assert pools == [4] and not asked
+
+
+def test_what_is_given_up_is_sampled_by_itself(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     counted = importance.sample
 
     def given_up(*given: object) -> importance.Weighted:
-        found = counted(*given)  # type: ignore[arg-type]
-        return found if len(found.settled) == 2 else replace(found, settled=np.array([True, False, False]))
+        return replace(counted(*given), settled=np.array([True, True, False, False]))  # type: ignore[arg-type]
 
     monkeypatch.setattr(importance, "sample", given_up)
-    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1)], DRAWS, 7)  # type: ignore[arg-type]
-    assert pools == [3, 2, 2] and settled.all() and elpd == pytest.approx(Normals.elpd[:2], abs=0.15)
-
-
-def test_what_is_given_up_is_begun_near_the_posterior_without_its_hold(
-    pools: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """From as many draws of it as there are of the full one; only what was settled with the full one is."""
-    asked: list[object] = []
-
-    def found(densities: object, z: object, order: object, rng: object, ess: float, near: object = None) -> object:
-        asked.append(near)
-        settled = [True, False, True, False] if near is None else [len(asked) == 2, True]
-        drawn = lambda density, n, rng: (density, n)  # noqa: E731
-        integral = np.array([1.0, 2.0, 3.0, 4.0]) if near is None else np.array([10.0, 4.0])
-        return SimpleNamespace(log_integral=integral, settled=np.array(settled), drawn=drawn)
-
-    monkeypatch.setattr(importance, "from_draws", found)
-    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
-    assert asked == [None, (1, 4000), (3, 4000)]
-    assert elpd.tolist() == [6.0, -2.0, 6.0] and settled.tolist() == [True, True, False]
+    for converged in (True, False):
+        asked = by_themselves(monkeypatch, converged)
+        elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+        assert asked == [1, 2] and settled.tolist() == [True, converged, converged]
+        assert elpd == pytest.approx(Normals.elpd, abs=0.15)
 
 
 def test_what_never_settles_is_said(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importance, "tail", lambda log_weight: 0.8)
     monkeypatch.setattr(importance, "_ROUNDS", 2)
+    by_themselves(monkeypatch)  # without a full posterior, they are no help
     elpd, settled = log_densities(Normals(), [(0, 0)], DRAWS, 7)  # type: ignore[arg-type]
     assert not settled.any() and np.isfinite(elpd).all()
 

@@ -7,7 +7,8 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, without_hold
+from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
+from wirebayes.prediction.left_out_density import without_hold
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from wirebayes.comparison.candidates import Candidate, effects_of, problem_of
 from wirebayes.effects import catalogue
-from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
+from wirebayes.inference.weighted_posterior import Posterior, weighted_posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.comparison import (
@@ -33,6 +34,7 @@ from wirebayes.workers import workers
 
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
 POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=600)
+_WEIGHTED = 0.5  # of those draws where they are weighted: all are kept, and an integral is then known to .03
 MEANINGFUL_ELPD, MEANINGFUL_SE = 4.0, 2.0  # below either, the difference may be chance (Sivula et al. 2020)
 
 
@@ -99,20 +101,22 @@ def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
     recorded = len(whole.recorded_holds)
     first = task.train_holds or two_thirds(recorded)
 
-    def fitted(holds: int) -> Fit:
+    def sampled(holds: int) -> Posterior:
         training = whole.train(holds)
         own = seed_of(seed, task.experiment.name, candidate.name, str(holds))
-        return fit(problem_of(candidate, training, effects_of(candidate, training, known, seed)), own, policy=policy)
+        problem = problem_of(candidate, training, effects_of(candidate, training, known, seed))
+        found = weighted_posterior(problem, own, policy.ess * _WEIGHTED)
+        return found if found.converged else fit(problem, own, policy=policy)
 
-    full = fitted(task.train_holds or recorded)
+    full = sampled(task.train_holds or recorded)
     own = seed_of(seed, task.experiment.name, candidate.name, "without")
     left = smoothed_leave_one_hold_out(full, own)
-    early = full if task.train_holds else fitted(first)
+    early = full if task.train_holds else sampled(first)
     content: Judgement = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],
         "parameters": len(full.problem.names),
-        "converged": full.chains.converged and early.chains.converged and left.converged,
-        "convergence": full.chains.why,
+        "converged": full.converged and early.converged and left.converged,
+        "convergence": full.why,
         "leave_one_hold_out": {
             "holds": left.hold, "elpd": left.total, "se": left.se, "per_hold": left.elpd,
             "pareto_k": left.pareto_k, "refitted": left.hold[left.refitted],
@@ -125,11 +129,11 @@ def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
     return content
 
 
-def _keys(known: Mapping[str, Any], fitted: Fit) -> list[str]:
+def _keys(known: Mapping[str, Any], fitted: Posterior) -> list[str]:
     return [e.key for e in fitted.problem.samples[0].model.effects if e.name in known]
 
 
-def _held_out(result: HeldOut, trained: Fit) -> HeldOutHolds:
+def _held_out(result: HeldOut, trained: Posterior) -> HeldOutHolds:
     return {
         "trained_on": result.trained,
         "holds": np.unique(result.given.hold),

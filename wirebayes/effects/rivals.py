@@ -31,12 +31,17 @@ class AtOnce(Effect):
         exponent = hold.theta["U"]
         log_creep = np.log(hold.theta["B"] / hold.length_mm) + exponent * np.log(hold.theta["k1"])
         # In log s the equation is convex and rising: Newton's steps from above cannot miss.
-        alone = (np.log(whole) - log_creep) / exponent
-        log_s = np.where(alone.real < np.log(whole).real, alone, np.log(whole))
-        for _ in range(_NEWTON_STEPS):
-            elastic, crept = np.exp(log_s), np.exp(log_creep + exponent * log_s)
-            log_s = log_s - (elastic + crept - whole) / (elastic + exponent * crept)
+        log_s = np.minimum((np.log(whole.real) - log_creep.real) / exponent.real, np.log(whole.real))
+        for _ in range(_NEWTON_STEPS - 1):
+            log_s = _nearer(log_s, log_creep.real, exponent.real, whole.real)
+        log_s = _nearer(log_s, log_creep, exponent, whole)  # from the root itself, a step has its derivatives, too
         return np.where(stretched, np.exp(log_s), value)
+
+
+def _nearer(log_s: NDArray[Any], log_creep: NDArray[Any], exponent: Any, whole: NDArray[Any]) -> NDArray[Any]:
+    """One of Newton's steps towards the elastic part of a whole strain, in its logarithm."""
+    elastic, crept = np.exp(log_s), np.exp(log_creep + exponent * log_s)
+    return np.asarray(log_s - (elastic + crept - whole) / (elastic + exponent * crept))
 
 
 _NEWTON_STEPS = 7  # exact to rounding from where they start, in each of 20,000 draws of the prior; five leave 4e-9

@@ -44,6 +44,14 @@ class Fit:
         """(n, d) all stored draws."""
         return self.theta.reshape(-1, self.theta.shape[-1])
 
+    @property
+    def converged(self) -> bool:
+        return self.chains.converged
+
+    @property
+    def why(self) -> str:
+        return self.chains.why
+
 
 def fit(
     problem: Problem,

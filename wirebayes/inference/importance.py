@@ -2,8 +2,8 @@
 
 One proposal serves them all. Round by round its draws join a pool, where they are weighted for every density against
 the mixture of all proposals so far. The proposal is then learned anew from the whole pool: from the sum of the
-densities, each normalised, in which those that are known worst have the greatest shares. Once it is good enough, fresh
-draws of it give the integrals of all densities from the same evaluations, so that errors of their ratios largely
+densities, each normalised, in which those that are known worst have the greatest shares. Where it is good enough, fresh
+draws of it give the integrals of several densities from the same evaluations, so that errors of their ratios largely
 cancel.
 
 References
@@ -13,14 +13,14 @@ A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importan
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference.array_statistics import array_statistics
-from wirebayes.inference.modes import climb, distinct
+from wirebayes.inference.modes import Optimum, climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
@@ -39,13 +39,20 @@ class Weighted:
     log_density : (n, m) array
     log_proposal : (n,) array
     settled : (m,) bool array
-        Densities of which there are as many effective draws as were wanted, with weights that can be trusted.
+        Densities of which there are, or were in an earlier round, as many effective draws as were wanted, with weights
+        that can be trusted.
+    log_ratio : (m,) array
+        Logarithms of each integral over the first one, in the round that settled both, or else in the last.
+    proposal : Mixture or Proposal
+        What was drawn from.
     """
 
     z: Array
     log_density: Array
     log_proposal: Array
     settled: NDArray[np.bool_]
+    log_ratio: Array
+    proposal: Mixture | Proposal
 
     @property
     def log_weight(self) -> Array:
@@ -79,13 +86,18 @@ class _Past:
     proposals: tuple[Mixture | Proposal, ...]
     counts: tuple[int, ...]
 
-    def joined(self, new: Weighted, current: Mixture | Proposal) -> "_Past":
+    @staticmethod
+    def first(new: Weighted) -> "_Past":
+        """The draws of the first proposal."""
+        return _Past(new.z, new.log_density, new.log_proposal[None], (new.proposal,), (len(new.z),))
+
+    def joined(self, new: Weighted) -> "_Past":
         """With the draws of one more proposal."""
-        of_old = np.vstack([self.log_proposals, current.log_density(self.z)])
+        of_old = np.vstack([self.log_proposals, new.proposal.log_density(self.z)])
         of_new = np.vstack([*(q.log_density(new.z) for q in self.proposals), new.log_proposal])
         return _Past(
             np.vstack([self.z, new.z]), np.vstack([self.log_density, new.log_density]), np.hstack([of_old, of_new]),
-            (*self.proposals, current), (*self.counts, len(new.z)),
+            (*self.proposals, new.proposal), (*self.counts, len(new.z)),
         )  # fmt: skip
 
     def points(self, wanted: NDArray[np.bool_], ess: float) -> tuple[Points, Points]:
@@ -112,16 +124,16 @@ def sample(
     densities: Callable[[Array], Array],
     start: Mixture,
     draws: Array,
-    near: Array,
     order: NDArray[np.int64],
     rng: np.random.Generator,
     ess: float,
 ) -> Weighted:
     """Learn a proposal, then draw from it until there are enough effective draws of each density.
 
-    All draws are of the proposal that was learned last, so integrals have no bias from the learning; those of the
-    rounds before only teach. Among more than two densities, some may be given up: once the first rounds are over, those
-    that would need too many draws. Each is better sampled with the first alone, which is never given up.
+    A proposal takes longer to learn than thousands of draws to be made, so from the third round on there are as many as
+    seem to be needed. A density is settled by the draws of one round, so its integral has no bias from the learning;
+    those of the rounds before only teach. From then on the proposal is learned for the others. Once the first rounds
+    are over, those that would need too many draws are given up, except the first: each is better sampled by itself.
 
     Parameters
     ----------
@@ -130,9 +142,7 @@ def sample(
     start : Mixture
         Reaches every mode.
     draws : (n, d) array
-        Points that roughly follow the first density.
-    near : (k, d) array
-        Points near the others, none if there are none or they are like the first.
+        Points that roughly follow the first density; none where the start is all that is known of it.
     order : (d,) array of int
         In which coordinates are straightened (see `wirebayes.inference.sampler.transport_map`).
     rng : numpy Generator
@@ -143,32 +153,33 @@ def sample(
     -------
     Weighted
     """
-    known = np.concatenate([draws, near])
-    rough = Points.equal(known)
-    current = _learned(rough, rough, start, order, rng, start)
-    remembered, witness = (points[rng.permutation(len(points))[:_WITNESSES]] for points in (known, draws))
-    height = densities(witness)[:, 0]
-    fresh = _weighted(densities, current, _FIRST, ess, rng)
-    past = _Past(fresh.z, fresh.log_density, fresh.log_proposal[None], (current,), (len(fresh.z),))
-    wanted = np.ones(len(fresh.settled), bool)
-    for done in range(_ROUNDS):
-        hot, cold = (
-            each.joined(Points.equal(remembered).worth(_REMEMBERED * each.weight.sum()))
-            for each in past.points(wanted, ess)
-        )
-        current = _learned(hot, cold, start, order, rng, current)
-        needed = _RESERVE * len(fresh.z) * ess / np.maximum(effective(fresh.log_weight), 1.0)
-        if done >= _PATIENCE and len(wanted) > 2:
-            wanted[1:] &= needed[1:] <= _AFFORDABLE
-        most = int(needed[wanted].max())
-        ready = most < 2 * done * _LEARNING
-        n = min(max(most, _LEARNING), _AFFORDABLE) if ready else _LEARNING
+    witness = draws[rng.permutation(len(draws))[:_WITNESSES]]
+    height = densities(witness)[:, 0] if len(witness) else np.empty(0)
+    current: Mixture | Proposal = start
+    if len(draws):
+        rough = Points.equal(draws)
+        current = _learned(rough, rough, start, order, rng, start)
+    n, past = _LEAST, None
+    log_ratio, settled = np.zeros(1), np.zeros(1, bool)
+    for done in range(1, _ROUNDS + 1):
         fresh = _weighted(densities, current, n, ess, rng)
-        fresh.settled[0] &= expected(fresh, current, witness, height) >= _LEAST_EXPECTED * ess
-        if (fresh.settled | ~wanted).all():
+        fresh.settled[0] &= expected(fresh, witness, height) >= _LEAST_EXPECTED * ess
+        log_ratio = np.where(settled, log_ratio, fresh.log_ratio)
+        settled = settled | fresh.settled & fresh.settled[0]
+        needed = _RESERVE * n * ess / np.maximum(effective(fresh.log_weight), 1.0)
+        wanted = ~settled
+        if done >= _PATIENCE:
+            wanted[1:] &= needed[1:] <= _AFFORDABLE
+        if done == _ROUNDS or not wanted.any():
             break
-        past = past.joined(fresh, current)
-    return fresh
+        wanted[0] = True  # without it, the others are ratios of nothing
+        n = _LEAST if done == 1 else int(np.clip(needed[wanted].max(), _LEAST, _AFFORDABLE))
+        past = _Past.first(fresh) if past is None else past.joined(fresh)
+        hot, cold = past.points(wanted, ess)
+        if len(witness):
+            hot, cold = (p.joined(Points.equal(witness).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold))
+        current = _learned(hot, cold, start, order, rng, current)
+    return replace(fresh, settled=settled, log_ratio=log_ratio)
 
 
 def from_draws(
@@ -177,7 +188,6 @@ def from_draws(
     order: NDArray[np.int64],
     rng: np.random.Generator,
     ess: float,
-    near: Array | None = None,
 ) -> Weighted:
     """`sample`, begun from draws: modes are climbed to from the highest ones, those of the first also from others.
 
@@ -189,22 +199,23 @@ def from_draws(
     order : (d,) array of int
     rng : numpy Generator
     ess : float
-    near : (k, d) array, optional
-        Points near the other densities.
     """
-    near = draws[:0] if near is None else near
-    known = np.concatenate([draws, near])
-    height = densities(known)
+    height = densities(draws)
     width = draws.std(axis=0)
     spread = mixture.spread_rows(draws / np.where(width > 0, width, 1.0), _STARTS, rng)
     which = np.append(np.arange(height.shape[1]), np.zeros(len(spread), int))
-    begin = known[np.append(np.argmax(height, axis=0), spread)]
+    begin = draws[np.append(np.argmax(height, axis=0), spread)]
     found = climb(
         lambda z, rows: densities(z)[np.arange(len(rows)), which[rows]], begin, iterations=_STEPS, tolerance=1e-2
     )
     found = distinct([found])
     start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
-    return sample(densities, start, draws, near, order, rng, ess)
+    return sample(densities, start, draws, order, rng, ess)
+
+
+def widened(modes: Optimum) -> Mixture:
+    """The modes' normal approximations, wide enough that little of the posterior lies outside, with heavier tails."""
+    return mixture.from_modes(modes.z, _WIDER * modes.covariance, modes.log_evidence)
 
 
 def _weighted(
@@ -215,7 +226,8 @@ def _weighted(
     log_weight = log_density - log_proposal[:, None]
     enough = effective(log_weight) >= ess
     trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
-    return Weighted(z, log_density, log_proposal, np.array(trusted))
+    integral = logsumexp(log_weight, axis=0)
+    return Weighted(z, log_density, log_proposal, np.array(trusted), integral - integral[0], current)
 
 
 def effective(log_weight: Array) -> Array:
@@ -225,8 +237,8 @@ def effective(log_weight: Array) -> Array:
     return np.asarray(weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300))
 
 
-def expected(fresh: Weighted, current: Mixture | Proposal, witness: Array, height: Array) -> float:
-    """Effective draws of the first density, as its weights at other draws of it promise.
+def expected(fresh: Weighted, witness: Array, height: Array) -> float:
+    """Effective draws of the first density, as its weights at other draws of it promise; all, where there are none.
 
     Draws of a proposal know nothing of a hill that it misses, and their weights look fine.
 
@@ -234,13 +246,14 @@ def expected(fresh: Weighted, current: Mixture | Proposal, witness: Array, heigh
     ----------
     fresh : Weighted
         Draws of the proposal.
-    current : Mixture or Proposal
     witness : (n, d) array
         Draws that roughly follow the first density.
     height : (n,) array
         Its logarithm there.
     """
-    over = height - current.log_density(witness) - fresh.log_integral[0]
+    if not len(witness):
+        return float(len(fresh.z))
+    over = height - fresh.proposal.log_density(witness) - fresh.log_integral[0]
     return float(len(fresh.z) * np.exp(min(np.log(len(over)) - logsumexp(over), 0.0)))
 
 
@@ -281,9 +294,9 @@ _STARTS = 6  # of climbs on the first density, besides the highest draw
 _STEPS = 40  # to a mode; the proposal learns the rest
 _WIDER = 1.7  # times the covariance at a mode
 LARGEST_K = 0.7  # above it no number of draws is enough (Vehtari et al.)
-_FIRST, _LEARNING = 1024, 2048  # draws of the first round and of others that only teach
-_ROUNDS = 14  # at most, some 50,000 draws: what has not settled by then has a proposal that never fits
-_PATIENCE = 4  # rounds in which all densities are learned, whatever they need
+_LEAST = 4096  # draws of a round: a proposal takes longer to learn than these to be drawn
+_ROUNDS = 8  # at most, some 100,000 draws: what has not settled by then, walkers sample sooner
+_PATIENCE = 3  # rounds in which all densities are learned, whatever they need
 _AFFORDABLE = 16_000  # draws for a density among others; alone, one takes some 3,000
 _WITNESSES = 1250  # of the rough points, that are learned from in every round: what they know is not forgotten
 _LEAST_EXPECTED = 0.5  # of the effective draws wanted: what a thousand rough draws promise is known to a factor

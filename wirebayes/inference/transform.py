@@ -8,9 +8,12 @@ deviations of their prior. Then, one after the other,
 - log B becomes the log tension lost in a hold, root mean square over the holds of the test, with the first readings
   taken as the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
   creep is linear in B, so G does not depend on B and takes one pass along the holds. Effects on the amount of creep
-  belong to G.
+  belong to G;
+- log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost / step)``, with the tension lost
+  in a hold over the root mean square of the steps between first readings. Where all creep is over before a first
+  reading, the readings see this stiffness alone; where there is little, it is k1.
 
-The map is triangular and these two steps have unit Jacobian. Values of partially pooled specimens come last
+The map is triangular and these steps have unit Jacobian. Values of partially pooled specimens come last
 (`wirebayes.inference.specimens`).
 
 The proposal learns the remaining curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the
@@ -53,6 +56,7 @@ class _Ridge:
     shifted: frozenset[str]
     steepest: float
     log_tension: Array
+    log_step: float
     times_s: Array
     which_time: NDArray[np.int64]
     kept: float
@@ -64,6 +68,10 @@ class _Ridge:
     def get(self, theta: Array, name: str) -> Any:
         """(n,) a parameter of the material, or the number that it is fixed at."""
         return theta[:, self.where[name]] if name in self.where else self.fixed[name]
+
+    def softened(self, z: Array) -> Array:
+        """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
+        return np.asarray(np.logaddexp(0.0, z[:, self.where["B"]] - self.log_step))
 
     def log_creep(self, U: Array, k2: Array, N: Array, theta: Array) -> Array:
         """log G: root mean square of the elongation gained in a hold, for B = 1.
@@ -132,7 +140,9 @@ class Transformation:
             }
             if len(where) + len(fixed) < len(MATERIAL):
                 continue  # a user's prior that allows negative values: leave this material's columns as they are
-            moved = frozenset({"k2", "B"} & {name for name in where if columns[name] not in shifted})
+            moved = frozenset({"k2", "B", "k1"} & {name for name in where if columns[name] not in shifted})
+            if self.specimens is not None or "B" not in moved:
+                moved -= {"k1"}  # specimens' values have coordinates of their own, and without B's nothing is known
             shifted |= {columns[name] for name in moved}
             if moved:
                 effects = tuple(e for e in sample.model.at("amount") if has_formula(e))  # others may ask for B
@@ -156,6 +166,8 @@ class Transformation:
                 z[:, ridge.where["k2"]] += hazard
             if "B" in ridge.shifted:
                 z[:, ridge.where["B"]] += creep
+            if "k1" in ridge.shifted:
+                z[:, ridge.where["k1"]] -= ridge.softened(z)
         if self.specimens is not None:
             z[:, self.specimens.own] = self.specimens.to_sampled(theta)
         return z
@@ -170,6 +182,8 @@ class Transformation:
             for ridge in self.ridges:
                 if "k2" in ridge.shifted:
                     theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
+                if "k1" in ridge.shifted:
+                    theta[:, ridge.where["k1"]] = np.exp(z[:, ridge.where["k1"]] + ridge.softened(z))
                 if "B" in ridge.shifted:
                     theta[:, ridge.where["B"]] = np.exp(z[:, ridge.where["B"]] - self._shifts(theta, ridge)[0])
             if self.specimens is not None:
@@ -230,6 +244,7 @@ def _ridge(
     first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
     # a slack wire drives no creep; a small share of the largest tension stands in for it
     tension = np.maximum(first, 0.02 * first.max()) if first.max() > 0 else np.ones_like(first)
+    log_step = 0.5 * float(np.log(np.mean(np.diff(tension, prepend=0.0) ** 2)))
     hold_s = sample.typical_hold_s
     duration = sample.protocol.duration_s
     times, which = np.unique(np.where(duration > 0, duration, hold_s), return_inverse=True)
@@ -241,7 +256,7 @@ def _ridge(
         for hold, first in zip(sample.protocol.holds, tension, strict=True)
     )  # fmt: skip
     return _Ridge(
-        where, fixed, shifted, steepest, np.log(tension), times, which, kept, hold_s, float(np.log(length)),
+        where, fixed, shifted, steepest, np.log(tension), log_step, times, which, kept, hold_s, float(np.log(length)),
         effects, holds,
     )  # fmt: skip
 

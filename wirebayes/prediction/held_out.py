@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from wirebayes.inference.fit import Fit
+from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.prediction.leave_one_hold_out import thinned
@@ -101,12 +101,12 @@ class HeldOut:
     given: Scores
 
 
-def held_out(fitted: Fit, experiment: Experiment, rng: np.random.Generator, sample: int = 0) -> HeldOut:
+def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator, sample: int = 0) -> HeldOut:
     """Predict the holds of an experiment that a fit of its first holds has not seen.
 
     Parameters
     ----------
-    fitted : Fit
+    fitted : Fit or WeightedPosterior
         One of its samples is the experiment's first holds.
     experiment : Experiment
         The whole of it.
@@ -201,7 +201,7 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
 
 
 def _chain_scores(
-    fitted: Fit, experiment: Experiment, sample: int, requested: NDArray[np.bool_]
+    fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]
 ) -> tuple[Array, Array, float]:
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
     problem, here = fitted.problem, fitted.problem.samples[sample]
@@ -222,7 +222,7 @@ def _chain_scores(
     return whole_hold, whole_hold - first_reading, float(every)
 
 
-def _hold_scores(fitted: Fit, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:
+def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["k1"]}

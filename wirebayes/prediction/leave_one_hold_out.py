@@ -4,11 +4,11 @@ Leaving a hold out drops its readings, never its displacement and duration: the 
 posterior without a hold is obtained from the full one by Pareto-smoothed importance sampling with the ratios ``1 /
 p(readings of the hold | all other readings, parameters)``. Where the tail of the ratios is too heavy for some holds,
 their densities are ratios of integrals, found by importance sampling from a proposal that is learned for them
-(`wirebayes.prediction.left_out_density`).
+(`wirebayes.prediction.left_out_density`). What is not settled then is left to walkers.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,10 @@ from scipy.optimize import brentq
 from scipy.special import expit, logsumexp
 
 from wirebayes.inference.array_statistics import array_statistics
-from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
-from wirebayes.model.problem import Problem
-from wirebayes.prediction.left_out_density import log_densities
+from wirebayes.inference.weighted_posterior import Posterior
+from wirebayes.prediction.left_out_density import log_densities, without_hold
 from wirebayes.typing import Floats
 
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
@@ -83,7 +83,7 @@ def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
 
 
 def smoothed_leave_one_hold_out(
-    fitted: Fit,
+    fitted: Posterior,
     seed: int = 0,
     *,
     policy: Policy = REFIT,
@@ -98,12 +98,12 @@ def smoothed_leave_one_hold_out(
 
     Parameters
     ----------
-    fitted : Fit
+    fitted : Fit or WeightedPosterior
         With a likelihood hold by hold, a hold's first reading stays given.
     seed : int
         Of what is sampled without holds.
     policy : Policy
-        Of fits without a hold, if `exact`.
+        Of fits without a hold, if `exact` or where importance sampling does not settle its density.
     exact : bool
         Fit without every hold, one by one, whatever the diagnostic says.
     progress : function of a share between 0 and 1
@@ -122,47 +122,22 @@ def smoothed_leave_one_hold_out(
         # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
         log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else array_statistics().psislw(log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
-    refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K), True
-    poor = np.flatnonzero(refitted).tolist()
-    if exact:
-        for done, i in enumerate(poor):
-            progress(done / len(poor))
-            s, j = where[i]
-            without = fit(
-                without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta
-            )
-            elpd[i] = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
-            converged &= without.chains.converged
-    elif poor:
+    # smoothing can fail where draws repeat, with a k that looks well
+    refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True
+    poor = alone = np.flatnonzero(refitted).tolist()
+    if poor and not exact:
         elpd[poor], settled = log_densities(problem, [where[i] for i in poor], theta, seed_of(seed, "left out"))
-        converged = bool(settled.all())
+        alone = [i for i, known in zip(poor, settled, strict=True) if not known]
+    for done, i in enumerate(alone):
+        progress(done / len(alone))
+        s, j = where[i]
+        without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta)
+        elpd[i] = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
+        converged &= without.converged
     progress(1.0)
     names = tuple(problem.samples[s].name for s, _ in where)
     numbers = np.array([problem.samples[s].protocol.number[j] for s, j in where])
     return LeftOut(names, numbers, elpd, k, refitted, converged)
-
-
-def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
-    """The problem that does not see the readings of one hold.
-
-    Parameters
-    ----------
-    problem : Problem
-    sample : int
-        Position among the problem's samples.
-    hold : int
-        Row of the sample's protocol; unrecorded holds count.
-
-    Returns
-    -------
-    Problem
-        Displacement and duration of the hold stay, so the wire creeps there all the same.
-    """
-    here = problem.samples[sample]
-    mask = here.protocol.mask.copy()
-    mask[hold] = False
-    kept = replace(here, protocol=replace(here.protocol, mask=mask))
-    return replace(problem, samples=(*problem.samples[:sample], kept, *problem.samples[sample + 1 :]))
 
 
 def thinned(theta: Floats, draws: int = _DRAWS) -> Floats:

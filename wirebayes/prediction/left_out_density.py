@@ -1,16 +1,19 @@
 """Log densities of holds given all others, as ratios of integrals: of the full posterior and of those without a hold.
 
 All are sampled by importance from one proposal (`wirebayes.inference.importance`). Posteriors without a hold that are
-far from the others are sampled with the full one alone.
+far from the others are sampled by themselves, from a search of their own.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference import importance
+from wirebayes.inference.fit import seed_of
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.weighted_posterior import weighted_posterior
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
 
@@ -38,13 +41,36 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     target = LogPosterior(problem)
     z = target.coordinates.to_sampled(draws)
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
-    elpd, settled = pool.log_integral[0] - pool.log_integral[1:], pool.settled[0] & pool.settled[1:]
+    elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
     for m in np.flatnonzero(~settled).tolist():
-        near = pool.drawn(1 + m, len(z), rng)
-        both = joined(target, [holds[m]])
-        own = importance.from_draws(both, z, target.coordinates.order, rng, _ESS, near)
-        elpd[m], settled[m] = own.log_integral[0] - own.log_integral[1], own.settled.all()
+        s, j = holds[m]
+        alone = weighted_posterior(without_hold(problem, s, j), seed_of(seed, str(s), str(j)), _ALONE)
+        elpd[m] = pool.log_integral[0] - alone.log_evidence
+        settled[m] = pool.settled[0] and alone.converged
     return elpd, settled
+
+
+def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
+    """The problem that does not see the readings of one hold.
+
+    Parameters
+    ----------
+    problem : Problem
+    sample : int
+        Position among the problem's samples.
+    hold : int
+        Row of the sample's protocol; unrecorded holds count.
+
+    Returns
+    -------
+    Problem
+        Displacement and duration of the hold stay, so the wire creeps there all the same.
+    """
+    here = problem.samples[sample]
+    mask = here.protocol.mask.copy()
+    mask[hold] = False
+    kept = replace(here, protocol=replace(here.protocol, mask=mask))
+    return replace(problem, samples=(*problem.samples[:sample], kept, *problem.samples[sample + 1 :]))
 
 
 def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
@@ -68,4 +94,5 @@ def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
 
 
 _ESS = 400.0  # a ratio of two integrals is then known to .07 at worst
+_ALONE = 1000.0  # more, as nothing cancels in a ratio of integrals from two proposals
 _ROWS = 1024  # points at once: what stays in the cache
