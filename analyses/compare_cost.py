@@ -17,10 +17,10 @@ import numpy as np
 
 def cost_of(wire: int, model: str) -> dict[str, Any]:
     """One model in this process: processor time, elpd, and whether all its samplings converged."""
+    import arviz_stats  # noqa: F401  # a process loads it once, for all models
+
     from wirebayes.comparison.compare import Task, judge
     from wirebayes.io.paper import experiments
-
-    import arviz_stats  # noqa: F401  # a process loads it once, for all models
 
     candidate = next(c for c in known(wire) if c.name == model)
     begin = time.process_time()
