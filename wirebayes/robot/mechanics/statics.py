@@ -211,8 +211,9 @@ def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H
     outer = np.stack([(q[i] * r).sum(1) for i in range(3)])
     outer[2] += moment  # the weight, an arm of its own
     trace = outer[0, 0] + outer[1, 1] + outer[2, 2]
-    H[3:, 3:] += 0.5 * (outer + outer.swapaxes(0, 1))
-    for i in range(3):
+    turned_twice = 0.5 * (outer + outer.swapaxes(0, 1))
+    for i in range(3):  # nothing is in the lower triangle yet, not even a number
+        H[3 + i, 3 + i :] += turned_twice[i, i:]
         H[3 + i, 3 + i] -= trace
 
 
