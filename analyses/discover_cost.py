@@ -18,6 +18,8 @@ from analyses.gate_cost import PAPER, experiments_of
 
 def cost_of(name: str, simulations: int) -> dict[str, Any]:
     """One case in this process: processor time, p, verdict and effects of its first experiment."""
+    import arviz_stats  # noqa: F401  # a command loads it once, and for its posteriors anyway
+
     from wirebayes.discovery.search import investigate
     from wirebayes.discovery.settings import Settings
     from wirebayes.effects import CATALOGUE
