@@ -8,7 +8,7 @@ both searches. Where that does not help, or the weights cannot be trusted, the p
 the caller has to sample it (`wirebayes.inference.fit`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,8 +104,7 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
         if overlooked(target, pool, importance.widened(others), rng) <= _NEXT_TO_NOTHING:
             return pool
         known = distinct([known, others])
-    pool.settled[0] = False
-    return pool
+    return replace(pool, settled=np.zeros(1, bool))
 
 
 def overlooked(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.random.Generator) -> float:
