@@ -17,6 +17,9 @@ SIMULATIONS = 999  # p of .04 is then known to .006, and more are made where tha
 UNKNOWN_WEIGHT = 1.0  # a remainder and no effect, to one name: a person who finds a gap is as ready for either
 MORE_EFFECTS = 0.1  # all sets of k + 1 names, to all sets of k: one thing missing is ten times likelier than two
 REMAINDER_WEIGHT = 0.5  # a remainder beside effects, to none beside the same effects
+# Lengths of a remainder's processes, in steps of three: neighbours explain nearly the same.
+HOLD_LENGTHS = (1.5, 4.0, 10.0)  # holds: from what one shares with the next to the whole test
+TIME_LENGTHS = (0.7, 2.0, 50.0)  # of the logarithm of time: from a part of a hold to all of it
 NEARLY_ONE = 0.9999  # |cos| of signatures from which two names are one, and share its weight
 
 # Which sets are looked at.

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.discovery.settings import HOLD_LENGTHS, TIME_LENGTHS
 from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 
 FUNCTIONS = 16  # they hold 99 % of the process's variance on the paper's protocols
-# Lengths of the other processes, in holds and in the logarithm of time: from what a hold shares with the next to the
-# whole test, and from a part of a hold to all of it. Steps of three: neighbours explain nearly the same.
-HOLDS, TIMES = (1.5, 4.0, 10.0), (0.7, 2.0, 50.0)
-SHORT_FUNCTIONS = 40  # of these; short lengths need more to hold 99 % of their variance
+SHORT_FUNCTIONS = 40  # of the other processes; short lengths need more to hold 99 % of their variance
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ def family(protocol: Protocol) -> list[Array]:
     deviation of a few holds, or early in each, was no remainder, and was given the name of an effect.
     """
     at = _Readings.of(protocol)
-    kernels = [_smooth(at.hold, holds) * _smooth(at.time, times) for holds in HOLDS for times in TIMES]
+    kernels = [_smooth(at.hold, holds) * _smooth(at.time, times) for holds in HOLD_LENGTHS for times in TIME_LENGTHS]
     return [basis(protocol, 1.0), *(_functions(protocol, kernel, SHORT_FUNCTIONS) for kernel in kernels)]
 
 
