@@ -11,11 +11,14 @@ from wirebayes.workflows.results import Calibration, Comparison, Findings, Place
 
 HELD_OUT = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": 0.05}}
 SLIP = {
-    "verdict": "ambiguous", "effects": ["grip_slip", "toe"], "group": ["grip_slip", "toe", "ageing", "unknown"],
+    "verdict": "ambiguous", "effects": ["grip_slip", "toe"], "set": ["grip_slip", "unknown", "toe"],
+    "probabilities": {"grip_slip": 0.62, "toe": 0.14, "unknown": 0.17, "ageing": 0.07},
+    "group": ["grip_slip", "toe", "ageing", "unknown"],
     "p_global": 0.001, "held_out": HELD_OUT, "next_measurement": "Unload.",
     "amplitudes": {"grip_slip": {"mean": 0.31, "q05": 0.25, "q95": 0.38, "unit": "mm", "hold": 4}},
 }  # fmt: skip
-CLEAN = {"verdict": "nothing-missing", "effects": [], "group": [], "p_global": 0.4, "held_out": HELD_OUT,
+CLEAN = {"verdict": "nothing-missing", "effects": [], "set": [], "probabilities": {}, "group": [],
+         "p_global": 0.4, "held_out": HELD_OUT,
          "next_measurement": "Hold longer.", "amplitudes": {}}  # fmt: skip
 
 
@@ -28,7 +31,7 @@ def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
     assert answer.answer(found) == [
-        "a: ambiguous: grip_slip, toe (p = 0.001)",
+        "a: ambiguous: grip_slip (62 %), nothing known (17 %) or toe (14 %) (p = 0.001)",
         "  grip_slip at hold 4 0.31 [0.25, 0.38] mm",
         "  hard to distinguish on this protocol: ageing",
         "  held-out holds: rmse 0.25 -> 0.05 N",
@@ -43,6 +46,19 @@ def test_a_part_that_has_a_name_is_said_with_the_rest_that_has_none(tmp_path: Pa
     assert answer.answer(found)[0] == "a: grip_slip is missing, and something that is not in the catalogue (p = 0.001)"
     two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"a": part | {"effects": ["grip_slip", "toe"]}}})
     assert answer.answer(two)[0].startswith("a: grip_slip, toe are missing, and something")
+
+
+def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp_path: Path) -> None:
+    """A remainder with toe at 90 % beside it, which is not quite enough to accept it, is no answer without a name."""
+    open_ = SLIP | {"verdict": "unknown", "effects": [], "amplitudes": {}}
+    likely = open_ | {"set": ["toe", "unknown"], "probabilities": {"toe": 0.89, "ageing": 0.03, "unknown": 0.08}}
+    alone = open_ | {"set": ["unknown"], "probabilities": {"toe": 0.04, "unknown": 0.96}}
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": likely, "b": alone}})
+    assert answer.answer(found) == [
+        "a: something is missing that is not in the catalogue (p = 0.001)",
+        "  beside it most likely toe (89 %) or nothing known (8 %); none of these is established",
+        "b: something is missing that is not in the catalogue (p = 0.001)",
+    ]
 
 
 def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:

@@ -106,6 +106,15 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
 
 
+def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its probability is zero; as something that is no number, it made every other probability none either."""
+    monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
+        effect, tuple(which), -np.inf, 0.0, 1.0, ()))  # fmt: skip
+    data, trials = scan_of(np.array([8.0]), True), probes(named("toe"))[:1]
+    found = name_evidence.weigh_names([SimpleNamespace()], trials, [Candidate(0, "toe", (0,), True)], [data])  # type: ignore[list-item]
+    assert found.log_bayes["toe"] == -np.inf and found.presence["toe"] == pytest.approx([0.0])
+
+
 @pytest.mark.parametrize("one_sided", [True, False])
 def test_the_amplitude_that_four_tests_in_five_would_show(one_sided: bool) -> None:
     """Known noise: z is normal about δ with sd 1, and an effect passes where z²/2 and the prior beat the threshold."""

@@ -270,11 +270,18 @@ DISCOVERY = {
         ({"group": ["strain_stiffening"]}, "What is missing: strain stiffening."),
         ({}, "The wire becomes stiffer (or softer) the more it is strained. τ = k1 s (1 + c s)."),
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "Nothing is missing"),
-        ({"verdict": "unknown", "effects": []}, "that no effect in the catalogue explains"),
+        ({"verdict": "unknown", "effects": [], "set": ["unknown"]}, "that no effect in the catalogue explains."),
+        (
+            {"verdict": "unknown", "effects": [], "probabilities": {"unknown": 0.2, "strain_stiffening": 0.8}},
+            "explains. Beside it most likely: strain stiffening (80 %); none of these is established.",
+        ),
         ({"verdict": "partial"}, "Strain stiffening is missing, and something else that no effect"),
         ({"verdict": "partial", "effects": ["toe", "memory"]}, "Toe and memory are missing, and something else"),
         ({}, "remains beside them with probability 0.020"),
-        ({"verdict": "ambiguous", "set": ["toe", "memory"]}, "cannot distinguish between toe and memory"),
+        (
+            {"verdict": "ambiguous", "set": ["toe", "memory"], "probabilities": {"toe": 0.7, "memory": 0.25}},
+            "these readings do not tell what: toe (70 %) or memory (25 %);",
+        ),
     ],
 )
 def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, message, tmp_path):

@@ -17,6 +17,7 @@ from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Quantiles
+from wirebayes.sentences import likely
 from wirebayes.workflows.results import (
     Batch,
     Calibration,
@@ -151,10 +152,14 @@ def _effects(summary: SummaryJson) -> list[str]:
 def _finding(name: str, report: ExperimentFindings) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
     finding = _NAMED.get(verdict, f"{verdict}: {effects}")
+    if verdict == "ambiguous":
+        finding = f"ambiguous: {likely(report)}"
     if verdict == "partial":
         are = "are" if report["effects"][1:] else "is"
         finding = f"{effects} {are} missing, and something that is not in the catalogue"
     lines = [f"{name}: {finding} (p = {report['p_global']:.2g})"]
+    if verdict == "unknown" and likely(report):
+        lines.append(f"  beside it most likely {likely(report)}; none of these is established")
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
         unit = "" if size["unit"] == "-" else f" {size['unit']}"

@@ -149,8 +149,10 @@ def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int, 
     for name, options in parts.items():
         totals = np.array([total for total, _, _ in options])
         log_bayes[name] = float(logsumexp(totals) - np.log(len(totals)))
-        share = np.exp(totals - logsumexp(totals))
-        presence_[name] = np.sum([s * presence for s, (_, presence, _) in zip(share, options, strict=True)], axis=0)
+        # no form is possible where no climb of any ended
+        share = np.exp(totals - logsumexp(totals)) if np.isfinite(totals).any() else np.zeros(len(totals))
+        presence = np.sum([s * presence for s, (_, presence, _) in zip(share, options, strict=True)], axis=0)
+        presence_[name] = np.minimum(presence, 1.0)
         refitted = [option for option in options if option[2]]
         if refitted:
             winners_[name] = max(refitted, key=lambda option: option[0])[2]

@@ -9,7 +9,8 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.clock import has_moments
 from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, unit_of
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.undecided import Undecided, listed
+from wirebayes.io.bench.undecided import Undecided
+from wirebayes.sentences import listed
 from wirebayes.units import nearest
 
 IGNORE = "ignore"

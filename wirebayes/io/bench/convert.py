@@ -22,10 +22,11 @@ from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet, is_number, is_value
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.thinning import MOST, thinned
-from wirebayes.io.bench.undecided import Choices, Decimal, Undecided, listed
+from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.experiment import Experiment, experiment_of
 from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
 from wirebayes.io.toml_keys import Keys
+from wirebayes.sentences import listed
 from wirebayes.typing import Floats
 
 _COLUMN_ROLES: dict[str, Role] = {

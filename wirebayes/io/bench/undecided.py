@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from wirebayes.errors import InputError
+from wirebayes.sentences import listed
 
 Decimal = Literal["point", "comma"]
 TimeSince = Literal["hold", "test"]
@@ -63,11 +64,6 @@ class Undecided(InputError):
         besides = f"; besides, undecided: {'; '.join(more)}" if more else ""
         super().__init__(f"{found}; expected {options} to say {question}{besides}")
         self.found, self.question, self.answers = found, question, dict(answers)
-
-
-def listed(words: Sequence[str], last: str = "and") -> str:
-    """Words as a sentence lists them."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
 def quoted(option: str) -> str:

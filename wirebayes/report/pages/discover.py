@@ -24,8 +24,8 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.glossary import meaning, spoken
-from wirebayes.report.pages.paper_summary import listed
 from wirebayes.report.pictures.discover import waterfall
+from wirebayes.sentences import likely, listed
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -57,11 +57,12 @@ _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % 
 
 
 def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
-    candidates = listed([spoken(e) for e in v["set"]])
+    candidates = likely(v, spoken)
+    beside = f" Beside it most likely: {candidates}; none of these is established." if candidates else ""
     words = {
         "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
-        "unknown": "Something is missing that no effect in the catalogue explains.",
-        "ambiguous": f"Something is missing; these readings cannot distinguish between {candidates}{_alike(v)}.",
+        "unknown": f"Something is missing that no effect in the catalogue explains.{beside}",
+        "ambiguous": f"Something is missing; these readings do not tell what: {candidates}{_alike(v)}.",
         "named": f"What is missing: {listed([spoken(e) for e in v['effects']])}{_alike(v)}.",
         "partial": f"{listed([spoken(e) for e in v['effects']]).capitalize()} {'are' if v['effects'][1:] else 'is'} "
         "missing, and something else that no effect in the catalogue explains.",

@@ -26,9 +26,9 @@ from wirebayes.report.blocks import (
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
-from wirebayes.report.pages.paper_summary import listed
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.store import Stored, load_with_priors, unit_of
+from wirebayes.sentences import listed
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 

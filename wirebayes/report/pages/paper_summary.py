@@ -1,10 +1,10 @@
 """The summary of the paper reproduced: what was measured, what is known well, what is not."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from wirebayes.report.blocks import Columns, Points, number, span
 from wirebayes.report.pages.paper_tables import LEAST_COVERAGE, Rows
+from wirebayes.sentences import listed
 
 
 def in_a_minute(tables: dict[str, Rows]) -> Columns:
@@ -80,8 +80,3 @@ def of_table_4(rows: Rows, source: str) -> Rows:
 def unbroken(row: dict[str, Any]) -> str:
     """A sample's name that does not break at its hyphens."""
     return str(row["experiment"]).replace("-", "\u2011")
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names as a sentence lists them."""
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1] if names else "nothing"

@@ -8,9 +8,10 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded, files_beside
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import paper_tables
-from wirebayes.report.pages.paper_summary import in_a_minute, listed, of_table_4, unbroken
+from wirebayes.report.pages.paper_summary import in_a_minute, of_table_4, unbroken
 from wirebayes.report.pages.paper_tables import LEAST_COVERAGE, Rows
 from wirebayes.report.pages.robot_view import robot_view
+from wirebayes.sentences import listed
 
 Tables = dict[str, Rows]
 Gallery = Callable[..., list[Block]]
