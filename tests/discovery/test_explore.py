@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from wirebayes.discovery import stepwise
 from wirebayes.discovery.model_space import EffectSet, log_prior
@@ -88,6 +87,17 @@ def test_a_set_keeps_the_better_of_two_chains(monkeypatch: pytest.MonkeyPatch) -
     assert pair.log_bayes == 13.0 and pair.names == ("b", "a")
 
 
+@pytest.mark.parametrize(("ahead", "names"), [(0.29, "ab"), (0.31, "ba")])
+def test_of_two_orders_with_one_evidence_the_weaker_effect_comes_last(
+    monkeypatch: pytest.MonkeyPatch, ahead: float, names: str
+) -> None:
+    """It has to predict holds that are left out; which order the search met first is chance."""
+    beside = {"a": {"b": 13.0}, "b": {"a": 14.0 + ahead}}
+    found, _ = explored(monkeypatch, {"a": 11.0, "b": 10.0}, beside)
+    (pair,) = [s for s in found.sets if len(s.names) == 2]
+    assert pair.names == tuple(names)
+
+
 def test_a_set_that_is_good_beside_a_remainder_is_fitted_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Alone b is hopeless; beside a remainder, which has half the weight of none, it may come to 25 nats."""
     promised = {"a": -30.0, "b": 20.0}
@@ -134,32 +144,6 @@ def test_credit_beside_a_remainder_is_that_of_the_best_form(monkeypatch: pytest.
     found = stepwise._credits(["x", "y"], trials)  # type: ignore[list-item]
     assert found["a"] == pytest.approx(np.array([5.0, 4.0]) + occam(True))
     assert found["b"] == pytest.approx(np.array([3.0, 0.0]) + occam(False))
-
-
-def corrected(
-    sd: float = 2.0, unit: float | None = 0.5, known: dict[str, Any] | None = None, theta: float = 3.0
-) -> float:
-    """A refit of b beside a, whose amplitude moved from 1 to `theta` and has a normal prior."""
-    a, b = (SimpleNamespace(key=n, columns=lambda n=n: (n,)) for n in "ab")
-    before = SimpleNamespace(names=("k1", "a"), prior=SimpleNamespace(distributions={"a": stats.norm(0.0, 2.0)}))
-    beside = SimpleNamespace(names=("k1", "b", "a"))
-    target = SimpleNamespace(problem=before, coordinates=SimpleNamespace(to_natural=lambda z: z))
-    block = SimpleNamespace(target=target, modes=SimpleNamespace(z=np.array([[900.0, 1.0], [0.0, 9.0]])), effects=(a,),
-                            experiments=[SimpleNamespace(priors=known or {})],
-                            problem_with=lambda effect: beside)  # fmt: skip
-    found: Any = SimpleNamespace(effect=b, blocks=(0,), sd=sd, theta=(np.array([900.0, 0.1, theta]),))
-    units: Any = {} if unit is None else {("b", (0,)): unit}
-    return stepwise._to_plain_prior(found, [block], units)  # type: ignore[list-item]
-
-
-def test_priors_of_a_chain_are_those_of_the_plain_fit() -> None:
-    """What b's amplitude gains in width, and what a's prior density loses: e^(-1/8) before, e^(-9/8) after."""
-    assert corrected() == pytest.approx(np.log(2.0 / 0.5) + 1.0)
-    assert corrected(unit=None) == corrected(sd=0.0) == corrected(unit=0.0) == pytest.approx(1.0)
-    assert corrected(theta=1.0) == pytest.approx(np.log(4.0))
-    # what other materials know of a shared amplitude is no prior of this kind
-    assert corrected(known={"a": {}}) == pytest.approx(np.log(4.0))
-    assert corrected(theta=np.inf) == pytest.approx(np.log(4.0))  # a place that the prior excludes says nothing
 
 
 def test_when_all_looks_are_spent_the_best_set_alone_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -239,7 +223,7 @@ class Fits:
         monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
 
     def fit(self) -> stepwise.FittedSet:
-        return stepwise._fit(self.parent, "b", self.settings, {}, np.random.default_rng(0))
+        return stepwise._fit(self.parent, "b", self.settings, np.random.default_rng(0))
 
 
 def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -278,17 +262,3 @@ def test_a_further_effect_is_refitted_and_added_where_that_is_worth_it(
     found = fits.fit()
     assert (("weighed", 6, 1) in fits.did) is weighed
     assert found.further is (fits.evidence if further else None)
-
-
-def test_the_unit_of_an_amplitude_is_its_width_beside_nothing_else() -> None:
-    """For every form of a name, on the blocks where it was refitted."""
-
-    def refit(key: str, blocks: tuple[int, ...], sd: float) -> Any:
-        return SimpleNamespace(effect=SimpleNamespace(key=key), blocks=blocks, sd=sd)
-
-    refits: Any = {
-        "slip": [refit("slip@3", (0,), 0.1), refit("slip@4", (1,), 0.2)],
-        "drift": [refit("drift", (0, 1), 0.3)],
-    }
-    found = NameEvidence({}, refits, {})
-    assert stepwise._units(found) == {("slip@3", (0,)): 0.1, ("slip@4", (1,)): 0.2, ("drift", (0, 1)): 0.3}

@@ -21,8 +21,8 @@ def a_set(names: str, log_bayes: float, remainder: Any = NONE) -> EffectSet:
     return EffectSet(tuple(names), log_bayes, dict.fromkeys(names, ONE), remainder)
 
 
-def judged(sets: list[EffectSet], names: int = 20, copies: dict[str, int] | None = None) -> Any:
-    return posterior(sets, *log_weights(sets, names, copies or {}), blocks=1)
+def judged(sets: list[EffectSet], names: int = 20, copies: dict[str, set[str]] | None = None) -> Any:
+    return posterior(sets, *log_weights(sets, names, copies or {}), blocks=1, copies=copies or {})
 
 
 def test_each_further_effect_is_ten_times_less_likely_whatever_the_catalogue_holds() -> None:
@@ -60,8 +60,21 @@ def test_the_same_effect_under_two_names_makes_it_no_likelier() -> None:
     """A catalogue that lists an effect twice names something with the same probability as one that lists it once."""
     unknown = a_set("", 0.0, np.array([10.0]))
     once = judged([unknown, a_set("a", 10.0)], 20)
-    twice = judged([unknown, a_set("a", 10.0), a_set("b", 10.0)], 21, {"a": 2, "b": 2})
+    copies = {"a": {"a", "b"}, "b": {"a", "b"}}
+    twice = judged([unknown, a_set("a", 10.0), a_set("b", 10.0)], 21, copies)
     assert twice.shares[0]["unknown"] == pytest.approx(once.shares[0]["unknown"])
+    # nor any less likely to be there: each of the names stands for both
+    assert twice.inclusion["a"] == twice.inclusion["b"] == pytest.approx(once.inclusion["a"])
+    assert twice.shares[0]["a"] == pytest.approx(0.5 * once.shares[0]["a"])
+
+
+def test_a_copy_acts_where_one_of_its_names_does() -> None:
+    """In a set with both names it acts where either does; elsewhere each set counts with its own."""
+    both = EffectSet(("a", "b"), 5.0, {"a": np.array([0.5]), "b": np.array([0.2])}, NONE)
+    copies = {"a": {"a", "b"}, "b": {"a", "b"}}
+    found = posterior([both, a_set("c", 5.0)], np.log([0.6, 0.4]), np.full(2, -np.inf), 1, copies)
+    assert found.inclusion["a"] == found.inclusion["b"] == pytest.approx([0.6 * (1.0 - 0.5 * 0.8)])
+    assert found.inclusion["c"] == pytest.approx([0.4])
 
 
 def test_materials_are_judged_each_by_what_acts_there() -> None:
@@ -160,11 +173,12 @@ def test_none_or_one_effect_has_no_factor_whatever_the_catalogue_holds() -> None
 def test_weights_by_hand() -> None:
     """Of a set alone, and beside a remainder that is smooth or not; of nothing at all, and of a remainder alone."""
     sets = [a_set("", 0.0, np.array([3.0])), a_set("a", 5.0, np.array([1.0])), a_set("ab", 9.0, None)]
-    without, beside = log_weights(sets, 20, {"a": 2, "b": 3})
+    copies = {"a": {"a", "x"}, "b": {"b", "y", "z"}}
+    without, beside = log_weights(sets, 20, copies)
     pair = log_prior(2, 20) - np.log(2.0) - np.log(3.0)
     assert without == pytest.approx([-np.inf, 5.0 - np.log(2.0), 9.0 + pair])
     assert beside == pytest.approx([3.0, 5.0 - np.log(2.0) + np.log(0.5) + 1.0, -np.inf])
-    _, rough = log_weights(sets, 20, {"a": 2, "b": 3}, {frozenset("a"): 1.0, frozenset("ab"): 2.0})
+    _, rough = log_weights(sets, 20, copies, {frozenset("a"): 1.0, frozenset("ab"): 2.0})
     assert rough == pytest.approx([3.0, beside[1] + np.log(2.0), 9.0 + pair + np.log(0.5) + 2.0])
 
 

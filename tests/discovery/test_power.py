@@ -71,7 +71,7 @@ def test_copies_are_names_with_one_signature_for_every_form() -> None:
     names = ["a", "twin", "b", "b", "none", "near"]
     found = copies([one], [probe(n) for n in names], [1.0])
     # b has a form like a's, but also another one; `near` has cos 0.9998 with a and 0.99995 with one form of b
-    assert found == {"a": 2, "twin": 2, "b": 1, "near": 1}
+    assert found == {"a": {"a", "twin"}, "twin": {"a", "twin"}, "b": {"b"}, "near": {"near"}}
 
 
 def test_a_group_holds_what_is_at_least_so_alike() -> None:

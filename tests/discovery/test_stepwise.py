@@ -5,6 +5,7 @@ import pytest
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import screening, stepwise
+from wirebayes.discovery.amplitude_prior import correction
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet
 from wirebayes.discovery.name_evidence import weigh_names
@@ -35,16 +36,13 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
     plain = plain_fit(bench, truth, (first, second))
     settings = Settings(kinds={n: CATALOGUE[n] for n in (first, second)})
     trials, candidates = screening.candidate_probes(plain, settings.kinds)
-    scans = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]
-    found = weigh_names(plain, trials, candidates, scans)
-    units = stepwise._units(found)
+    found = weigh_names(plain, trials, candidates, [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))])
     root = stepwise.FittedSet(EffectSet((), 0.0, {}, None), plain, (), found, ([], [], []))
     values, bare = [], []
     for one, other in ((first, second), (second, first)):
-        added = stepwise._fit(root, one, settings, units, np.random.default_rng(1))
-        beside = weigh_names(
-            added.blocks, *added.scanned, correction=lambda r, b=added.blocks: stepwise._to_plain_prior(r, b, units)
-        )  # fmt: skip
+        added = stepwise._fit(root, one, settings, np.random.default_rng(1))
+        blocks = added.blocks
+        beside = weigh_names(blocks, *added.scanned, correction=lambda r, b=blocks: correction(r, b))
         values.append(found.log_bayes[one] + beside.log_bayes[other])
         bare.append(found.log_bayes[one] + weigh_names(added.blocks, *added.scanned).log_bayes[other])
     assert values[0] == pytest.approx(values[1], abs=0.15)

@@ -557,14 +557,23 @@ def _without_tangent(x: Expansion) -> Expansion:
 
 def projected(x: Expansion, ratio: float) -> Array:
     """(N, m) signatures of the first row, whitened at a noise ratio, free of what the parameters absorb."""
-
-    def whiten(columns: Array) -> Array:
-        shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
-        return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
-
-    basis, _ = np.linalg.qr(whiten(x.parameters[0]))
-    signatures = whiten(x.signatures[0])
+    basis, _ = np.linalg.qr(whitened(x, x.parameters[0], ratio))
+    signatures = whitened(x, x.signatures[0], ratio)
     return np.asarray(signatures - basis @ (basis.T @ signatures))
+
+
+def whitened(x: Tangent, columns: Array, ratio: float) -> Array:
+    """(N, m) columns in the metric of the noise, as the first row has it.
+
+    Parameters
+    ----------
+    x : Tangent
+    columns : (N, m) array
+    ratio : float
+        Size of the setting errors against the sensor's, ρ.
+    """
+    shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
+    return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
 
 
 def damp(singular: Array, ratio: Array | float) -> Array:

@@ -4,7 +4,7 @@ A set is evaluated together with the remainder, so an effect is credited for wha
 probability of a remainder is part of the answer.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,7 @@ class ModelPosterior:
     remainder : (b,) array
         Probability of a remainder in a material.
     inclusion : dict of name to (b,) array
-        Probability that an effect acts in a material.
+        Probability that an effect, under this name or that of a copy, acts in a material.
     shares : list of dict
         For each material, the probability of each name to be the effect with the largest share of the disagreement, and
         of *unknown*, a remainder and no effect; given that something is missing there.
@@ -97,7 +97,10 @@ def log_prior(size: int, names: int) -> float:
 
 
 def log_weights(
-    sets: Sequence[EffectSet], names: int, copies: Mapping[str, int], other: Mapping[frozenset[str], float] = {}
+    sets: Sequence[EffectSet],
+    names: int,
+    copies: Mapping[str, Collection[str]],
+    other: Mapping[frozenset[str], float] = {},
 ) -> tuple[Array, Array]:
     """(s,) unnormalised log probabilities of each set without a remainder and with one.
 
@@ -106,14 +109,14 @@ def log_weights(
     sets : sequence of EffectSet
     names : int
         Names in the catalogue.
-    copies : mapping of name to int
-        How many names leave the same signature in these tests, and share the weight of one.
+    copies : mapping of name to set of names
+        The names that leave the same signature in these tests, itself included; they share the weight of one.
     other : mapping of set to float
         Log Bayes factor of a remainder that is not smooth, beside a set.
     """
     without, beside = [], []
     for s in sets:
-        prior = log_prior(len(s.names), names) - sum(np.log(copies.get(n, 1)) for n in s.names)
+        prior = log_prior(len(s.names), names) - sum(np.log(len(copies.get(n, {n}))) for n in s.names)
         smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
         if s.names:
             without.append(prior + s.log_bayes)
@@ -125,7 +128,13 @@ def log_weights(
     return np.array(without), np.array(beside)
 
 
-def posterior(sets: Sequence[EffectSet], without: Array, beside: Array, blocks: int) -> ModelPosterior:
+def posterior(
+    sets: Sequence[EffectSet],
+    without: Array,
+    beside: Array,
+    blocks: int,
+    copies: Mapping[str, Collection[str]] = {},
+) -> ModelPosterior:
     """Normalise, and sum over the sets for each material.
 
     Parameters
@@ -135,11 +144,14 @@ def posterior(sets: Sequence[EffectSet], without: Array, beside: Array, blocks: 
         As `log_weights` returns them.
     blocks : int
         Number of materials.
+    copies : mapping of name to set of names
+        As for `log_weights`. A name is included where one of its copies is: they are one effect.
     """
     total = logsumexp([*without, *beside])
     p_without, p_beside = np.exp(without - total), np.exp(beside - total)
     nothing, remainder = np.zeros(blocks), np.zeros(blocks)
-    inclusion: dict[str, Array] = {}
+    own = dict.fromkeys(name for s in sets for name in s.names)
+    inclusion = {name: np.zeros(blocks) for name in own}
     shares: list[dict[str, float]] = [{} for _ in range(blocks)]
     for s, bare, more in zip(sets, p_without, p_beside, strict=True):
         remains = np.ones(blocks) if s.remainder is None else over_subsets(s.remainder)[1]
@@ -147,10 +159,12 @@ def posterior(sets: Sequence[EffectSet], without: Array, beside: Array, blocks: 
         idle = np.ones(blocks)  # no effect before acts here
         for name in s.names:
             acts = s.presence[name]
-            inclusion[name] = inclusion.get(name, np.zeros(blocks)) + (bare + more) * acts
             for b in range(blocks):
                 shares[b][name] = shares[b].get(name, 0.0) + float((bare + more) * idle[b] * acts[b])
             idle = idle * (1.0 - acts)
+        for name in own:
+            absent = np.prod([1.0 - s.presence[n] for n in s.names if n in copies.get(name, {name})], axis=0)
+            inclusion[name] = inclusion[name] + (bare + more) * (1.0 - absent)
         nothing += bare * idle + more * (1.0 - remains) * idle
         for b in range(blocks):
             shares[b]["unknown"] = shares[b].get("unknown", 0.0) + float(more * remains[b] * idle[b])

@@ -105,8 +105,10 @@ def similarity(
     return out
 
 
-def copies(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> dict[str, int]:
-    """How many names are one and the same in these tests, itself included, by name.
+def copies(
+    expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]
+) -> dict[str, frozenset[str]]:
+    """The names that are one and the same in these tests, itself included, by name.
 
     Two names are where each form of either has a form of the other with the same signature.
 
@@ -120,7 +122,7 @@ def copies(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Seq
 
     Returns
     -------
-    dict of name to int
+    dict of name to set of names
         Only names that show at all.
     """
     same = _cosines(expansions, trials, ratios) > NEARLY_ONE
@@ -133,7 +135,7 @@ def copies(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Seq
         for a, i in forms.items()
         for b, j in forms.items()
     }
-    return {a: sum(bool(both[a, b]) for b in forms) for a in forms}
+    return {a: frozenset(b for b in forms if both[a, b]) for a in forms}
 
 
 def _cosines(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> Array:

@@ -27,6 +27,7 @@ MOST_EFFECTS = 4  # more than four did not pay in any simulated test
 REACH = 4.0  # nats below the best: a set further down holds less than 2 % of its weight
 WORTH_A_REFIT = 1.3  # log Bayes factor by the linear scan, of an effect beside others
 WORTH_ADDING = 2.0  # the same, refitted
+SAME_EVIDENCE = 0.3  # nats by which two orders of refits may differ where both found the best parameters
 MOST_BESIDE = 6  # effects refitted beside a set: what it leaves over is small, and the linear scan nearly right
 FIRST_LOOK, MOST_LOOKS = 3, 7  # sets fitted in full: at first, and in all
 

@@ -3,21 +3,22 @@
 A step back asks whether an early effect is still needed beside those that came after it: the set without it may be
 better, and was never reached because the names in it explain little one by one.
 
-The evidence of a set comes from a chain of refits, each effect refitted beside those before it. The prior of an
-amplitude is fixed once, on the plain fit, so the order of the chain does not matter.
+The evidence of a set comes from a chain of refits, each effect refitted beside those before it. The prior of amplitudes
+follows one rule in every set, so the order of the chain does not matter.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import repeat
 
 import numpy as np
 
 from wirebayes.discovery import screening, smooth_reference
+from wirebayes.discovery.amplitude_prior import correction
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
-from wirebayes.discovery.refit import Refit, occam
+from wirebayes.discovery.refit import occam
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import (
     FIRST_LOOK,
@@ -28,19 +29,19 @@ from wirebayes.discovery.settings import (
     MOST_LOOKS,
     REACH,
     REMAINDER_WEIGHT,
+    SAME_EVIDENCE,
     WORTH_A_REFIT,
     WORTH_ADDING,
     Settings,
 )
 from wirebayes.discovery.sharing import informed
 from wirebayes.discovery.smooth_credit import beside_smooth
-from wirebayes.inference.laplace_fit import LaplaceFit, column_of, fitted
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
 Key = frozenset[str]
-_Units = Mapping[tuple[str, tuple[int, ...]], float]
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,9 @@ class _Frontier:
     towards: list[Key] = field(default_factory=list)
 
     def add(self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf) -> None:
-        """A set that a refit found, unless another order of the same names found a better one.
+        """A set that a refit found, unless another order of the same names is better.
+
+        Of orders that found the same, the one with the strongest parent stays: the weakest effect has to prove itself.
 
         Parameters
         ----------
@@ -127,13 +130,17 @@ class _Frontier:
         credit : float
             Log Bayes factor that the set may come to with a remainder beside it, as far as is known.
         """
-        names = (*parent.names, name)
-        key = frozenset(names)
+        key = parent.key | {name}
         value = parent.log_bayes + found.log_bayes[name]
-        if key not in self.known or (key not in self.fitted and self.known[key].log_bayes < value):
-            presence = {**parent.presence, name: found.presence[name]}
-            self.known[key] = EffectSet(names, value, presence, None)
-            self.parents[key] = parent.key, name
+        if key not in self.fitted:
+            known = self.known.get(key)
+            ahead = np.inf if known is None else value - known.log_bayes
+            if abs(ahead) < SAME_EVIDENCE:
+                ahead = parent.log_bayes - self.known[self.parents[key][0]].log_bayes
+            if ahead > 0.0:
+                presence = {**parent.presence, name: found.presence[name]}
+                self.known[key] = EffectSet((*parent.names, name), value, presence, None)
+                self.parents[key] = parent.key, name
         self.credit[key] = max(self.credit.get(key, -np.inf), credit)
 
     def promise(self, key: Key) -> float:
@@ -173,7 +180,6 @@ def explore(
     parallel_map : function
         The built-in `map`, or one over processes; the sets are the same.
     """
-    units = _units(found)
     smooth = np.array([_remainder(block) for block in plain])
     root = EffectSet((), 0.0, {}, smooth)
     frontier = _Frontier(len(settings.kinds))
@@ -197,7 +203,7 @@ def explore(
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]
         names = [frontier.parents[k][1] for k in wave]
-        fitted_sets = parallel_map(_fit, parents, names, repeat(settings), repeat(units), rng.spawn(len(wave)))
+        fitted_sets = parallel_map(_fit, parents, names, repeat(settings), rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
             known = frontier.known[key]
             beside = float(np.maximum(new.effects.remainder, 0.0).sum())
@@ -222,11 +228,6 @@ def explore(
     return Explored((root, *frontier.known.values()), done, left_over)
 
 
-def _units(found: NameEvidence) -> _Units:
-    """Amplitude that amounts to δ = 1 for each effect on its blocks, as the refit beside nothing else found it."""
-    return {(r.effect.key, r.blocks): r.sd for refits in found.winners.values() for r in refits}
-
-
 def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[str, Array]:
     """(b,) log Bayes factor of each name beside a smooth remainder, linearly, the better of its forms."""
     out: dict[str, Array] = {}
@@ -237,7 +238,7 @@ def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[s
     return out
 
 
-def _fit(parent: FittedSet, name: str, settings: Settings, units: _Units, rng: np.random.Generator) -> FittedSet:
+def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator) -> FittedSet:
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
     assert parent.further is not None
     blocks, effects = list(parent.blocks), {}
@@ -254,8 +255,8 @@ def _fit(parent: FittedSet, name: str, settings: Settings, units: _Units, rng: n
     further = None
     if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
         further = weigh_names(
-            blocks, trials, candidates, scans, correction=lambda r: _to_plain_prior(r, blocks, units),
-            most=MOST_BESIDE, forms_a_name=1,
+            blocks, trials, candidates, scans, correction=lambda r: correction(r, blocks), most=MOST_BESIDE,
+            forms_a_name=1,
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
             further = None
@@ -270,24 +271,3 @@ def _fit(parent: FittedSet, name: str, settings: Settings, units: _Units, rng: n
 def _remainder(block: LaplaceFit) -> float:
     """Log Bayes factor of something smooth but unknown beside the effects of a block, local or global."""
     return float(scan(expand(block.target, block.modes.z[:1], [], reference=smooth_reference.family)).flexible[0])
-
-
-def _to_plain_prior(found: Refit, blocks: Sequence[LaplaceFit], units: _Units) -> float:
-    """What turns a refit's log Bayes factor beside other effects into one with priors as the plain fit set them.
-
-    The refit's own prior is uniform in what the amplitude does beside those effects, and theirs are the catalogue's.
-    """
-    unit = units.get((found.effect.key, found.blocks))
-    change = float(np.log(found.sd / unit)) if unit is not None and unit > 0 and found.sd > 0 else 0.0
-    for b, theta in zip(found.blocks, found.theta, strict=True):
-        problem, plain = blocks[b].problem_with(found.effect), blocks[b].target.problem
-        before = blocks[b].target.coordinates.to_natural(blocks[b].modes.z[:1])[0]
-        for effect in blocks[b].effects:
-            amplitude = effect.columns()[0]
-            if any(amplitude in e.priors for e in blocks[b].experiments):
-                continue  # what other materials know of a shared amplitude is no prior of this kind
-            old, new = column_of(plain, effect), column_of(problem, effect)
-            density = plain.prior.distributions[plain.names[old]].logpdf
-            shift = float(density(before[old]) - density(theta[new]))
-            change += shift if np.isfinite(shift) else 0.0
-    return change

@@ -1,6 +1,6 @@
 """From the probabilities of models to a verdict for each material, in the order in which the thresholds apply."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 
@@ -71,7 +71,7 @@ class Decision:
 def decide(
     plain: list[LaplaceFit],
     explored: Explored,
-    copies: Mapping[str, int],
+    copies: Mapping[str, Collection[str]],
     settings: Settings,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
@@ -84,8 +84,8 @@ def decide(
         One a material.
     explored : Explored
         Sets of effects that the search visited, with their evidence and fits.
-    copies : mapping of name to int
-        How many names share one signature in these tests (`power.copies`); they share its prior.
+    copies : mapping of name to set of names
+        Those that share one signature in these tests (`power.copies`).
     settings : Settings
     rng : numpy.random.Generator
     parallel_map : function
@@ -107,7 +107,7 @@ def decide(
 
     while True:
         without, beside = model_space.log_weights(sets, count, copies, explored.left_over)
-        found = model_space.posterior(sets, without, beside, blocks)
+        found = model_space.posterior(sets, without, beside, blocks, copies)
         best = _best_fitted(found, explored)
         if best is None:
             return Decision(found, None, None, {})
@@ -124,7 +124,7 @@ def decide(
     if retest.p is not None:
         i = next(k for k, s in enumerate(sets) if s.key == best.effects.key)
         beside = _more_beside(sets, beside, i, float(without[i] - P_SLOPE * np.log(retest.p / ALPHA_AFTER)))
-    found = model_space.posterior(sets, without, beside, blocks)
+    found = model_space.posterior(sets, without, beside, blocks, copies)
     if not found.best.names:
         return Decision(found, None, retest, {})
     path = [explored.fitted.get(frozenset(best.effects.names[: n + 1])) for n in range(len(best.effects.names))]
