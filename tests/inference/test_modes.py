@@ -1,13 +1,17 @@
-"""Climbs: steps by residuals and by differences, whole and shortened, and where they end; rows far from one another."""
+"""Climbs: steps by residuals and by differences, and where they end; a search finds what matters; rows far apart."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.statistical.targets import Silent
 from wirebayes.effects import named
-from wirebayes.inference.modes import climb
+from wirebayes.inference import modes
+from wirebayes.inference.modes import climb, search
 from wirebayes.inference.sampler.mixture import spread_rows
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.io.paper import experiments
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import build, with_readings
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -157,3 +161,61 @@ def test_the_residuals_of_the_prior_have_its_curvature(effects):
     slopes = [residuals(z + m, [0])[1] - residuals(z - m, [0])[1] for m in 1e-5 * np.eye(z.shape[1])]
     slopes = np.hstack(slopes) / 2e-5
     assert slopes.T @ slopes == pytest.approx(found.curvature[0], rel=2e-3, abs=2e-3)
+
+
+def _one_time_constant(data):
+    """Fitted to a wire with a toe, what explains the residuals may be the setting errors or the sensor's noise."""
+    if data == "nylon":
+        experiment = next(e for e in experiments() if e.name == "nylon-1.5m")
+        problem = build([experiment])
+        return replace(problem, prior=_with_n_fixed(problem.prior))
+    bench = Bench(length_mm=1500.0)
+    truth = {"k1": 1550.0, "B": 0.56, "U": 1.1, "k2": 0.032, "N": 0.58, "toe.c": 0.0019, "preload": 3.2}
+    made = draw([bench], Truth(truth | {"setting_sd": 0.015, "sensor_sd": 0.0057}, effects=(named("toe"),)), seed=data)
+    problem = build([bench.experiment()])
+    seen = with_readings(problem, [s.readings for s in made.problem.samples])
+    return replace(seen, prior=_with_n_fixed(seen.prior))
+
+
+def _with_n_fixed(prior):
+    free = {name: d for name, d in prior.distributions.items() if name != "N"}
+    return replace(prior, distributions=free, fixed=prior.fixed | {"N": 1.0}, logarithmic=prior.logarithmic - {"N"})
+
+
+@pytest.mark.parametrize("data", ["nylon", 0, 1, 3])
+def test_a_search_finds_the_mode_with_most_of_the_mass(data):
+    """Which one that is, hundreds of climbs from prior draws tell: of ten, not one may end there."""
+    target = LogPosterior(integrated(_one_time_constant(data)))
+    density, residuals = target.rowwise()
+    start = target.coordinates.to_sampled(target.problem.prior.rvs(400, np.random.default_rng(0)))
+    ended = climb(density, start[np.isfinite(target(start))], residuals, curvature_at_end=False)
+    there = ended.log_density > ended.log_density.max() - 0.1
+    assert there.mean() < 0.1  # a search by luck would fail
+    before = target.evaluations
+    for seed in range(5):
+        found = search(target, np.random.default_rng(seed)).modes
+        assert found.log_density[0] == pytest.approx(ended.log_density.max(), abs=0.01)
+    assert target.evaluations - before < 5 * 12_000
+
+
+def test_with_a_ratio_kept_starts_are_led_to_it_and_without_noises_they_stay():
+    target = simulated()
+    start = target.coordinates.to_sampled(target.problem.prior.rvs(6, np.random.default_rng(3)))
+    led = modes._with_ratios(target, start)
+    [pair] = target.coordinates.noises
+    ratio = (led[:, pair.setting] - led[:, pair.sensor] - pair.middle) / pair.spread
+    assert ratio == pytest.approx(np.tile([1.3, -1.3, 0.0], 2))
+    assert (target(led) > target(start)).all()
+    holds = simulated(likelihood="hold")
+    begin = holds.coordinates.to_sampled(holds.problem.prior.rvs(6, np.random.default_rng(3)))
+    assert holds.coordinates.noises == () and modes._with_ratios(holds, begin) is begin
+
+
+def test_starts_are_spread_over_rates_of_creep():
+    """Nine starts: three slow ones, three fast ones, three in the middle, for each ratio of the noises one."""
+    target = simulated()
+    z = target.coordinates.to_sampled(target.problem.prior.rvs(1000, np.random.default_rng(3)))
+    chosen = modes._spread(target, z, 9, np.random.default_rng(0))
+    [rate] = target.coordinates.rates
+    rank = np.searchsorted(np.sort(z[:, rate]), chosen[:, rate]) / len(z)
+    assert (rank[:3] < 0.2).all() and (rank[3:6] > 0.8).all() and (abs(rank[6:] - 0.5) < 0.1).all()

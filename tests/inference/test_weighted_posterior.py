@@ -45,7 +45,7 @@ def searching(monkeypatch: pytest.MonkeyPatch, *found: tuple[int, ...]) -> Calla
     made: list[tuple[int, ...]] = []
 
     def search(target: object, rng: np.random.Generator, starts: int) -> SimpleNamespace:
-        assert starts == 32
+        assert starts == 18
         made.append(found[min(len(made), len(found) - 1)])
         return SimpleNamespace(modes=modes(*made[-1]))
 

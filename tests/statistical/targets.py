@@ -14,13 +14,14 @@ D = 8
 class Analytic:
     """What the sampler asks of a target, for a density written down."""
 
-    def __init__(self, log_density, mean, second, spread=6.0):
+    def __init__(self, log_density, mean, second, spread=6.0, hills=1):
+        self.hills = hills
         self.log_density, self.mean, self.second = log_density, mean, second
         self.evaluations = 0
         same = lambda x: x  # noqa: E731
         d = len(mean)
         self.coordinates = SimpleNamespace(
-            to_sampled=same, to_natural=same, log_columns=np.zeros(d, bool), order=np.arange(d)
+            noises=(), rates=[], to_sampled=same, to_natural=same, log_columns=np.zeros(d, bool), order=np.arange(d)
         )
         start = lambda n, rng: rng.normal(0.0, spread, (n, d))  # noqa: E731
         self.problem = SimpleNamespace(prior=SimpleNamespace(rvs=start), names=tuple(f"x{i}" for i in range(d)))
@@ -81,7 +82,7 @@ def two_modes():
         return logsumexp(parts, axis=0)
 
     second = weights @ np.array([np.full(D, s * s) + (k * shift) ** 2 for k, s in enumerate(widths)])
-    return Analytic(density, weights[1] * shift, second)
+    return Analytic(density, weights[1] * shift, second, hills=2)
 
 
 def heavy_tails():

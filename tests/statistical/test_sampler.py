@@ -10,7 +10,7 @@ from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussi
 from wirebayes.effects import catalogue, named
 from wirebayes.inference import convergence
 from wirebayes.inference.fit import fit
-from wirebayes.inference.modes import Optimum
+from wirebayes.inference.modes import Optimum, search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, kept, moves, stop_rule
 from wirebayes.inference.sampler import state as sampler_state
@@ -28,17 +28,20 @@ LIMIT = 4.5
 
 def worst(target_of, policy=SMALL, runs=RUNS):
     """Largest |t| over the first and second moments of all coordinates, from the spread of independent runs; and the
-    ratio of that spread to what the reported effective sample sizes promise."""
+    ratio of that spread to what the reported effective sample sizes promise. Of runs whose search found every hill; how
+    many miss one is a test of its own."""
     estimates, promised = [], []
     for seed in range(runs):
         target = target_of()
         chains = sample(target, 1000 + seed, policy)
+        if chains.modes < target.hills:
+            continue
         z = chains.z.reshape(-1, chains.z.shape[-1])
         estimates.append(np.concatenate([z.mean(axis=0), (z**2).mean(axis=0)]))
         promised.append(z.var(axis=0) / chains.ess)
     estimates, truth = np.array(estimates), np.concatenate([target.mean, target.second])
     spread = estimates.std(axis=0, ddof=1)
-    t = np.abs(estimates.mean(axis=0) - truth) / (spread / np.sqrt(runs))
+    t = np.abs(estimates.mean(axis=0) - truth) / (spread / np.sqrt(len(estimates)))
     half = len(target.mean)
     return t.max(), np.sqrt((spread[:half] ** 2).mean() / np.mean(promised))
 
@@ -48,6 +51,16 @@ def test_moments_are_right_within_monte_carlo_error(name):
     t, ratio = worst(TARGETS[name])
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
+
+
+def test_a_search_seldom_misses_a_mode_ten_standard_deviations_away():
+    """17 of 1,400 of these do, and 9 of 800 did before climbs began at prior draws. At that rate six of 150 happen once
+    in a hundred times."""
+    missed = 0
+    for seed in range(150):
+        ends = search(TARGETS["two_modes"](), np.random.default_rng(seed)).modes.z[:, 0]
+        missed += not (np.abs(ends).min() < 0.1 and np.abs(ends - 10.0).min() < 0.1)
+    assert missed < 6
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ Every row is an optimisation of its own; rows may also have their own readings (
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,7 @@ from wirebayes.inference.transform import Density, LogPosterior, Residuals
 from wirebayes.resampling import next_power, systematic_rows
 from wirebayes.typing import Array
 
-_LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
+LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
 _LOOKED = 400  # places at which it is tested whether a mode explains them
 # where on the line to a mode the density is evaluated: a valley between two hills seldom avoids all three
 _ON_THE_WAY = np.array([0.25, 0.5, 0.75])
@@ -33,6 +33,11 @@ _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
 _REACH = 30.0  # nats below the best mode that no mode counts
+# of setting errors over sensor noise, for each start in turn: standard deviations of its logarithm under the prior
+_RATIOS = np.array([1.3, -1.3, 0.0])
+# among prior draws, for as many starts in turn as there are ratios: rank of the creep's rate, and what is added to it
+_RATES, _WITHIN = np.array([0.1, 0.9, 0.5]), 0.1
+_LED, _LED_TO = 20, 0.1  # steps, at most, with a ratio kept, and the gain in nats that ends them
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
 
@@ -71,7 +76,7 @@ class Optimum:
         No direction counts as wider than the prior makes it (sampled coordinates are of order one under the prior).
         """
         d = self.z.shape[1]
-        eigen = np.maximum(np.linalg.eigvalsh(self.curvature), _LEAST_CURVATURE)
+        eigen = np.maximum(np.linalg.eigvalsh(self.curvature), LEAST_CURVATURE)
         return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
 
 
@@ -84,6 +89,10 @@ class _Local:
     curvature: Array
 
 
+def _nowhere(z: Array) -> NDArray[np.bool_]:
+    return np.zeros(len(z), bool)
+
+
 def climb(
     density: Density,
     start: Array,
@@ -91,7 +100,7 @@ def climb(
     *,
     iterations: int = 60,
     tolerance: float = 1e-5,
-    until: Callable[[Array], NDArray[np.bool_]] = lambda z: np.zeros(len(z), bool),
+    until: Callable[[Array], NDArray[np.bool_]] = _nowhere,
     reach: float = np.inf,
     curvature_at_end: bool = True,
 ) -> Optimum:
@@ -163,12 +172,19 @@ def climb(
         hopeless = value[left] + _PATIENCE * promised[left] < value.max() - reach
         left = left[hopeless | until(z[left])]
         done[left], value[left] = True, -np.inf
-    curvature = _composed(eigen, vectors)
-    rows = np.flatnonzero(np.isfinite(value))
-    if len(rows) and curvature_at_end:
-        _, hessian = _derivatives(density, z[rows], rows, value[rows], _steps(curvature[rows]), sides=2)
-        curvature[rows] = _composed(*_positive(-hessian))
-    return Optimum(z, value, curvature, converged)
+    found = Optimum(z, value, _composed(eigen, vectors), converged)
+    return _curved(density, found, np.arange(n)) if curvature_at_end else found
+
+
+def _curved(density: Density, found: Optimum, which: NDArray[np.int64]) -> Optimum:
+    """The same places with the curvature of the density itself, where that is finite; `which` (n,) start each is of."""
+    rows = np.flatnonzero(np.isfinite(found.log_density))
+    if not len(rows):
+        return found
+    z, value, curvature = found.z[rows], found.log_density[rows], found.curvature.copy()
+    _, hessian = _derivatives(density, z, which[rows], value, _steps(curvature[rows]), sides=2)
+    curvature[rows] = _composed(*_positive(-hessian))
+    return replace(found, curvature=curvature)
 
 
 def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:
@@ -287,15 +303,15 @@ class Search:
 
 
 def search(
-    target: LogPosterior, rng: np.random.Generator, *, draws: int = 800, starts: int = 8, extra: Array | None = None
+    target: LogPosterior, rng: np.random.Generator, *, draws: int = 400, starts: int = 9, extra: Array | None = None
 ) -> Search:
-    """Look for the modes of a posterior: good ones among many prior draws, each climbed.
+    """Look for the modes of a posterior: climbs from prior draws that differ in what decides where a climb ends.
 
-    Prior draws are annealed to the posterior. Half of the starts, the highest place among them, are spread
-    over all places it passed: where it ends, a mode of less weight may have died out, but on the way it lived. The
-    others are chosen among passed places that belong to the hill of no mode found from these; such a climb is given up
-    where it comes so near to a known mode that it would count as that one. Where they find several modes, more are
-    looked for in the same way.
+    That is how fast the creep is, and whether setting errors or the sensor's noise explain the residuals. Meanwhile
+    prior draws are annealed to the posterior. Some climbs begin at places they passed, the highest one and some far
+    from one another: where annealing ends, a mode of less weight may have died out. Others, later, begin at passed
+    places that belong to the hill of no mode found so far. Such a climb is given up where it comes so near to a known
+    mode that it would count as that one. Where they find several modes, more are looked for in the same way.
 
     Parameters
     ----------
@@ -304,7 +320,7 @@ def search(
     draws : int
         Of the prior.
     starts : int
-        Half of them climb first, and half at every further look.
+        Climbs from prior draws; half as many at every further look.
     extra : (m, d) array, optional
         Further starts, in sampled coordinates.
     """
@@ -312,11 +328,17 @@ def search(
     value = target(z)
     passed, height = _cooled(target, z, value, rng)
     warm, cold, cold_height = passed[-_WARM_STEPS * draws :], passed[-draws:], height[-draws:]
-    width = passed.std(axis=0)
-    spread = spread_rows(passed / np.where(width > 0, width, 1.0), starts // 2 - 1, rng)
-    start = np.vstack([passed[spread], passed[np.argmax(height)], *([] if extra is None else extra)])
     density, residuals = target.rowwise()
-    found = distinct([climb(density, start, residuals, reach=_REACH)])
+
+    def climbed(start: Array, until: Callable[[Array], NDArray[np.bool_]] = _nowhere) -> Optimum:
+        found = distinct([climb(density, start, residuals, until=until, reach=_REACH, curvature_at_end=False)])
+        return _curved(density, found, np.zeros(len(found.z), np.int64))
+
+    possible = z[np.isfinite(value)] if np.isfinite(value).any() else z
+    width = passed.std(axis=0)
+    apart = spread_rows(passed / np.where(width > 0, width, 1.0), starts, rng)
+    begin = [_with_ratios(target, _spread(target, possible, starts, rng)), passed[[int(np.argmax(height)), *apart]]]
+    found = climbed(np.vstack(begin if extra is None else [*begin, extra]))
     looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
     passed, height = passed[looked], height[looked]
     for _ in range(_LOOKS):
@@ -325,12 +347,53 @@ def search(
         if not len(strange):
             break
         share = sag[strange] / sag[strange].sum()
-        chosen = rng.choice(strange, min(len(strange), starts // 2), replace=False, p=share)
-        known, before = partial(_near, modes=found.z, curvature=found.curvature), len(found.z)
-        found = distinct([found, climb(density, passed[chosen], residuals, until=known, reach=_REACH)])
+        chosen = rng.choice(strange, min(len(strange), max(starts // 2, 1)), replace=False, p=share)
+        before = len(found.z)
+        near = partial(_near, modes=found.z, curvature=found.curvature)
+        found = distinct([found, climbed(passed[chosen], near)])
         if len(found.z) < before + _MANY:
             break
     return Search(found, warm, cold, cold_height)
+
+
+def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) -> Array:
+    """(n, d) of the places (m, d): by turns some where the creep is slow, where it is fast, and in the middle."""
+    rates = target.coordinates.rates
+    if not rates:
+        return z[rng.choice(len(z), n, replace=n > len(z))]
+    order = np.argsort(z[:, rates].mean(axis=1))
+    rank = np.resize(np.repeat(_RATES, len(_RATIOS)), n) + _WITHIN * rng.uniform(-1.0, 1.0, n)
+    return np.asarray(z[order[(len(z) * rank).astype(int)]])
+
+
+def _with_ratios(target: LogPosterior, start: Array) -> Array:
+    """Starts (n, d) led uphill for some steps, each with one of several ratios of the noises kept.
+
+    Above all, what explains the residuals, setting errors or the sensor's noise, decides at which of several modes a
+    climb ends. Whatever they were, both grow at first from a start that fits badly, and the wire's parameters follow
+    them. With the ratio kept, the wire is fitted as if it were known; the climb that comes after frees it.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    start : (n, d) array
+    """
+    pairs, ratio = target.coordinates.noises, np.resize(_RATIOS, len(start))
+    if not pairs:
+        return start
+
+    def kept(z: Array, rows: Array) -> Array:
+        z = z.copy()
+        for pair in pairs:
+            z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
+        return z
+
+    density, residuals = target.rowwise()
+    found = climb(
+        lambda z, rows: density(kept(z, rows), rows), start, lambda z, rows: residuals(kept(z, rows), rows),
+        iterations=_LED, tolerance=_LED_TO, curvature_at_end=False,
+    )  # fmt: skip
+    return kept(found.z, np.arange(len(start)))
 
 
 def _sag(target: LogPosterior, z: Array, height: Array, found: Optimum) -> Array:

@@ -105,8 +105,31 @@ class _Ridge:
         return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
 
+@dataclass(frozen=True)
+class Noises:
+    """Columns of a sample's two noises, and the logarithm of setting error over sensor noise under the prior.
+
+    Attributes
+    ----------
+    sensor, setting : int
+    middle, spread : float
+        Of the logarithm of the ratio of the standard deviations, mm/N.
+    """
+
+    sensor: int
+    setting: int
+    middle: float
+    spread: float
+
+
 class Transformation:
-    """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``."""
+    """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``.
+
+    Attributes
+    ----------
+    noises : tuple of Noises
+        Of every sample of which neither noise is fixed.
+    """
 
     def __init__(self, problem: Problem) -> None:
         names = problem.names
@@ -122,6 +145,7 @@ class Transformation:
         for i in np.flatnonzero(self.log_columns).tolist():
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
             self.log_spread[i] = 0.5 * np.log(high / low)
+        self.noises = _noises(problem, self.log_columns, self.log_spread)
         self.specimens = specimens(problem)
         first = () if self.specimens is None else self.specimens.spreads
         steepest = np.inf if self.specimens is None else _STEEPEST
@@ -153,6 +177,11 @@ class Transformation:
                     else:
                         fixed[column] = problem.prior.fixed[name]
                 self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood, effects))
+
+    @property
+    def rates(self) -> list[int]:
+        """Columns that say how fast a material creeps: the logarithm of its hazard at half a hold."""
+        return [ridge.where["k2"] for ridge in self.ridges if "k2" in ridge.shifted]
 
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
@@ -224,6 +253,18 @@ class Transformation:
         with np.errstate(all="ignore"):
             creep = ridge.log_creep(U, k2, N, theta) + np.log(k1) - ridge.log_length
         return creep, self._hazard(theta, ridge)
+
+
+def _noises(problem: Problem, log_columns: NDArray[np.bool_], spread: Array) -> tuple[Noises, ...]:
+    """Of every sample of which neither noise is fixed; holds by themselves have no setting errors."""
+    out = []
+    for sample in problem.samples if problem.likelihood == "chain" else ():
+        names = [problem.column(name, sample) for name in ("sensor_sd", "setting_sd")]
+        if all(name in problem.names and log_columns[problem.names.index(name)] for name in names):
+            sensor, setting = (problem.names.index(name) for name in names)
+            middle = np.diff([np.log(problem.prior.distributions[name].median()) for name in names])[0]
+            out.append(Noises(sensor, setting, float(middle), float(np.hypot(spread[sensor], spread[setting]))))
+    return tuple(out)
 
 
 def _rank(name: str) -> int:

@@ -126,7 +126,7 @@ def overlooked(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.ra
 
 
 _DRAWS = 4000  # as many as predictions take
-_STARTS = 32  # of climbs, four times as many as before a walk: walkers still find what a search misses, weights do not
+_STARTS = 18  # of climbs, twice as many as before a walk: walkers still find what a search misses, weights do not
 _SEARCHES = 3  # that may contradict, before it is left to walkers
 _WITNESSES = 2000  # a hill with a hundredth of the mass has some twenty of them, where a search found it
 _HARDLY = 3.0  # nats of posterior over proposal: a place drawn twenty times too seldom

@@ -93,6 +93,16 @@ def test_what_the_proposal_overlooks_is_measured_in_nats(shift: float, witness: 
     )
 
 
+@pytest.mark.parametrize(("share", "counts"), [(1e-2, True), (1e-4, False)])
+def test_a_place_whose_hill_can_hold_next_to_nothing_is_not_overlooked(share: float, counts: bool) -> None:
+    """A hill as wide as the widest prior: from a typical place of it, half a nat a coordinate up to the top."""
+    z, far = np.zeros((1001, D)), np.full((1001, D), 50.0)
+    top = np.log(share) + 70.0 - 0.5 * D * np.log(2.0 * np.pi / 0.3)
+    learned = Learned(NORMAL, NORMAL, 1, (far, np.full(1001, top - 0.5 * D)))
+    found = burn_in.overlooked(learned, z, NORMAL.log_density(z) + 70.0)
+    assert found == pytest.approx(top - 0.5 * D - NORMAL.log_density(far)[0] - 70.0 if counts else 0.0)
+
+
 def test_burn_in_walks_with_few_walkers() -> None:
     """A quarter of them, but two more than twice as many as there are parameters: differences must span the space."""
     target = gaussian(8)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.modes import Optimum, search
+from wirebayes.inference.modes import LEAST_CURVATURE, Optimum, search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
@@ -147,7 +147,9 @@ def overlooked(learned: Learned, z: Array, value: Array) -> float:
 
     The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
     draws, and at its 99 % quantile over the rough draws that the search left; the larger counts. A neck into which few
-    walkers found their way, and stayed, shows in the first, a mode that they lost in the second.
+    walkers found their way, and stayed, shows in the first, a mode that they lost in the second. Of the search's
+    draws, those do not count where even a hill as wide as the prior would hold next to nothing: where annealing lost
+    most of its rows, copies of such places are what it ended with.
 
     Parameters
     ----------
@@ -167,7 +169,9 @@ def overlooked(learned: Learned, z: Array, value: Array) -> float:
     if learned.witness is None:
         return float(high - middle)
     z, value = learned.witness
-    return float(max(high, np.quantile(value - learned.proposal.log_density(z), 0.99)) - middle)
+    matters = value + z.shape[1] * _WIDEST > middle + _NEXT_TO_NOTHING
+    left = np.where(matters, value - learned.proposal.log_density(z), middle)
+    return float(max(high, np.quantile(left, 0.99)) - middle)
 
 
 def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
@@ -261,6 +265,9 @@ def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> 
     return drawn[:n], values[:n]
 
 
+# nats a coordinate from the density at a typical place of a normal hill to its mass, where it is as wide as the prior
+_WIDEST = 0.5 * float(1.0 + np.log(2.0 * np.pi / LEAST_CURVATURE))
+_NEXT_TO_NOTHING = float(np.log(1e-3))  # share of the mass: far less than shows in any summary
 # of the covariance at a mode: too narrow a start misses what is bent, too wide a one costs some draws
 _OVERDISPERSED = 1.7
 _WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the longer the more often it has to
