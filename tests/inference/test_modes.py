@@ -211,11 +211,12 @@ def test_with_a_ratio_kept_starts_are_led_to_it_and_without_noises_they_stay():
     assert holds.coordinates.noises == () and modes._with_ratios(holds, begin) is begin
 
 
-def test_starts_are_spread_over_rates_of_creep():
-    """Nine starts: three slow ones, three fast ones, three in the middle, for each ratio of the noises one."""
+def test_starts_are_spread_over_rates_and_powers_of_creep():
+    """Nine starts: every pair of slow, middle and fast with a small, middle and large power."""
     target = simulated()
     z = target.coordinates.to_sampled(target.problem.prior.rvs(1000, np.random.default_rng(3)))
     chosen = modes._spread(target, z, 9, np.random.default_rng(0))
-    [rate] = target.coordinates.rates
-    rank = np.searchsorted(np.sort(z[:, rate]), chosen[:, rate]) / len(z)
-    assert (rank[:3] < 0.2).all() and (rank[3:6] > 0.8).all() and (abs(rank[6:] - 0.5) < 0.1).all()
+    [rate], [power] = target.coordinates.kinds_of_creep
+    rank = np.stack([np.searchsorted(np.sort(z[:, i]), chosen[:, i]) / len(z) for i in (rate, power)], axis=1)
+    level = np.select([rank < 0.25, rank > 0.75], [0, 2], 1)
+    assert len({tuple(pair) for pair in level}) == 9 and (level[:3, 0] == 0).all() and (level[3:6, 0] == 2).all()

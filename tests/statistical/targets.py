@@ -21,7 +21,12 @@ class Analytic:
         same = lambda x: x  # noqa: E731
         d = len(mean)
         self.coordinates = SimpleNamespace(
-            noises=(), rates=[], to_sampled=same, to_natural=same, log_columns=np.zeros(d, bool), order=np.arange(d)
+            noises=(),
+            kinds_of_creep=[],
+            to_sampled=same,
+            to_natural=same,
+            log_columns=np.zeros(d, bool),
+            order=np.arange(d),
         )
         start = lambda n, rng: rng.normal(0.0, spread, (n, d))  # noqa: E731
         self.problem = SimpleNamespace(prior=SimpleNamespace(rvs=start), names=tuple(f"x{i}" for i in range(d)))

@@ -35,8 +35,12 @@ _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there 
 _REACH = 30.0  # nats below the best mode that no mode counts
 # of setting errors over sensor noise, for each start in turn: standard deviations of its logarithm under the prior
 _RATIOS = np.array([1.3, -1.3, 0.0])
-# among prior draws, for as many starts in turn as there are ratios: rank of the creep's rate, and what is added to it
-_RATES, _WITHIN = np.array([0.1, 0.9, 0.5]), 0.1
+# ranks among prior draws of the creep's rate and of its power of tension, for nine starts in turn: each pair of rate,
+# power and ratio occurs once
+_RANKS = np.array(
+    [[0.1, 0.1], [0.1, 0.9], [0.1, 0.5], [0.9, 0.9], [0.9, 0.5], [0.9, 0.1], [0.5, 0.5], [0.5, 0.1], [0.5, 0.9]]
+)
+_WITHIN = 0.1  # added to these, at most
 _LED, _LED_TO = 20, 0.1  # steps, at most, with a ratio kept, and the gain in nats that ends them
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
@@ -307,7 +311,8 @@ def search(
 ) -> Search:
     """Look for the modes of a posterior: climbs from prior draws that differ in what decides where a climb ends.
 
-    That is how fast the creep is, and whether setting errors or the sensor's noise explain the residuals. Meanwhile
+    That is how fast the creep is, how much more it is under more tension, and whether setting errors or the sensor's
+    noise explain the residuals. Meanwhile
     prior draws are annealed to the posterior. Some climbs begin at places they passed, the highest one and some far
     from one another: where annealing ends, a mode of less weight may have died out. Others, later, begin at passed
     places that belong to the hill of no mode found so far. Such a climb is given up where it comes so near to a known
@@ -357,13 +362,13 @@ def search(
 
 
 def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) -> Array:
-    """(n, d) of the places (m, d): by turns some where the creep is slow, where it is fast, and in the middle."""
-    rates = target.coordinates.rates
-    if not rates:
+    """(n, d) of the places (m, d): where the creep is slow, fast and between, each with a small and a large power."""
+    kinds = target.coordinates.kinds_of_creep
+    if not kinds:
         return z[rng.choice(len(z), n, replace=n > len(z))]
-    order = np.argsort(z[:, rates].mean(axis=1))
-    rank = np.resize(np.repeat(_RATES, len(_RATIOS)), n) + _WITHIN * rng.uniform(-1.0, 1.0, n)
-    return np.asarray(z[order[(len(z) * rank).astype(int)]])
+    found = np.stack([np.argsort(np.argsort(z[:, columns].mean(axis=1))) / len(z) for columns in kinds], axis=1)
+    wanted = np.resize(_RANKS, (n, 2))[:, : len(kinds)] + _WITHIN * rng.uniform(-1.0, 1.0, (n, len(kinds)))
+    return np.asarray(z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)])
 
 
 def _with_ratios(target: LogPosterior, start: Array) -> Array:

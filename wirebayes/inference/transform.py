@@ -179,9 +179,11 @@ class Transformation:
                 self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood, effects))
 
     @property
-    def rates(self) -> list[int]:
-        """Columns that say how fast a material creeps: the logarithm of its hazard at half a hold."""
-        return [ridge.where["k2"] for ridge in self.ridges if "k2" in ridge.shifted]
+    def kinds_of_creep(self) -> list[list[int]]:
+        """Columns that say how fast each material creeps, its hazard at half a hold; and how much more under more."""
+        rates = [ridge.where["k2"] for ridge in self.ridges if "k2" in ridge.shifted]
+        powers = [ridge.where["U"] for ridge in self.ridges if "U" in ridge.where]
+        return [columns for columns in (rates, powers) if columns]
 
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
