@@ -180,7 +180,7 @@ class Transformation:
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
-        """Columns that say how fast each material creeps, its hazard at half a hold; and how much more under more."""
+        """Columns that say how fast each material creeps, its hazard at half a hold; and its power of tension."""
         rates = [ridge.where["k2"] for ridge in self.ridges if "k2" in ridge.shifted]
         powers = [ridge.where["U"] for ridge in self.ridges if "U" in ridge.where]
         return [columns for columns in (rates, powers) if columns]
