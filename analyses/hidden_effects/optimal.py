@@ -115,8 +115,8 @@ def judge(case: Case, draws: int = 200) -> dict[str, Any]:
         worst = max(others, default=0.0)
         result["separable"] = bool(np.linalg.norm(z) * np.sqrt(max(1 - worst**2, 0.0)) > SEPARABLE)
     result["bench"] = case.rig.benches[int(np.argmax(share))].name
-    if case.spec.kind in (*TOGETHER, "without", "foreign") and case.hidden:
-        result |= _several(case, candidates, curves, result["groups"], draws)
+    if case.spec.kind in (*TOGETHER, "single", "without", "foreign") and case.hidden:
+        result |= _with_directions(case, candidates, curves, result["groups"], draws)
     if case.spec.kind in ("single", "without") and case.hidden:
         result["optimal"] = _optimal(case, candidates, sizes, curves, set(result["groups"][0]), draws)
     return result
@@ -151,10 +151,10 @@ def _optimal(
     }
 
 
-def _several(
+def _with_directions(
     case: Case, candidates: list[Candidate], curves: Array, groups: list[list[str]], draws: int
 ) -> dict[str, Any]:
-    """What is possible where several effects hide, or one that the judged program does not know."""
+    """What judges can do who know the direction of every signature and no amplitude."""
     geo, rng = case.geo, np.random.default_rng(int(case.spec.key, 16))
     names = list(dict.fromkeys(c.name for c in candidates))
     directions = Directions(
@@ -164,7 +164,11 @@ def _several(
     )
     z = signature(geo, [list(case.hidden)])[0]
     removed = case.spec.names if case.spec.kind == "without" else ()
-    result: dict[str, Any] = {"blind": answers(geo, directions.without(removed), z, rng).rates(groups)}
+    said = answers(geo, directions.without(removed), z, rng)
+    if case.spec.kind == "single":  # small ones are not always seen, and are easier to name where they are
+        seen = said.above(float(np.quantile(answers(geo, directions, 0.0 * z, rng).odds, 1 - ALPHA)))
+        return {"blind": seen.rates(groups)} if seen.names else {}
+    result: dict[str, Any] = {"blind": said.rates(groups)}
     if case.spec.kind in ("two", "three"):
         return result | {f"optimal_{case.spec.kind}": optimal_names(geo, directions, z, groups, rng, draws)}
     if case.spec.kind == "mixed":

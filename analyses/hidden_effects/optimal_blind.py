@@ -111,10 +111,23 @@ def log_evidence(found: list[Metric], sets: Sets, degrees: int) -> Array:
 
 @dataclass(frozen=True)
 class Answers:
-    """What the judge says of some data sets: the names of the most probable set, and whether a remainder is likely."""
+    """What the judge says of some data sets.
+
+    Attributes
+    ----------
+    names : of the most probable set.
+    remains : (m,) whether a remainder is likely.
+    odds : (m,) log odds of anything hidden against nothing, before any prior of nothing.
+    """
 
     names: list[list[str]]
     remains: Mask
+    odds: Array
+
+    def above(self, odds: float) -> Answers:
+        """Those on data sets in which more than that speaks for something hidden."""
+        rows = np.flatnonzero(self.odds > odds)
+        return Answers([self.names[i] for i in rows], self.remains[rows], self.odds[rows])
 
     def rates(self, groups: list[list[str]]) -> dict[str, float]:
         """How often what counts is said, as shares of the data sets.
@@ -125,14 +138,16 @@ class Answers:
 
         Returns
         -------
-        ``all``: a name from every group, ``known``: one from the first; ``remains``: a remainder; ``right``: a
-        remainder or a name from the first group; ``other``: no remainder and a name from no group.
+        ``all``: a name from every group, ``known``: one from the first; ``named``: that, and no remainder; ``remains``:
+        a remainder; ``right``: a remainder or a name from the first group; ``other``: no remainder and a name from no
+        group.
         """
         named = np.array([[any(n in group for n in names) for group in groups] for names in self.names])
         other = np.array([any(not any(n in g for g in groups) for n in names) for names in self.names])
         said = {
             "all": named.all(axis=1),
             "known": named[:, 0],
+            "named": named[:, 0] & ~self.remains,
             "remains": self.remains,
             "right": self.remains | named[:, 0],
             "other": other & ~self.remains,
@@ -152,6 +167,7 @@ def answers(geo: Geometry, directions: Directions, z: Array, rng: np.random.Gene
     bare, more = (list(metrics(geo, directions.units, data, remainder)) for remainder in (False, True))
     every = [Sets.of(directions, size) for size in range(LARGEST_SET + 1)]
     names = [[directions.names[i] for i in line] for sets in every for line in sets.effects]
+    nothing = log_evidence(bare, every[0], degrees)[:, 0]
     without = [np.full((draws, 1), -np.inf)]  # nothing at all is no answer
     for sets in every[1:]:
         size = sets.members.shape[1]
@@ -163,4 +179,5 @@ def answers(geo: Geometry, directions: Directions, z: Array, rng: np.random.Gene
     either = alone.copy()
     either[:, : remainder.shape[1]] = np.logaddexp(alone[:, : remainder.shape[1]], remainder)
     remains = logsumexp(remainder, axis=1) > logsumexp(alone, axis=1)
-    return Answers([names[i] for i in np.argmax(either, axis=1)], np.asarray(remains))
+    odds = np.asarray(logsumexp(either, axis=1) - nothing)
+    return Answers([names[i] for i in np.argmax(either, axis=1)], np.asarray(remains), odds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from statistics import NormalDist
 from typing import Any
 
+from .cases import TOGETHER
 from .rates import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ratio
 
 Target = dict[str, Any]
@@ -38,6 +39,7 @@ def targets(rows: list[Row]) -> list[Target]:
         table.append(_most(f"a test that knew the effect would detect, delta {delta:g}", at))
         right = rate(r["right_group"] for r in at if r["detected"])
         table.append(_at_least(f"top-ranked effect in the true group, delta {delta:g}", right, group))
+        table.append(_no_more(f"{BLIND}, delta {delta:g}", [r["blind"].get("named") for r in at if r["detected"]]))
         claimed = rate(r["claimed_group"] for r in at if r["detected"])
         table.append(_at_least(f"true effect in the reported group, delta {delta:g}", claimed, group))
     table.append(
@@ -74,6 +76,7 @@ def _several(rows: list[Row]) -> list[Target]:
     from .score import accepted_of_group, false_names, visible_beside
 
     kinds = {kind: [r for r in rows if r["kind"] == kind] for kind in ("single", "two", "three", "mixed")}
+    more = [r for kind in ("foreign", *TOGETHER) for r in rows if r["kind"] == kind]
     apart = {kind: [r for r in kinds[kind] if all(visible_beside(r))] for kind in ("two", "three")}
     first = [r for r in kinds["two"] if r["accepted"]]
     known = [r for r in kinds["mixed"] if visible_beside(r)[0]]
@@ -113,12 +116,10 @@ def _several(rows: list[Row]) -> list[Target]:
         _row(
             "the same, of files with several effects or a foreign one",
             "in %",
-            rate(bool(false_names(r)) for r in rows if r["blind"] and r["kind"] != "without"),
+            rate(bool(false_names(r)) for r in more),
             None,
         ),
-        _no_more(
-            f"{BLIND}: a name of no group", [r["blind"]["other"] for r in rows if r["blind"] and r["kind"] != "without"]
-        ),
+        _no_more(f"{BLIND}: a name of no group", [r["blind"].get("other") for r in more]),
     ]
     return table
 

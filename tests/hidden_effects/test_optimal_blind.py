@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from analyses.hidden_effects import optimal
 from analyses.hidden_effects.cases import Spec, build
 from analyses.hidden_effects.delta import derivatives
 from analyses.hidden_effects.optimal import judge
@@ -56,10 +57,32 @@ def test_each_metric_is_that_of_the_dense_covariance():
 
 
 def test_what_counts_as_said():
-    said = Answers([["a", "c"], ["b"], ["c"], ["b"]], np.array([False, False, False, True]))
+    said = Answers([["a", "c"], ["b"], ["c"], ["b"]], np.array([False, False, False, True]), np.arange(4.0))
     found = said.rates([["a", "b"], ["c"]])
-    assert found == {"all": 0.25, "known": 0.75, "remains": 0.25, "right": 0.75, "other": 0.0}
+    assert found == {"all": 0.25, "known": 0.75, "named": 0.5, "remains": 0.25, "right": 0.75, "other": 0.0}
     assert said.rates([["a"]])["other"] == 0.75
+    assert said.above(2.0).rates([["a", "b"]]) == {
+        "all": 1.0, "known": 1.0, "named": 0.0, "remains": 1.0, "right": 1.0, "other": 0.0
+    }  # fmt: skip
+
+
+def test_more_speaks_for_something_hidden_the_larger_it_is():
+    geo = build(Spec("two", "paper", ("toe", "memory"), 10.0, 0)).geo
+    z = geo.project(geo.chol @ np.random.default_rng(0).normal(size=len(geo.plain)))[0]
+    units = np.vstack([z / np.linalg.norm(z), np.eye(len(z))[:3]])
+    some = Directions(units, np.arange(4), ["a", "b", "c", "d"])
+    nothing, small, large = (
+        answers(geo, some, size * units[0], np.random.default_rng(1), draws=6).odds for size in (0.0, 5.0, 10.0)
+    )
+    assert (nothing < small).all()
+    assert (small < large).all()
+
+
+def test_a_single_effect_is_judged_where_it_is_seen(monkeypatch):
+    case = build(Spec("single", "dense", ("grip_slip",), 3.0, 0))
+    seen = judge(case, draws=20)["blind"]
+    monkeypatch.setattr(optimal, "ALPHA", 0.999)
+    assert seen["named"] > judge(case, draws=20)["blind"]["named"] + 0.1
 
 
 def test_a_slip_may_be_a_setting_error_where_its_size_is_unknown():

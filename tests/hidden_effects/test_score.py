@@ -170,7 +170,7 @@ def several(kind, accepted, ideal, remains=False, groups=(("toe",), ("yield",)))
         "right": False,
         "optimal_two": {"group": ideal} if kind == "two" else {},
         "optimal_three": {},
-        "blind": {"all": 0.5, "known": 0.7, "remains": 0.2, "right": 0.8, "other": 0.1},
+        "blind": {"all": 0.5, "known": 0.7, "named": 0.6, "remains": 0.2, "right": 0.8, "other": 0.1},
         "optimal_mixed": {"known": ideal, "remains": 0.5} if kind == "mixed" else {},
         "left_over": {"2": {"delta": 2.0, "power": 0.1}} if kind == "mixed" else {},
     }
