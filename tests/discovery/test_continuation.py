@@ -13,7 +13,7 @@ from wirebayes.discovery import continuation, linear_scan, refit, screening
 from wirebayes.discovery.continuation import Continuation, climb, ladders, start, strengths
 from wirebayes.discovery.linear_scan import RATIOS, Scan, Tangent, expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
-from wirebayes.discovery.screening import GlobalTest
+from wirebayes.discovery.screening import GlobalTest, Scale
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import read_experiments
@@ -100,7 +100,7 @@ def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path:
     larger = Continuation([block], trials, candidates, [data])
     far, log_bayes = larger.test([drawn], near), larger.log_bayes
     assert far.surprises["creep_threshold"] > near.surprises["creep_threshold"] + 1.0
-    assert far.p == pytest.approx(1 / 200) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
+    assert far.p == 1 / (1 + len(far.null)) and max(log_bayes, key=lambda c: log_bayes[c]).name == "creep_threshold"
 
 
 def test_all_noise_ratios_at_once_are_what_dense_algebra_says_of_each() -> None:
@@ -163,12 +163,13 @@ def test_simulations_that_come_later_are_climbed_and_the_others_kept(
         return climb(block, way, begin)
 
     monkeypatch.setattr(continuation, "climb", counted)
-    larger = Continuation([block], trials, candidates, [data])
+    larger, anew = (Continuation([block], trials, candidates, [data]) for _ in range(2))
     monkeypatch.setattr(continuation, "BY_LARGER", 1.0)  # no surprise is too small to be found out
+    for each in (larger, anew):
+        each._values = {"strain_stiffening": 50.0}  # more than the scan says
     for simulated in (drawn[0], both):
         found = larger.test([simulated], screening.global_test(candidates, [data], [simulated.scan]))
-    assert rows == [1, 40, 40]
-    anew = Continuation([block], trials, candidates, [data])
+    assert rows == [1, 1, 40, 40]
     again = anew.test([both], screening.global_test(candidates, [data], [both.scan]))
     assert found.surprises == again.surprises and anew.log_bayes == larger.log_bayes
 
@@ -178,11 +179,11 @@ def test_larger_effects_count_where_they_are_clear(as_high: int, counts: bool, m
     """A name that by its ladder surprises as much as the most surprising name in 2 % of the data sets, or less."""
     null = np.linspace(0.0, 10.0, 999)
     height = float(null[-1 - as_high] + 0.001)
-    test = GlobalTest({"a": np.linspace(-2.0, 4.0, 999)}, {"a": 1.0, "b": 5.0}, null)
+    test = GlobalTest({"a": np.linspace(-2.0, 4.0, 999)}, {"a": Scale(2.0, 1.0)}, {"a": 1.0, "b": 5.0}, null)
     larger = Continuation.__new__(Continuation)
     larger._values = {"a": 20.0}
     monkeypatch.setattr(Continuation, "_chance", lambda *given: np.empty(0))
-    monkeypatch.setattr(continuation, "surprise", lambda value, chance: height)
+    monkeypatch.setattr(Scale, "of", lambda chance: SimpleNamespace(surprise=lambda value: height))
     found = larger.test([], test)
     assert found.p == ((1 + as_high) / 1000 if counts else test.p) and test.p == 0.501
     assert found.surprises == ({"a": height, "b": 5.0} if counts else test.surprises)
@@ -193,14 +194,24 @@ def test_what_could_not_become_clear_is_not_led_through_the_simulations(
     rank: int, led: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A path only raises the simulations: a value that so many exceed in the scan already is no more surprising."""
-    chance = np.linspace(-2.0, 4.0, 999)
     null = np.log(1000.0) - np.log(np.arange(1.0, 1000.0))  # of one name alone: the k-th is as surprising as k in 1,000
+    scale = Scale(2.0, 1.0)
     larger = Continuation.__new__(Continuation)
-    larger._values = {"a": float(chance[-1 - rank])}
+    larger._values = {"a": scale.value(float(null[rank]))}
     tried: list[str] = []
     monkeypatch.setattr(Continuation, "_chance", lambda self, name, *given: tried.append(name) or np.full(999, 9.0))
-    larger.test([], GlobalTest({"a": chance}, {"a": 0.0}, null))
+    larger.test([], GlobalTest({"a": np.linspace(-2.0, 4.0, 999)}, {"a": scale}, {"a": 0.0}, null))
     assert tried == led
+
+
+def test_a_path_that_adds_nothing_is_not_led_through_the_simulations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The scan has said already how surprising that value is."""
+    larger = Continuation.__new__(Continuation)
+    larger._values = {"a": 9.0}
+    monkeypatch.setattr(Continuation, "_chance", lambda *given: pytest.fail("it was"))
+    scale, null = Scale(2.0, 1.0), np.linspace(0.0, 5.0, 99)
+    test = GlobalTest({"a": null}, {"a": scale}, {"a": float(scale.surprise(9.0))}, null)
+    assert larger.test([], test).p == test.p == 0.01
 
 
 @pytest.mark.parametrize(("value", "climbed"), [(0.0, 40), (2.9, 200), (9.0, 999)])
@@ -264,7 +275,7 @@ def test_the_noise_ratio_of_a_fit_is_that_of_its_setting_and_sensor_errors(tmp_p
 
 
 @pytest.mark.statistical
-def test_the_most_surprising_name_is_as_surprising_as_said() -> None:
+def test_the_most_surprising_name_is_as_surprising_as_said(monkeypatch: pytest.MonkeyPatch) -> None:
     """p is uniform whatever the tails and the correlations of the names: an analytic case, one row as the data."""
     rng = np.random.default_rng(0)
     values = []
@@ -272,9 +283,9 @@ def test_the_most_surprising_name_is_as_surprising_as_said() -> None:
         common = rng.exponential(size=100)
         names = {str(k): np.maximum(common, s * rng.exponential(size=100)) for k, s in enumerate((0.3, 1.0, 1.0, 3.0))}
         chance = {name: v[1:] for name, v in names.items()}
-        found = {name: screening.surprise(float(v[0]), chance[name]) for name, v in names.items()}
-        null = np.max([screening.surprises(v) for v in chance.values()], axis=0)
-        values.append(screening.GlobalTest(chance, found, null).p)
+        monkeypatch.setattr(screening, "by_name", lambda candidates, scans: scans)
+        found = {name: v[:1] for name, v in names.items()}
+        values.append(screening.global_test([], found, chance).p)  # type: ignore[arg-type]
     for alpha in (0.02, 0.04, 0.1, 0.5):
         share, sd = np.mean(np.array(values) <= alpha), np.sqrt(alpha * (1 - alpha) / 2000)
         assert abs(share - alpha) < 4 * sd, alpha

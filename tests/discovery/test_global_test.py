@@ -55,23 +55,26 @@ def examined(
 
 
 def test_what_is_plain_to_see_needs_no_larger_effects(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No simulation of 199 is as surprising: nothing that is tried further could change the verdict."""
-    found, made = examined(monkeypatch, linear=1 / 200, larger=0.9)
-    assert found.test.p == 1 / 200 and found.further == {} and made == SIMULATIONS
+    """No simulation of 300 is as surprising: nothing that is tried further could change the verdict."""
+    found, made = examined(monkeypatch, linear=1 / 301, larger=0.9, simulations=600)
+    assert found.test.p == 1 / 301 and found.further == {} and made == 300
 
 
-@pytest.mark.parametrize(("larger", "times"), [(0.5, 1), (0.002, 1), (0.04, MOST_TIMES)])
+@pytest.mark.parametrize(
+    ("larger", "wanted"), [(0.5, 100), (0.002, 100), (0.1, SIMULATIONS), (0.04, MOST_TIMES * SIMULATIONS)]
+)
 def test_larger_effects_decide_and_a_p_on_the_level_gets_more_simulations(
-    larger: float, times: int, monkeypatch: pytest.MonkeyPatch
+    larger: float, wanted: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Half of the simulations where they decide, then all, then twice as many each time."""
     found, made = examined(monkeypatch, linear=0.3, larger=larger)
     assert found.test.p == larger and found.further == {"a": 3.0}
-    assert made == times * SIMULATIONS
+    assert made == wanted
 
 
 def test_the_requested_level_decides_what_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
     assert examined(monkeypatch, linear=0.3, larger=0.2, alpha=0.2)[1] == MOST_TIMES * SIMULATIONS
-    assert examined(monkeypatch, linear=0.3, larger=0.04, alpha=0.2)[1] == SIMULATIONS
+    assert examined(monkeypatch, linear=0.3, larger=0.04, alpha=0.2)[1] == 100
 
 
 def test_without_an_effect_that_could_show_nothing_is_tested(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,12 +172,12 @@ def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(
     ("linear", "p", "further"),
-    [(0.002, 0.002, {}), (0.003, 0.003, {"a": 3.0}), (0.023, 0.023, {"a": 3.0}), (0.024, 0.9, {"a": 3.0})],
+    [(0.002, 0.002, {}), (0.003, 0.003, {"a": 3.0}), (8 / 501, 8 / 501, {"a": 3.0}), (9 / 501, 0.9, {"a": 3.0})],
 )
 def test_larger_effects_are_led_through_the_simulations_only_where_they_could_change_the_verdict(
     linear: float, p: float, further: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of 999 simulations two as surprising are plain to see, and 22 below the level of .04 beyond doubt; not 23."""
+    """Of 500 simulations none as surprising is plain to see, and 7 below the level of .04 beyond doubt; not 8."""
     found, _ = examined(monkeypatch, linear=linear, larger=0.9, simulations=999)
     assert found.further == further and found.test.p == p
 

@@ -29,7 +29,7 @@ from wirebayes.discovery.linear_scan import (
     tangent,
 )
 from wirebayes.discovery.refit import occam
-from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, shared_amplitude, surprise
+from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, Scale, by_name, shared_amplitude
 from wirebayes.discovery.settings import BY_LARGER
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
@@ -588,12 +588,13 @@ class Continuation:
         clear = max(BY_LARGER, 1.0 / (1 + count))
         needed = float(np.quantile(test.null, 1.0 - clear))  # below it no surprise can make p so small
         # Simulations come out no lower along the paths than in the scan, so a value is no more surprising than there.
-        most = {name: surprise(v, test.chance[name]) for name, v in values.items()}
+        most = {name: float(test.scales[name].surprise(v)) for name, v in values.items()}
         lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in values.items()}
         surprises = dict(test.surprises)
-        for name in sorted((n for n in lead if most[n] >= needed), key=lambda n: -lead[n])[:_TRIED]:
+        may = [n for n in lead if most[n] >= needed and most[n] > surprises[n]]
+        for name in sorted(may, key=lambda n: -lead[n])[:_TRIED]:
             chance = self._chance(name, test.chance[name], simulated, needed)
-            surprises[name] = max(surprises[name], surprise(values[name], chance))
+            surprises[name] = max(surprises[name], float(Scale.of(chance).surprise(values[name])))
             if surprises[name] > test.null.max():
                 break
         larger = replace(test, surprises=surprises)

@@ -25,9 +25,7 @@ from wirebayes.workers import ParallelMap
 
 Report = Callable[[str, float, float], None]
 PLAIN_TO_SEE = 0.002  # p of the linear scan at which naming needs no look from larger effects either
-# Risk on either side that a p on the level itself gives so few, or so many, exceedances: three standard errors, as the
-# ranks of names add some error to the binomial one.
-CLOSE = 0.00135
+CLOSE = 0.00135  # risk on either side that a p on the level itself gives so few, or so many, exceedances
 MOST_TIMES = 4  # as many simulations at most, in units of the requested number
 
 
@@ -83,7 +81,8 @@ def examine(
     kinds : mapping of name to effect class
         Which effects the test looks for, beside a smooth discrepancy.
     simulations : int
-        Refitted data sets behind the p-value; up to `MOST_TIMES` as many where p is too close to `alpha` to decide.
+        Refitted data sets behind the p-value; half as many where they decide, up to `MOST_TIMES` as many where p is too
+        close to `alpha`.
     rng : numpy Generator
     alpha : float
         The level p will be compared with.
@@ -115,13 +114,15 @@ def examine(
     larger: Continuation | None = None
     while True:
         report("simulations", len(simulated), len(blocks))
-        n = len(simulated[0].z) if simulated else simulations  # as many again each time
+        made = len(simulated[0].z) if simulated else 0
+        # half of them first, which is enough for most tests; more than all of them where p is close to the level
+        n = (made if made >= simulations else simulations - made) if made else (simulations + 1) // 2
         more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
         pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
         simulated = [screening.joined_replicates(parts) for parts in pairs]
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
-        beyond_linear = test.p > max(PLAIN_TO_SEE, 1.0 / (1 + simulations))
+        beyond_linear = test.p > max(PLAIN_TO_SEE, 1.0 / (1 + len(test.null)))
         if beyond_linear:
             report("larger effects", 0, 1)
             larger = larger or Continuation(blocks, trials, candidates, data, parallel_map)
@@ -129,7 +130,7 @@ def examine(
             if test.p > alpha or is_close(test.p, alpha, len(test.null)):
                 test = larger.test(simulated, test)
             report("larger effects", 1, 1)
-        if len(test.null) >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
+        if made + n >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
             break
     report("simulations", len(blocks), len(blocks))
     further = larger.log_bayes if larger is not None and beyond_linear else {}

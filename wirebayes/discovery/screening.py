@@ -26,6 +26,7 @@ _FLEXIBLE = "unknown"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 # What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
 _LEARNED_EXPONENT = LengthDependence("B").key
+_UPPER, _WORTH = 0.2, 100.0  # share of simulated values that a scale is fitted to; simulations that its prior is worth
 _AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
@@ -197,20 +198,39 @@ def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str,
     return out
 
 
-def surprise(value: float, chance: Array) -> float:
-    """Minus the log share of simulated values (n,) as large; beyond the largest it goes on by the distance.
+@dataclass(frozen=True)
+class Scale:
+    """How surprising a log Bayes factor of one name is: minus the log share of simulations as large.
 
-    A log Bayes factor is exceeded by chance about exponentially seldom, so a nat more is a nat more surprising.
+    A log Bayes factor is exceeded by chance about exponentially seldom. Counting the few simulations that exceed it
+    would make the surprise, and with it p, as uncertain as a number of five; a line through the upper values is not.
+
+    Attributes
+    ----------
+    high : float
+        What a share `_UPPER` of simulated values exceed.
+    fall : float
+        Nats by which the value grows while that share falls to 1/e of it.
     """
-    larger = int((chance >= value).sum())
-    return float(np.log1p(len(chance)) - np.log1p(larger) + max(value - chance.max(), 0.0))
 
+    high: float
+    fall: float
 
-def surprises(chance: Array) -> Array:
-    """(n,) the surprise of each simulated value among the others."""
-    larger = stats.rankdata(-chance, method="max")  # itself among them
-    first, second = np.sort(chance)[::-1][:2]
-    return np.asarray(np.log(len(chance)) - np.log(larger) + np.where(chance == first, first - second, 0.0))
+    @staticmethod
+    def of(chance: Array) -> "Scale":
+        """That of simulated values (n,); where there are few, the fall is nearly one nat, as for many readings."""
+        high = float(np.quantile(chance, 1.0 - _UPPER))
+        beyond = chance[chance > high] - high
+        return Scale(high, float((beyond.sum() + _WORTH) / (len(beyond) + _WORTH)))
+
+    def surprise(self, value: Any) -> Any:
+        """Of a value, or of each of an array; none where the evidence is against the name."""
+        along = (value - self.high) / self.fall - np.log(_UPPER)
+        return np.where(np.greater(value, _AGAINST), np.maximum(along, 0.0), 0.0)
+
+    def value(self, surprise: float) -> float:
+        """Which value is so surprising."""
+        return self.high + self.fall * float(surprise + np.log(_UPPER))
 
 
 @dataclass(frozen=True)
@@ -221,13 +241,16 @@ class GlobalTest:
     ----------
     chance : dict of name to (n,) array
         Its largest log Bayes factor in the simulations.
+    scales : dict of name to Scale
+        From the first third of the simulations.
     surprises : dict of name to float
         Of the data.
-    null : (n,) array
-        Largest surprise of each simulation.
+    null : (m,) array
+        Largest surprise of each of the other simulations: given the scales, these are independent of each other.
     """
 
     chance: dict[str, Array]
+    scales: dict[str, Scale]
     surprises: dict[str, float]
     null: Array
 
@@ -236,16 +259,25 @@ class GlobalTest:
         """Share of refitted simulations at least as surprising."""
         return float((1 + (self.null >= max(self.surprises.values())).sum()) / (1 + len(self.null)))
 
+    @property
+    def p_interval(self) -> tuple[float, float]:
+        """Clopper and Pearson's 95 % interval of the share of simulations at least as surprising."""
+        larger = int((self.null >= max(self.surprises.values())).sum())
+        low, high = stats.binomtest(larger, len(self.null)).proportion_ci()
+        return float(low), float(high)
+
     def threshold(self, name: str, alpha: float) -> float:
         """The log Bayes factor at which a name would be as surprising as chance is with probability alpha."""
-        share = np.exp(-np.quantile(self.null, 1.0 - alpha))
-        return float(np.quantile(self.chance[name], 1.0 - min(share, 1.0)))
+        return self.scales[name].value(float(np.quantile(self.null, 1.0 - alpha)))
 
 
 def chance_level(candidates: Sequence[Candidate], null: Sequence[Scan]) -> GlobalTest:
     """What chance reaches in simulations, with no readings to compare."""
     chance = by_name(candidates, null)
-    return GlobalTest(chance, {}, np.max([surprises(value) for value in chance.values()], axis=0))
+    first = max(len(next(iter(chance.values()))) // 3, 1)
+    scales = {name: Scale.of(value[:first]) for name, value in chance.items()}
+    surprises = [scales[name].surprise(value[first:]) for name, value in chance.items()]
+    return GlobalTest(chance, scales, {}, np.max(surprises, axis=0))
 
 
 def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Sequence[Scan]) -> GlobalTest:
@@ -264,5 +296,5 @@ def global_test(candidates: Sequence[Candidate], data: Sequence[Scan], null: Seq
     GlobalTest
     """
     level = chance_level(candidates, null)
-    found = {name: surprise(float(v[0]), level.chance[name]) for name, v in by_name(candidates, data).items()}
+    found = {name: float(level.scales[name].surprise(v[0])) for name, v in by_name(candidates, data).items()}
     return replace(level, surprises=found)

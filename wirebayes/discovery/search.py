@@ -17,6 +17,7 @@ from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.linear_scan import Expansion, expand
 from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.screening import GlobalTest
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.discovery.stepwise import Accepted, Explored, explore
 from wirebayes.discovery.verdict import Alternative, Decision, alternatives, decide, verdict_of
@@ -146,7 +147,7 @@ def investigate(
     out: dict[str, ExperimentFindings] = {}
     for i, block in enumerate(gate.blocks):
         report("held-out holds", i, len(gate.blocks))
-        common = _common(answers, i, gate.blocks, gate.test.p, where[i], alike)
+        common = _common(answers, i, gate.blocks, gate.test, where[i], alike)
         outlook = _outlook(gate, i, settings, answers[i], alike)
         for name, own in _own_reports(gate, block, answers[i], rng, parallel_map).items():
             out[name] = {**common, **outlook, **own}
@@ -307,7 +308,7 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
 
 
 def _common(
-    answers: Sequence[_Answer], i: int, plain: list[LaplaceFit], p: float, where: list[Disagreement],
+    answers: Sequence[_Answer], i: int, plain: list[LaplaceFit], test: GlobalTest, where: list[Disagreement],
     alike: dict[tuple[str, str], float],
 ) -> Answer:  # fmt: skip
     """What the experiments of one block share in the report."""
@@ -327,7 +328,9 @@ def _common(
         "probability_nothing": answer.nothing,
         "inclusion": answer.inclusion,
         "remainder": answer.remainder,
-        "p_global": p,
+        "p_global": test.p,
+        "p_interval": list(test.p_interval),
+        "p_simulations": len(test.null),
         "shared_with": list(dict.fromkeys(shared)),
         "where": where,
     }

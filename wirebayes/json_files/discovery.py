@@ -33,7 +33,11 @@ class Disagreement(TypedDict):
 
 
 class Answer(TypedDict):
-    """What the experiments of one material share."""
+    """What the experiments of one material share.
+
+    `p_simulations` is the number of refitted simulations that `p_global` is a share of, and `p_interval` the share's
+    95 % interval.
+    """
 
     verdict: Verdict
     effects: list[str]
@@ -47,6 +51,8 @@ class Answer(TypedDict):
     inclusion: dict[str, float]
     remainder: Remainder
     p_global: float
+    p_interval: list[float]
+    p_simulations: int
     shared_with: list[str]
     where: list[Disagreement]
 
