@@ -10,7 +10,7 @@ from scipy import stats
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import amplitude_prior
-from wirebayes.discovery.amplitude_prior import correction, information
+from wirebayes.discovery.amplitude_prior import corrections, information
 from wirebayes.effects import named
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.simulation.synthetic import Bench, Truth
@@ -39,7 +39,7 @@ def corrected(
 
     monkeypatch.setattr(amplitude_prior, "information", seen)
     found: Any = SimpleNamespace(effect=b, blocks=(0,), theta=(np.array([900.0, 0.1, theta]),))
-    return correction(found, [block])  # type: ignore[list-item]
+    return corrections([block])(found)  # type: ignore[list-item]
 
 
 def test_priors_of_a_chain_are_those_of_single_effects(monkeypatch: pytest.MonkeyPatch) -> None:

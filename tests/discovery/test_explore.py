@@ -43,7 +43,7 @@ def explored(
     monkeypatch.setattr(stepwise, "_fit", fit)
     known = {name: np.array([value]) for name, value in (credits or {}).items()}
     monkeypatch.setattr(stepwise, "_credits", lambda expansions, trials: known)
-    monkeypatch.setattr(stepwise, "_remainder", lambda block: smooth)
+    monkeypatch.setattr(stepwise, "_scanned", lambda block, trials: SimpleNamespace(flexible=np.array([smooth])))
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
     found = stepwise.explore(
         [None], evidence(singles), [], [], settings, np.random.default_rng(0), map  # type: ignore[list-item]
@@ -216,9 +216,8 @@ class Fits:
         monkeypatch.setattr(stepwise, "fitted", fitted)
         monkeypatch.setattr(stepwise, "informed", informed)
         monkeypatch.setattr(stepwise, "weigh_names", weighed)
-        monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: None)
-        monkeypatch.setattr(stepwise, "scan", lambda x: None)
-        monkeypatch.setattr(stepwise, "_remainder", lambda block: remainders[block.target])
+        seen = lambda block, trials: SimpleNamespace(flexible=np.array([remainders[block.target]]))  # noqa: E731
+        monkeypatch.setattr(stepwise, "_scanned", seen)
         monkeypatch.setattr(stepwise.screening, "candidate_probes", lambda blocks, kinds: (["probe"], ["candidate"]))
         monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
 
@@ -233,7 +232,7 @@ def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytes
     assert found.blocks[0] is fits.blocks[0] and found.blocks[1].target == "e1"
     assert found.effects.names == ("a", "b") and found.effects.remainder.tolist() == [5.0, 4.0]  # type: ignore[union-attr]
     assert found.accepted == ("first", stepwise.Accepted("b", (1,), {1: "new"}))  # type: ignore[comparison-overlap, dict-item]
-    assert found.scanned[:2] == (["probe"], ["candidate"]) and len(found.scanned[2]) == 2
+    assert found.probed == (["probe"], ["candidate"])
 
 
 @pytest.mark.parametrize(("on", "shared", "told"), [((0, 1), False, False), ((0, 1), True, True), ((0,), True, False)])

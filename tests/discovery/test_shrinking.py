@@ -218,10 +218,22 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
 
     monkeypatch.setattr(shrinking, "fitted", fitted)
     slip = replace(named("grip_slip@4"), test="another")  # type: ignore[type-var]
-    whole: Any = SimpleNamespace(effects=(slip, named("memory")), law="hooke", history="additive")
+    whole: Any = SimpleNamespace(
+        effects=(slip, named("memory")), law="hooke", history="additive", names=(one.name, other.name),
+        experiments=(one, other),
+    )  # fmt: skip
     memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]
     assert memory is whole.effects[1] and asked == [([other], (memory,), "hooke", "additive", "rng")]
     assert smooth == shrinking.discrepancy(other, shrinking.left_over(block, other.name))
+    # a block that is this experiment alone has been fitted, its first holds have not
+    block.effects, block.experiments, block.names = (memory,), (other,), (other.name,)
+    block.law, block.history = "hooke", "additive"
+    first = other.train(4)
+    monkeypatch.setattr(shrinking, "left_over", lambda fit, name: 0.5 if fit is block else np.nan)
+    _, smooth = shrinking.with_discrepancy(block, other, "rng")  # type: ignore[arg-type]
+    assert smooth == shrinking.discrepancy(other, 0.5) and len(asked) == 1
+    shrinking.with_discrepancy(block, first, "rng")  # type: ignore[arg-type]
+    assert asked[1:] == [([first], (memory,), "hooke", "additive", "rng")]
 
 
 def test_a_gain_is_reported_by_its_three_numbers() -> None:

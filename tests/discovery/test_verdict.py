@@ -135,7 +135,7 @@ def test_sets_that_failed_the_second_test_lose_their_weight_to_the_one_that_pass
 
 def test_nothing_left_to_add_passes_the_second_test() -> None:
     """No candidate is left that could be missing, so no simulation is needed."""
-    whole = SimpleNamespace(scanned=([], [], []), blocks=[None, None])
+    whole = SimpleNamespace(probed=([], []), blocks=[None, None])
     found = verdict._retested(whole, Settings(), np.random.default_rng(0), map)  # type: ignore[arg-type]
     assert found == Retest(None, [[], []])
     assert not verdict._fails(found)
@@ -269,7 +269,7 @@ def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.M
     monkeypatch.setattr(verdict.screening, "global_test", tested)
     monkeypatch.setattr(verdict, "expand", expand)
     monkeypatch.setattr(verdict, "scan", lambda x: x)
-    best: Any = SimpleNamespace(blocks=blocks, scanned=(["t1", "t2"], ["candidate"], []))
+    best: Any = SimpleNamespace(blocks=blocks, probed=(["t1", "t2"], ["candidate"]))
     found = verdict._retested(best, Settings(), np.random.default_rng(0), map)
     assert asked == [(block, ["t1", "t2"], 299) for block in blocks] and found.p == 0.3
     assert found.where == [

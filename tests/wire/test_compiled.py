@@ -1,6 +1,7 @@
 """The compiled staircase and filter against the ones in numpy, which other tests compare with independent truth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,10 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.effects.creep import SteadyCreepCarried
 from wirebayes.effects.elastic import LengthDependence, StrainStiffening
 from wirebayes.effects.rivals import Logarithmic
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.io.paper import experiments
 from wirebayes.model import likelihoods
+from wirebayes.model.problem import build
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.staircase import Model, linearise, simulate
@@ -150,3 +154,15 @@ def test_numpy_computes_what_has_no_formula_and_what_is_complex():
     assert compiled.call(p, theta | {"k1": np.array([900.0 + 1e-30j])}, Model()) is None
     step = simulate(p, theta, Model(), np.full((6, 1), 1e-30j))
     assert np.iscomplexobj(step)
+
+
+@pytest.mark.parametrize("history", ["saturating", "additive"])
+def test_the_coordinates_follow_the_same_creep(history: Any) -> None:
+    """A posterior's coordinates from compiled code and from numpy, holds of different lengths."""
+    first, *rest = experiments()[0].holds
+    longer = replace(first, duration_s=2.0 * first.duration_s)
+    problem = build([replace(experiments()[0], holds=(longer, *rest))], history=history)
+    theta, coordinates = problem.prior.rvs(50, np.random.default_rng(0)), LogPosterior(problem).coordinates
+    z = coordinates.to_sampled(theta)
+    np.testing.assert_allclose(z, by_numpy(lambda: coordinates.to_sampled(theta)), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(coordinates.to_natural(z), theta, rtol=1e-9)

@@ -3,11 +3,12 @@
 It is uniform in δ, the change that the amplitude alone makes to the readings beside the plain parameters, in units of
 the noise. So it is for a single effect, in the linear scan, and so is the size of a smooth remainder. A refit beside
 other effects does not know of the rule: its amplitude is uniform in what it does beside those too, and theirs are as
-the catalogue has them. `correction` adds the difference.
+the catalogue has them. `corrections` adds the difference.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy import stats
@@ -22,7 +23,7 @@ from wirebayes.wire.effect import Effect
 _STEP = 1e-4  # of a sampled coordinate, by which its natural parameter is differentiated
 
 
-def correction(found: Refit, parent: Sequence[LaplaceFit]) -> float:
+def corrections(parent: Sequence[LaplaceFit]) -> Callable[[Refit], float]:
     """What turns the log Bayes factor of a refit beside other effects into one with the prior of this module.
 
     With G the information on the amplitudes, all other parameters free, the evidence of a set holds the root of
@@ -31,25 +32,48 @@ def correction(found: Refit, parent: Sequence[LaplaceFit]) -> float:
 
     Parameters
     ----------
-    found : Refit
     parent : sequence of LaplaceFit
-        The blocks that it was refitted in, with the effects before it.
+        The blocks that effects are refitted in, with the effects before them.
+
+    Returns
+    -------
+    function of Refit to float
     """
-    out, own, left = 0.0, 0.0, 0.0
-    for b, theta in zip(found.blocks, found.theta, strict=True):
-        block = parent[b]
+
+    @cache
+    def before(b: int) -> _Before:
+        return _Before.of(parent[b])
+
+    def correction(found: Refit) -> float:
+        out, own, left = 0.0, 0.0, 0.0
+        for b, theta in zip(found.blocks, found.theta, strict=True):
+            old, after = before(b), _with(parent[b], found)
+            new = information(after, theta, [*old.effects, found.effect])
+            for i, effect in enumerate(old.effects):
+                out += 0.5 * _log_ratio(new[i, i], old.information[i, i])
+                out += old.log_catalogue[i] - _catalogue(after, theta, effect)
+            own += new[-1, -1]
+            left += new[-1, -1] - float(new[-1, :-1] @ np.linalg.pinv(new[:-1, :-1]) @ new[:-1, -1])
+        return out + 0.5 * _log_ratio(own, left)
+
+    return correction
+
+
+@dataclass(frozen=True)
+class _Before:
+    """A block's effects, the information on their amplitudes, and the log density that the catalogue gives each."""
+
+    effects: list[Effect]
+    information: Array
+    log_catalogue: list[float]
+
+    @staticmethod
+    def of(block: LaplaceFit) -> "_Before":
         # what other materials know of a shared amplitude is no prior of this kind
-        earlier = [e for e in block.effects if not any(e.columns()[0] in x.priors for x in block.experiments)]
-        before = block.target.coordinates.to_natural(block.modes.z[:1])[0]
-        after = _with(block, found)
-        old = information(block.target, before, earlier)
-        new = information(after, theta, [*earlier, found.effect])
-        for i, effect in enumerate(earlier):
-            out += 0.5 * _log_ratio(new[i, i], old[i, i])
-            out += _catalogue(block.target, before, effect) - _catalogue(after, theta, effect)
-        own += new[-1, -1]
-        left += new[-1, -1] - float(new[-1, :-1] @ np.linalg.pinv(new[:-1, :-1]) @ new[:-1, -1])
-    return out + 0.5 * _log_ratio(own, left)
+        effects = [e for e in block.effects if not any(e.columns()[0] in x.priors for x in block.experiments)]
+        theta = block.target.coordinates.to_natural(block.modes.z[:1])[0]
+        catalogue = [_catalogue(block.target, theta, effect) for effect in effects]
+        return _Before(effects, information(block.target, theta, effects), catalogue)
 
 
 def information(target: LogPosterior, theta: Array, effects: Sequence[Effect]) -> Array:

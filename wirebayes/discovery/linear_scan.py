@@ -11,11 +11,11 @@ from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
-from scipy.special import logsumexp
 
 from wirebayes.discovery import smooth_reference
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.linear_algebra import cholesky
+from wirebayes.log_sum import log_sum
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
@@ -203,7 +203,7 @@ class Pieces:
         half = -0.5 * self.degrees
         with_it = self.shared + half * np.log(np.maximum(left, self.least))
         without = self.shared + half * np.log(np.maximum(rss, self.least))
-        return np.asarray(logsumexp(with_it, axis=0) - logsumexp(without, axis=0))
+        return np.asarray(log_sum(with_it, axis=0) - log_sum(without, axis=0))
 
 
 def joined(scans: Sequence[Scan]) -> Scan:
@@ -504,15 +504,15 @@ def _scan_few(x: Expansion) -> Scan:
             log_volume, less = _taken_by(found.smooth_square[..., own, own], found.smooth_along[..., own], size)
             # The process is measured in units of the noise that is left beside it.
             loose.append(shared - log_volume - 0.5 * degrees * np.log(np.maximum(rss - less, least)))
-    reference = logsumexp(plain, axis=1)
+    reference = log_sum(plain, axis=1)
     seen = np.isfinite(reference)
     reference = np.where(seen, reference, 0.0)
-    flexible_value = logsumexp(np.concatenate(loose, axis=1), axis=1) - np.log(len(loose)) - reference
+    flexible_value = log_sum(np.concatenate(loose, axis=1), axis=1) - np.log(len(loose)) - reference
     best = np.argmax(effects, axis=1)[:, None]
     amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
     norm = np.sqrt(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best)
     return Scan(
-        np.where(seen[:, None], logsumexp(effects, axis=1) - reference[:, None], 0.0),
+        np.where(seen[:, None], log_sum(effects, axis=1) - reference[:, None], 0.0),
         np.where(seen, flexible_value, 0.0),
         amplitude,
         norm,

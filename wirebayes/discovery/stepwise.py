@@ -14,7 +14,7 @@ from itertools import repeat
 import numpy as np
 
 from wirebayes.discovery import screening, smooth_reference
-from wirebayes.discovery.amplitude_prior import correction
+from wirebayes.discovery.amplitude_prior import corrections
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
@@ -73,15 +73,15 @@ class FittedSet:
         In the order in which they were added.
     further : NameEvidence or None
         Of one more effect; None where none has a chance.
-    scanned : tuple
-        Probes, candidates and scans of the blocks.
+    probed : tuple
+        Probes, and candidates for one more effect.
     """
 
     effects: EffectSet
     blocks: list[LaplaceFit]
     accepted: tuple[Accepted, ...]
     further: NameEvidence | None
-    scanned: tuple[list[Probe], list[Candidate], list[Scan]]
+    probed: tuple[list[Probe], list[Candidate]]
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ def explore(
     parallel_map : function
         The built-in `map`, or one over processes; the sets are the same.
     """
-    smooth = np.array([_remainder(block) for block in plain])
+    smooth = np.array([float(_scanned(block, []).flexible[0]) for block in plain])
     root = EffectSet((), 0.0, {}, smooth)
     frontier = _Frontier(len(settings.kinds))
     credits = _credits(expansions, trials)
@@ -188,7 +188,7 @@ def explore(
         credit = float(np.maximum(smooth + credits.get(name, -np.inf), 0.0).sum()) if name in credits else -np.inf
         frontier.add(root, name, found, credit)
     done = frontier.fitted
-    start = FittedSet(root, plain, (), found, ([], [], []))
+    start = FittedSet(root, plain, (), found, ([], []))
     while True:
         promises = {key: frontier.promise(key) for key in frontier.known}
         best = max(promises.values(), default=-np.inf)
@@ -209,7 +209,7 @@ def explore(
             beside = float(np.maximum(new.effects.remainder, 0.0).sum())
             done[key] = FittedSet(
                 EffectSet(known.names, known.log_bayes, known.presence, new.effects.remainder),
-                new.blocks, new.accepted, new.further, new.scanned,
+                new.blocks, new.accepted, new.further, new.probed,
             )  # fmt: skip
             frontier.known[key] = done[key].effects
             frontier.credit[key] = known.log_bayes + beside
@@ -251,23 +251,22 @@ def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Genera
     if any(len(r.blocks) > 1 for r in refits.values()):
         blocks = informed(blocks, effects, rng)
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
-    scans = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+    scans = [_scanned(block, trials) for block in blocks]
     further = None
     if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
         further = weigh_names(
-            blocks, trials, candidates, scans, correction=lambda r: correction(r, blocks), most=MOST_BESIDE,
-            forms_a_name=1,
+            blocks, trials, candidates, scans, correction=corrections(blocks), most=MOST_BESIDE, forms_a_name=1,
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
             further = None
-    remainder = np.array([_remainder(block) for block in blocks])
+    remainder = np.array([float(s.flexible[0]) for s in scans])
     accepted = (*parent.accepted, Accepted(name, tuple(effects), effects))
     return FittedSet(
         EffectSet((*parent.effects.names, name), 0.0, {}, remainder), blocks, accepted, further,
-        (trials, candidates, scans),
+        (trials, candidates),
     )  # fmt: skip
 
 
-def _remainder(block: LaplaceFit) -> float:
-    """Log Bayes factor of something smooth but unknown beside the effects of a block, local or global."""
-    return float(scan(expand(block.target, block.modes.z[:1], [], reference=smooth_reference.family)).flexible[0])
+def _scanned(block: LaplaceFit, trials: Sequence[Probe]) -> Scan:
+    """What further effects, and something smooth but unknown, local or global, would explain beside a block's."""
+    return scan(expand(block.target, block.modes.z[:1], trials, reference=smooth_reference.family))

@@ -201,7 +201,7 @@ def _gain(
 
 def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, parallel_map: ParallelMap) -> Retest:
     """The global test with the set inside, and where its residuals still depend on something."""
-    trials, candidates, _ = best.scanned
+    trials, candidates = best.probed
     if not candidates:
         return Retest(None, [[] for _ in best.blocks])
     simulated = list(

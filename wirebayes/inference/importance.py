@@ -25,6 +25,7 @@ from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.log_sum import log_sum
 from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
 
@@ -109,7 +110,7 @@ class _Past:
         ess : float
             Effective draws wanted of each density; those with fewer have greater shares.
         """
-        drawn_from = mixture.log_sum(self.log_proposals + np.log(self.counts)[:, None])
+        drawn_from = log_sum(self.log_proposals + np.log(self.counts)[:, None])
         log_weight = self.log_density - drawn_from[:, None]
         found = effective(log_weight)
         known = wanted & (found > 0)

@@ -13,6 +13,7 @@ from wirebayes.inference.sampler import mixture
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.transform import LogPosterior
+from wirebayes.log_sum import log_sum
 from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
 
@@ -58,7 +59,7 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
         by_proposal = np.vstack([by_proposal, proposals[-1].log_density(z)])
         by_proposal = np.hstack([by_proposal, [proposal.log_density(new) for proposal in proposals]])
         z, height = np.concatenate([z, new]), np.append(height, target(new))
-        drawn_from = mixture.log_sum(by_proposal)
+        drawn_from = log_sum(by_proposal)
         log_weight = height - drawn_from
         if effective(log_weight[:, None])[0] >= _ENOUGH and tail(log_weight) <= LARGEST_K:
             return z[truncated_rows(log_weight, n, rng)]

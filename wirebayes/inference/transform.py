@@ -31,6 +31,7 @@ from wirebayes.inference.edges import edge
 from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
+from wirebayes.wire import compiled
 from wirebayes.wire.compiled import has_formula
 from wirebayes.wire.effect import Effect, HoldContext, Placed
 
@@ -91,6 +92,14 @@ class _Ridge:
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
+        if compiled.kernel is not None and not self.effects:
+            square = compiled.kernel.square_gained(drive, reached, self.which_time, self.kept)
+        else:
+            square = self._square_gained(drive, reached, theta)
+        # the floor keeps the logarithm finite
+        return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
+
+    def _square_gained(self, drive: Array, reached: Array, theta: Array) -> Array:
         carried, square = 0.0 * reached[0], 0.0 * drive[0]
         effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
         for j, time in enumerate(self.which_time):
@@ -101,8 +110,7 @@ class _Ridge:
             gained = amount * reached[time]
             carried = carried + gained
             square = square + gained * gained
-        # the floor keeps the logarithm finite
-        return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
+        return square
 
 
 @dataclass(frozen=True)

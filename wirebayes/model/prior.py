@@ -17,7 +17,7 @@ setting_sd     0.004 to 0.2 mm       a milling machine's screw up to a hand-set 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -61,12 +61,15 @@ class Prior:
 
     def log_density(self) -> Callable[[Array], Array]:
         """A function of (n, d) parameters that returns the (n,) log density."""
-        parts = [fast_logpdf(d) for d in self.distributions.values()]
+        forms = [_parsed(d) for d in self.distributions.values()]
+        positive = [i for i, d in enumerate(forms) if d.name == "lognorm" and d.loc == 0.0]
+        together = _lognormal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("shape", "scale")))
+        others = [(i, fast_logpdf(d)) for i, d in enumerate(self.distributions.values()) if i not in positive]
 
         def evaluate(theta: Array) -> Array:
-            total = parts[0](theta[:, 0])
-            for i in range(1, len(parts)):
-                total = total + parts[i](theta[:, i])
+            total = together(theta[:, positive]).sum(axis=1)
+            for i, log_pdf in others:
+                total = total + log_pdf(theta[:, i])
             return total
 
         return evaluate
@@ -123,25 +126,43 @@ class PooledPrior(Prior):
 
 def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
     """The log density of a frozen distribution; closed forms of the common ones avoid scipy's overhead per call."""
-    shapes, loc, scale = dist.dist._parse_args(*dist.args, **dist.kwds)
-    loc, scale = float(loc), float(scale)
-    if dist.dist.name == "norm":
+    name, shape, loc, scale = _parsed(dist)
+    if name == "norm":
         return lambda x: -0.5 * ((x - loc) / scale) ** 2 - (np.log(scale) + _HALF_LOG_2PI)
-    if dist.dist.name == "halfnorm":
+    if name == "halfnorm":
         constant = 0.5 * float(np.log(2.0 / np.pi)) - float(np.log(scale))
         return lambda x: np.where(x >= loc, constant - 0.5 * ((x - loc) / scale) ** 2, -np.inf)
-    if dist.dist.name == "lognorm" and loc == 0.0:
-        s = float(shapes[0])
-
-        def lognormal(x: Array) -> Array:
-            log_x = np.log(np.where(x > 0, x, 1.0))
-            value = -0.5 * ((log_x - np.log(scale)) / s) ** 2 - log_x - (np.log(s) + _HALF_LOG_2PI)
-            return np.where(x > 0, value, -np.inf)
-
-        return lognormal
-    if dist.dist.name == "uniform":
+    if name == "lognorm" and loc == 0.0:
+        return _lognormal(shape, scale)
+    if name == "uniform":
         return lambda x: np.where((x >= loc) & (x <= loc + scale), -np.log(scale), -np.inf)
     return lambda x: np.asarray(dist.logpdf(x))
+
+
+class _Parsed(NamedTuple):
+    """Name, first shape parameter (0 where there is none), location and scale of a distribution."""
+
+    name: str
+    shape: float
+    loc: float
+    scale: float
+
+
+def _parsed(dist: Any) -> _Parsed:
+    """What a frozen distribution of scipy was made with."""
+    shapes, loc, scale = dist.dist._parse_args(*dist.args, **dist.kwds)
+    return _Parsed(dist.dist.name, float(shapes[0]) if shapes else 0.0, float(loc), float(scale))
+
+
+def _lognormal(spread: Any, median: Any) -> Callable[[Array], Array]:
+    """The log density of a log-normal distribution, or of several, a column each."""
+    middle, constant = np.log(median), np.log(spread) + _HALF_LOG_2PI
+
+    def evaluate(x: Array) -> Array:
+        log_x = np.log(np.where(x > 0, x, 1.0))
+        return np.where(x > 0, -0.5 * ((log_x - middle) / spread) ** 2 - log_x - constant, -np.inf)
+
+    return evaluate
 
 
 def wire_defaults(length_mm: float) -> dict[str, Any]:

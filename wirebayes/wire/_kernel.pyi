@@ -1,6 +1,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wirebayes.typing import Array
 
 MOST_EFFECTS: int
@@ -33,6 +36,7 @@ def chain(
     variance: Array,
     setting_sd: Array,
 ) -> tuple[Array, Array, Array]: ...
+def square_gained(drive: Array, reached: Array, which: NDArray[np.int64], kept: float) -> Array: ...
 def seen(
     tension: Array,
     by_setting: Array,

@@ -500,6 +500,23 @@ cdef inline Read read_hold(
     return out
 
 
+def square_gained(const double[:, ::1] drive, const double[:, ::1] reached, const Py_ssize_t[::1] which, double kept):
+    """Squares (n,) of what creep gains in a hold, summed over holds: `wirebayes.inference.transform`.
+
+    `drive` (H, n) is where creep goes in each hold, `reached` (T, n) the share of it reached, `which` (H,) of these.
+    """
+    cdef Py_ssize_t n = drive.shape[1], holds = drive.shape[0], i, j
+    out, past = np.zeros(n), np.zeros(n)
+    cdef double[::1] square = out, carried = past
+    cdef double gained
+    for j in range(holds):
+        for i in range(n):
+            gained = (drive[j, i] - kept * carried[i]) * reached[which[j], i]
+            carried[i] += gained
+            square[i] += gained * gained
+    return out
+
+
 cdef double LOG_2PI = log(2.0 * np.pi)
 
 

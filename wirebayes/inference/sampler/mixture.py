@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from wirebayes.inference.sampler.points import Points
+from wirebayes.log_sum import log_sum
 from wirebayes.typing import Array
 
 DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
@@ -195,12 +196,6 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None
         chosen.append(int(rng.choice(len(x), p=share * nearest / (share @ nearest))))
         nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
     return chosen
-
-
-def log_sum(logs: Array) -> Array:
-    """(n,) log of the sum of (k, n) exponentials; scipy's spends most of its time on cases that do not occur here."""
-    top = logs.max(axis=0)
-    return np.asarray(top + np.log(np.exp(logs - top).sum(axis=0)))
 
 
 _OF_THE_WHOLE = 3.0  # points' worth of the covariance of all points in that of every component

@@ -16,6 +16,7 @@ from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.transport_map import Straight
+from wirebayes.log_sum import log_sum
 from wirebayes.typing import Array
 
 SHARES = (0.72, 0.12, 0.12, 0.04)  # of the close part, the wide one, the plain one and the start's
@@ -62,7 +63,7 @@ class Proposal:
         u, jacobian = self.straight.forward(x)
         straightened = [part.log_density(u) + jacobian for part in (self.close, self.wide)]
         parts = [*straightened, self.plain.log_density(x), self.start.log_density(x)]
-        return mixture.log_sum(np.array(parts) + np.log(self.shares)[:, None])
+        return log_sum(np.array(parts) + np.log(self.shares)[:, None])
 
     def rvs(self, n: int, rng: Any) -> Array:
         """(n, d) draws; `rng` is a numpy RandomState or Generator."""
