@@ -179,11 +179,13 @@ def test_larger_effects_count_where_they_are_clear(as_high: int, counts: bool, m
     """A name that by its ladder surprises as much as the most surprising name in 2 % of the data sets, or less."""
     null = np.linspace(0.0, 10.0, 999)
     height = float(null[-1 - as_high] + 0.001)
-    test = GlobalTest({"a": np.linspace(-2.0, 4.0, 999)}, {"a": Scale(2.0, 1.0)}, {"a": 1.0, "b": 5.0}, null)
+    test = GlobalTest(
+        {"a": np.linspace(-2.0, 4.0, 999)}, {"a": Scale.of(np.linspace(-2.0, 4.0, 999))}, {"a": 1.0, "b": 5.0}, null
+    )
     larger = Continuation.__new__(Continuation)
     larger._values = {"a": 20.0}
     monkeypatch.setattr(Continuation, "_chance", lambda *given: np.empty(0))
-    monkeypatch.setattr(Scale, "of", lambda chance: SimpleNamespace(surprise=lambda value: height))
+    monkeypatch.setattr(continuation, "counted", lambda value, chance: height)
     found = larger.test([], test)
     assert found.p == ((1 + as_high) / 1000 if counts else test.p) and test.p == 0.501
     assert found.surprises == ({"a": height, "b": 5.0} if counts else test.surprises)
@@ -195,7 +197,7 @@ def test_what_could_not_become_clear_is_not_led_through_the_simulations(
 ) -> None:
     """A path only raises the simulations: a value that so many exceed in the scan already is no more surprising."""
     null = np.log(1000.0) - np.log(np.arange(1.0, 1000.0))  # of one name alone: the k-th is as surprising as k in 1,000
-    scale = Scale(2.0, 1.0)
+    scale = Scale.of(np.linspace(-2.0, 4.0, 999))
     larger = Continuation.__new__(Continuation)
     larger._values = {"a": scale.value(float(null[rank]))}
     tried: list[str] = []
@@ -209,7 +211,7 @@ def test_a_path_that_adds_nothing_is_not_led_through_the_simulations(monkeypatch
     larger = Continuation.__new__(Continuation)
     larger._values = {"a": 9.0}
     monkeypatch.setattr(Continuation, "_chance", lambda *given: pytest.fail("it was"))
-    scale, null = Scale(2.0, 1.0), np.linspace(0.0, 5.0, 99)
+    scale, null = Scale.of(np.linspace(-2.0, 4.0, 999)), np.linspace(0.0, 5.0, 99)
     test = GlobalTest({"a": null}, {"a": scale}, {"a": float(scale.surprise(9.0))}, null)
     assert larger.test([], test).p == test.p == 0.01
 

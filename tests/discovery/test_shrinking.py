@@ -228,7 +228,7 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
     # a block that is this experiment alone has been fitted, its first holds have not
     block.effects, block.experiments, block.names = (memory,), (other,), (other.name,)
     block.law, block.history = "hooke", "additive"
-    first = other.train(4)
+    first = other.train(3)
     monkeypatch.setattr(shrinking, "left_over", lambda fit, name: 0.5 if fit is block else np.nan)
     _, smooth = shrinking.with_discrepancy(block, other, "rng")  # type: ignore[arg-type]
     assert smooth == shrinking.discrepancy(other, 0.5) and len(asked) == 1

@@ -29,7 +29,7 @@ from wirebayes.discovery.linear_scan import (
     tangent,
 )
 from wirebayes.discovery.refit import occam
-from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, Scale, by_name, shared_amplitude
+from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, counted, shared_amplitude
 from wirebayes.discovery.settings import BY_LARGER
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
@@ -594,7 +594,7 @@ class Continuation:
         may = [n for n in lead if most[n] >= needed and most[n] > surprises[n]]
         for name in sorted(may, key=lambda n: -lead[n])[:_TRIED]:
             chance = self._chance(name, test.chance[name], simulated, needed)
-            surprises[name] = max(surprises[name], float(Scale.of(chance).surprise(values[name])))
+            surprises[name] = max(surprises[name], counted(values[name], chance))
             if surprises[name] > test.null.max():
                 break
         larger = replace(test, surprises=surprises)

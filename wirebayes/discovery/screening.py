@@ -27,6 +27,7 @@ FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an
 # What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
 _LEARNED_EXPONENT = LengthDependence("B").key
 _UPPER, _WORTH = 0.2, 100.0  # share of simulated values that a scale is fitted to; simulations that its prior is worth
+_MORE = 1.0  # nats by which the line may be above the count: what chance does where five are expected and two are seen
 _AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
@@ -198,12 +199,19 @@ def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str,
     return out
 
 
+def counted(value: Any, chance: Array) -> Any:
+    """Minus the log share of simulated values (n,) as large; beyond the largest it goes on by the distance."""
+    larger = len(chance) - np.searchsorted(np.sort(chance), value)
+    return np.log1p(len(chance)) - np.log1p(larger) + np.maximum(value - chance.max(), 0.0)
+
+
 @dataclass(frozen=True)
 class Scale:
     """How surprising a log Bayes factor of one name is: minus the log share of simulations as large.
 
-    A log Bayes factor is exceeded by chance about exponentially seldom. Counting the few simulations that exceed it
-    would make the surprise, and with it p, as uncertain as a number of five; a line through the upper values is not.
+    It is exceeded by chance about exponentially seldom. Counting the few simulations that exceed it would make the
+    surprise, and with it p, as uncertain as a number of five; a line through the upper values is not. Where a tail is
+    longer than exponential the line would lead far beyond what was counted: there the count decides.
 
     Attributes
     ----------
@@ -211,26 +219,34 @@ class Scale:
         What a share `_UPPER` of simulated values exceed.
     fall : float
         Nats by which the value grows while that share falls to 1/e of it.
+    chance : (n,) array
+        The simulated values.
     """
 
     high: float
     fall: float
+    chance: Array
 
     @staticmethod
     def of(chance: Array) -> "Scale":
-        """That of simulated values (n,); where there are few, the fall is nearly one nat, as for many readings."""
+        """That of simulated values; where there are few, the fall is nearly one nat, as for many readings."""
         high = float(np.quantile(chance, 1.0 - _UPPER))
         beyond = chance[chance > high] - high
-        return Scale(high, float((beyond.sum() + _WORTH) / (len(beyond) + _WORTH)))
+        return Scale(high, float((beyond.sum() + _WORTH) / (len(beyond) + _WORTH)), chance)
 
     def surprise(self, value: Any) -> Any:
         """Of a value, or of each of an array; none where the evidence is against the name."""
-        along = (value - self.high) / self.fall - np.log(_UPPER)
-        return np.where(np.greater(value, _AGAINST), np.maximum(along, 0.0), 0.0)
+        along = np.maximum((value - self.high) / self.fall - np.log(_UPPER), 0.0)
+        most = counted(value, self.chance) + _MORE
+        return np.where(np.greater(value, _AGAINST), np.minimum(along, most), 0.0)
 
     def value(self, surprise: float) -> float:
-        """Which value is so surprising."""
-        return self.high + self.fall * float(surprise + np.log(_UPPER))
+        """The least value that is so surprising."""
+        along = self.high + self.fall * float(surprise + np.log(_UPPER))
+        beyond = surprise - _MORE - float(np.log1p(len(self.chance)))  # the largest simulated value
+        share = min(1.0, np.exp(_MORE - surprise))
+        least = self.chance.max() + beyond if beyond > 0 else np.quantile(self.chance, 1.0 - share)
+        return max(along, float(least))
 
 
 @dataclass(frozen=True)
