@@ -31,7 +31,7 @@ def batch(
         typer.Option("--discover/--no-discover", help="Find what is missing in each, or fit the plain model only."),
     ] = True,
     check: Annotated[
-        bool, typer.Option("--check/--no-check", help="With --no-discover: check each fit against 999 simulations.")
+        bool, typer.Option("--check/--no-check", help="With --no-discover: check each fit against simulations.")
     ] = True,
     posteriors: Annotated[
         bool, typer.Option("--posteriors/--no-posteriors", help="Keep the draws (3 MB a fit), or their summaries only.")

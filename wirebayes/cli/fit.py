@@ -41,7 +41,7 @@ def fit(
     ] = None,
     check: Annotated[
         bool,
-        typer.Option("--check/--no-check", help="Check each fit against 999 refitted simulations (some 1 to 10 s)."),
+        typer.Option("--check/--no-check", help="Check each fit against up to 999 refitted simulations (1 to 10 s)."),
     ] = True,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -41,7 +41,7 @@ class ModelCheck:
     alpha : float
         Level that `p` is compared with.
     simulations : int
-        Refitted data sets behind `p`.
+        Refitted data sets that `p` is a share of.
     surprising : tuple of str
         Effects that the readings ask for most, most surprising first; where the check failed.
     gross_errors : tuple of dict
@@ -121,7 +121,7 @@ def check_model(
     alpha : float
         See `level`.
     simulations : int
-        Refitted data sets behind p; more where p is too close to `alpha` to decide.
+        Refitted data sets behind p: half of them where these decide, more where p is too close to `alpha`.
     parallel_map : function, optional
         The built-in `map`, or one over processes.
     """

@@ -11,7 +11,7 @@ from wirebayes.wire.laws import ElasticLaw, History
 
 ALPHA = 0.04  # level of the global test: one clean file in twenty-five is called incomplete
 BY_LARGER = 0.02  # p up to which what only larger effects show counts
-SIMULATIONS = 999  # p of .04 is then known to .006, and more are made where that is not enough
+SIMULATIONS = 999  # half of them where these decide, more where p is close to the level
 
 # Prior over models. A single effect of any name has weight 1.
 UNKNOWN_WEIGHT = 1.0  # a remainder and no effect, to one name: a person who finds a gap is as ready for either
@@ -61,7 +61,7 @@ class Settings:
     kinds : mapping of name to effect class
         The catalogue searched.
     simulations : int
-        Refitted data sets behind the p-value; more where it is too close to the level to decide.
+        Refitted data sets behind the p-value: half of them where these decide, more where it is too close to the level.
     """
 
     law: ElasticLaw = "hooke"

@@ -99,7 +99,7 @@ def batch(
     policy : Policy, optional
         How many walkers and draws the fits have.
     simulations : int, optional
-        Refitted data sets behind each p-value; 999 when left out.
+        Refitted data sets behind each p-value, half of them where these decide; 999 when left out.
 
     Returns
     -------

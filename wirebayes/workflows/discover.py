@@ -81,7 +81,7 @@ def discover(
     policy : Policy, optional
         How many walkers and draws the fits have; what the command uses when left out.
     simulations : int, optional
-        Refitted data sets behind the p-value; 999 when left out.
+        Refitted data sets behind the p-value, half of them where these decide; 999 when left out.
 
     Returns
     -------

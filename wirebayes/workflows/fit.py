@@ -74,7 +74,7 @@ def fit(
     together : str, optional
         Fit all samples of this material at once.
     check : bool
-        Check each fit against 999 refitted simulations.
+        Check each fit against up to 999 refitted simulations, half of them where these decide.
     seed : int
         Same seed, same machine: same draws.
     output : path, optional
