@@ -13,6 +13,7 @@ from scipy import stats
 
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, probes, scan
 from wirebayes.discovery.refit import occam
+from wirebayes.discovery.settings import ABOVE_COUNT, ONE_NAT, UPPER
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import climb
@@ -26,8 +27,6 @@ _FLEXIBLE = "unknown"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 # What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
 _LEARNED_EXPONENT = LengthDependence("B").key
-_UPPER, _WORTH = 0.2, 100.0  # share of simulated values that a scale is fitted to; simulations that its prior is worth
-_MORE = 1.0  # nats by which the line may be above the count: what chance does where five are expected and two are seen
 _AGAINST = -2.0  # nats; names that hardly show have nearly the same value in all simulations, below this
 
 
@@ -216,7 +215,7 @@ class Scale:
     Attributes
     ----------
     high : float
-        What a share `_UPPER` of simulated values exceed.
+        What a share `UPPER` of simulated values exceed.
     fall : float
         Nats by which the value grows while that share falls to 1/e of it.
     chance : (n,) array
@@ -230,21 +229,21 @@ class Scale:
     @staticmethod
     def of(chance: Array) -> "Scale":
         """That of simulated values; where there are few, the fall is nearly one nat, as for many readings."""
-        high = float(np.quantile(chance, 1.0 - _UPPER))
+        high = float(np.quantile(chance, 1.0 - UPPER))
         beyond = chance[chance > high] - high
-        return Scale(high, float((beyond.sum() + _WORTH) / (len(beyond) + _WORTH)), chance)
+        return Scale(high, float((beyond.sum() + ONE_NAT) / (len(beyond) + ONE_NAT)), chance)
 
     def surprise(self, value: Any) -> Any:
         """Of a value, or of each of an array; none where the evidence is against the name."""
-        along = np.maximum((value - self.high) / self.fall - np.log(_UPPER), 0.0)
-        most = counted(value, self.chance) + _MORE
+        along = np.maximum((value - self.high) / self.fall - np.log(UPPER), 0.0)
+        most = counted(value, self.chance) + ABOVE_COUNT
         return np.where(np.greater(value, _AGAINST), np.minimum(along, most), 0.0)
 
     def value(self, surprise: float) -> float:
         """The least value that is so surprising."""
-        along = self.high + self.fall * float(surprise + np.log(_UPPER))
-        beyond = surprise - _MORE - float(np.log1p(len(self.chance)))  # the largest simulated value
-        share = min(1.0, np.exp(_MORE - surprise))
+        along = self.high + self.fall * float(surprise + np.log(UPPER))
+        beyond = surprise - ABOVE_COUNT - float(np.log1p(len(self.chance)))  # the largest simulated value
+        share = min(1.0, np.exp(ABOVE_COUNT - surprise))
         least = self.chance.max() + beyond if beyond > 0 else np.quantile(self.chance, 1.0 - share)
         return max(along, float(least))
 
