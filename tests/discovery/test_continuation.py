@@ -185,7 +185,7 @@ def test_larger_effects_count_where_they_are_clear(as_high: int, counts: bool, m
     larger = Continuation.__new__(Continuation)
     larger._values = {"a": 20.0}
     monkeypatch.setattr(Continuation, "_chance", lambda *given: np.empty(0))
-    monkeypatch.setattr(continuation, "counted", lambda value, chance: height)
+    monkeypatch.setattr(continuation, "_surprise", lambda value, chance: height)
     found = larger.test([], test)
     assert found.p == ((1 + as_high) / 1000 if counts else test.p) and test.p == 0.501
     assert found.surprises == ({"a": height, "b": 5.0} if counts else test.surprises)
@@ -319,3 +319,11 @@ def test_places_with_other_errors_are_weighed_in_the_same_units(tmp_path: Path) 
     assert abs(units[1] - units[0]) > 1.0  # a difference of units that would be seen
     assert own[0] - units[0] == pytest.approx(own[1] - units[1], abs=0.2)
     np.testing.assert_allclose(begin.largest - units, (begin.log_density - units).max(), rtol=1e-12)
+
+
+def test_a_path_surprises_as_much_as_both_the_line_and_the_count_say() -> None:
+    rng = np.random.default_rng(0)
+    short, long = rng.exponential(size=999), rng.standard_cauchy(size=999)
+    few = np.minimum(short, 4.0)  # by chance, none of some eighteen that should exceed it
+    assert continuation._surprise(4.5, few) == Scale.of(few).surprise(4.5) < screening.counted(4.5, few)
+    assert continuation._surprise(100.0, long) == screening.counted(100.0, long) < Scale.of(long).surprise(100.0)

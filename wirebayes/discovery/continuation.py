@@ -29,7 +29,15 @@ from wirebayes.discovery.linear_scan import (
     tangent,
 )
 from wirebayes.discovery.refit import occam
-from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates, by_name, counted, shared_amplitude
+from wirebayes.discovery.screening import (
+    Candidate,
+    GlobalTest,
+    Replicates,
+    Scale,
+    by_name,
+    counted,
+    shared_amplitude,
+)
 from wirebayes.discovery.settings import BY_LARGER
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.transform import LogPosterior
@@ -594,7 +602,7 @@ class Continuation:
         may = [n for n in lead if most[n] >= needed and most[n] > surprises[n]]
         for name in sorted(may, key=lambda n: -lead[n])[:_TRIED]:
             chance = self._chance(name, test.chance[name], simulated, needed)
-            surprises[name] = max(surprises[name], counted(values[name], chance))
+            surprises[name] = max(surprises[name], _surprise(values[name], chance))
             if surprises[name] > test.null.max():
                 break
         larger = replace(test, surprises=surprises)
@@ -620,6 +628,15 @@ class Continuation:
         z, readings = zip(*plain, strict=True)
         begin = list(self._each(start, self._blocks, z, readings))
         return strengths(ways, list(self._each(_climbs, ways, repeat(self._blocks), repeat(begin))))
+
+
+def _surprise(value: float, chance: Array) -> float:
+    """Of a value along a path, by the simulations' (n,): no more than the line through them says, and than the count.
+
+    The most surprising of all names, which it is compared with, is read off lines alone, and hardly varies. A count
+    varies by a factor of two, and some would by chance come out on the other side.
+    """
+    return float(min(counted(value, chance), Scale.of(chance).surprise(value)))
 
 
 def _climbs(way: AmplitudePath, blocks: Sequence[LaplaceFit], begin: Sequence[Start]) -> dict[int, Climbed]:
