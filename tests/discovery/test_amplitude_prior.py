@@ -92,3 +92,7 @@ def test_information_on_amplitudes_is_that_of_a_regression_beside_everything_els
     wanted = (every[np.ix_(of, of)] - across @ np.linalg.solve(inner, across.T)) / np.outer(scale, scale)
     found = information(target, target.coordinates.to_natural(z)[0], effects)
     np.testing.assert_allclose(found, wanted, rtol=1e-3)
+    absurd = target.coordinates.to_natural(z)[0]
+    absurd[names.index("B")] = np.inf
+    with np.errstate(all="ignore"):
+        assert (information(target, absurd, effects) == 0.0).all()

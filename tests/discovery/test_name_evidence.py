@@ -111,7 +111,10 @@ def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypat
     monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
         effect, tuple(which), -np.inf, 0.0, 1.0, ()))  # fmt: skip
     data, trials = scan_of(np.array([8.0]), True), probes(named("toe"))[:1]
-    found = name_evidence.weigh_names([SimpleNamespace()], trials, [Candidate(0, "toe", (0,), True)], [data])  # type: ignore[list-item]
+    found = name_evidence.weigh_names(
+        [SimpleNamespace()], trials, [Candidate(0, "toe", (0,), True)], [data],  # type: ignore[list-item]
+        correction=lambda r: pytest.fail("there are no parameters to correct it at"),
+    )  # fmt: skip
     assert found.log_bayes["toe"] == -np.inf and found.presence["toe"] == pytest.approx([0.0])
 
 

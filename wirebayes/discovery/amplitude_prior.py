@@ -97,7 +97,8 @@ def information(target: LogPosterior, theta: Array, effects: Sequence[Effect]) -
     across = every[np.ix_(of, rest)]
     seen = every[np.ix_(of, of)] - across @ np.linalg.solve(inner, across.T)
     natural = np.array([_derivative(target, z, c) for c in columns])
-    return np.asarray(seen / np.outer(natural, natural))
+    found = np.asarray(seen / np.outer(natural, natural))
+    return found if np.isfinite(found).all() else np.zeros_like(found)  # no tangent: nothing to compare
 
 
 def _with(block: LaplaceFit, found: Refit) -> LogPosterior:

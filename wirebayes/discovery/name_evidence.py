@@ -131,13 +131,18 @@ def _forms(
     return out
 
 
+def _corrected(found: Refit, correction: Correction) -> float:
+    """The log Bayes factor of a refit; where no climb of it ended there are no parameters to correct it at."""
+    return found.log_bayes + correction(found) if np.isfinite(found.log_bayes) else -np.inf
+
+
 def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int, correction: Correction) -> NameEvidence:
     """Add up the forms of every name: its variants equally, its blocks by `over_subsets`."""
     parts: dict[str, list[tuple[float, Array, list[Refit]]]] = {}
     for form in forms:
         refits = [found.get(place) for place in form.places]
         pairs = zip(refits, form.linear, strict=True)
-        values = np.array([linear if r is None else r.log_bayes + correction(r) for r, linear in pairs])
+        values = np.array([linear if r is None else _corrected(r, correction) for r, linear in pairs])
         total, each, chosen = over_subsets(values)
         presence = np.zeros(blocks)
         for share, (_, on) in zip(each, form.places, strict=True):
