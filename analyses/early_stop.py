@@ -13,16 +13,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from unittest.mock import patch
 
-import numpy as np
-
+from analyses.gate_cost import plain_fits
 from analyses.hidden_effects.cases import SIZES, Plan, Spec, seal, specs
 from analyses.hidden_effects.rates import rate
 from analyses.resumable import records
 from wirebayes.discovery import global_test
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
 from wirebayes.effects import CATALOGUE
-from wirebayes.inference.fit import seed_of
-from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment, read_experiments
 
 DELTAS = (3.0, 5.0)  # so small that many lie near the level
@@ -30,13 +27,7 @@ DELTAS = (3.0, 5.0)  # so small that many lie near the level
 
 def looked(experiments: list[Experiment], seed: int, simulations: int) -> tuple[list[tuple[float, bool]], float, int]:
     """The p at each look with whether the test would go on, the last p, and its number of simulations."""
-    rng = np.random.default_rng(seed_of(seed, "discover"))
-    groups: dict[str, list[Experiment]] = {}
-    for e in experiments:
-        groups.setdefault(e.material, []).append(e)
-    blocks = [
-        fitted(g, (), "hooke", "saturating", r) for g, r in zip(groups.values(), rng.spawn(len(groups)), strict=True)
-    ]
+    blocks, rng = plain_fits(experiments, seed)
     looks: dict[int, tuple[float, bool]] = {}
     is_close = global_test.is_close
 

@@ -36,13 +36,24 @@ def experiments_of(name: str) -> tuple[Any, int]:
         return read_experiments(Path(folder) / "cases" / spec.key / "experiment.toml"), int(spec.key, 16) % 2**31
 
 
+def plain_fits(experiments: Any, seed: int) -> tuple[list[Any], np.random.Generator]:
+    """The plain fit of each material, as `discover` begins, and the random numbers that it goes on with."""
+    from wirebayes.inference.fit import seed_of
+    from wirebayes.inference.laplace_fit import fitted
+
+    rng = np.random.default_rng(seed_of(seed, "discover"))
+    groups: dict[str, list[Any]] = {}
+    for e in experiments:
+        groups.setdefault(e.material, []).append(e)
+    streams = rng.spawn(len(groups))
+    return [fitted(g, (), "hooke", "saturating", r) for g, r in zip(groups.values(), streams, strict=True)], rng
+
+
 def cost_of(name: str, simulations: int) -> dict[str, Any]:
     """One case in this process: processor time, p and the surprise of every name."""
     from analyses.model_check import case
     from wirebayes.discovery.global_test import examine
     from wirebayes.effects import CATALOGUE
-    from wirebayes.inference.fit import seed_of
-    from wirebayes.inference.laplace_fit import fitted
 
     if name.startswith("check"):
         _, kind, number = name.split(":")
@@ -52,12 +63,7 @@ def cost_of(name: str, simulations: int) -> dict[str, Any]:
     experiments, seed = experiments_of(name)
     if experiments is None:
         return {"case": name, "cpu_s": 0.0, "p": None, "first": ""}
-    rng = np.random.default_rng(seed_of(seed, "discover"))
-    groups: dict[str, list[Any]] = {}
-    for e in experiments:
-        groups.setdefault(e.material, []).append(e)
-    streams = rng.spawn(len(groups))
-    blocks = [fitted(g, (), "hooke", "saturating", r) for g, r in zip(groups.values(), streams, strict=True)]
+    blocks, rng = plain_fits(experiments, seed)
     begin = time.process_time()
     gate = examine(blocks, CATALOGUE, simulations, rng)
     cpu = time.process_time() - begin

@@ -8,19 +8,16 @@ simulations, taken for readings, have p <= 0.04. Each for several ways to read o
 """
 
 import argparse
-from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 from scipy import stats
 
-from analyses.gate_cost import experiments_of
+from analyses.gate_cost import experiments_of, plain_fits
 from wirebayes.discovery import screening
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.settings import ABOVE_COUNT, ALPHA, ONE_NAT, UPPER
 from wirebayes.effects import CATALOGUE
-from wirebayes.inference.fit import seed_of
-from wirebayes.inference.laplace_fit import fitted
 from wirebayes.typing import Array
 
 ALL, LOTS, TRIED = 8000, 60, 500
@@ -36,12 +33,7 @@ WAYS = {
 def values(name: str) -> tuple[dict[str, Array], dict[str, Array]]:
     """Each name's log Bayes factor in the readings (1,), and in the simulations (n,)."""
     experiments, seed = experiments_of(name)
-    rng = np.random.default_rng(seed_of(seed, "discover"))
-    groups: dict[str, list[Any]] = {}
-    for e in experiments:
-        groups.setdefault(e.material, []).append(e)
-    streams = rng.spawn(len(groups))
-    blocks = [fitted(g, (), "hooke", "saturating", r) for g, r in zip(groups.values(), streams, strict=True)]
+    blocks, rng = plain_fits(experiments, seed)
     trials, candidates = screening.candidate_probes(blocks, CATALOGUE)
     data = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
     null = [screening.replicated(b, trials, ALL, rng).scan for b in blocks]

@@ -270,15 +270,19 @@ class GlobalTest:
     null: Array
 
     @property
+    def _as_surprising(self) -> int:
+        """How many simulations are."""
+        return int((self.null >= max(self.surprises.values())).sum())
+
+    @property
     def p(self) -> float:
-        """Share of refitted simulations at least as surprising."""
-        return float((1 + (self.null >= max(self.surprises.values())).sum()) / (1 + len(self.null)))
+        """Share of refitted simulations at least as surprising, the readings counted with them."""
+        return (1 + self._as_surprising) / (1 + len(self.null))
 
     @property
     def p_interval(self) -> tuple[float, float]:
         """Clopper and Pearson's 95 % interval of the share of simulations at least as surprising."""
-        larger = int((self.null >= max(self.surprises.values())).sum())
-        low, high = stats.binomtest(larger, len(self.null)).proportion_ci()
+        low, high = stats.binomtest(self._as_surprising, len(self.null)).proportion_ci()
         return float(low), float(high)
 
     def threshold(self, name: str, alpha: float) -> float:
