@@ -156,12 +156,14 @@ def test_numpy_computes_what_has_no_formula_and_what_is_complex():
     assert np.iscomplexobj(step)
 
 
+@pytest.mark.parametrize("known", [(), ("k2", "N"), ("U",), ("U", "k2", "N")])
 @pytest.mark.parametrize("history", ["saturating", "additive"])
-def test_the_coordinates_follow_the_same_creep(history: Any) -> None:
-    """A posterior's coordinates from compiled code and from numpy, holds of different lengths."""
+def test_the_coordinates_follow_the_same_creep(history: Any, known: tuple[str, ...]) -> None:
+    """A posterior's coordinates from compiled code and from numpy; holds of different lengths, parameters known."""
     first, *rest = experiments()[0].holds
     longer = replace(first, duration_s=2.0 * first.duration_s)
-    problem = build([replace(experiments()[0], holds=(longer, *rest))], history=history)
+    priors = {name: {"fixed": 0.7} for name in known}
+    problem = build([replace(experiments()[0], holds=(longer, *rest), priors=priors)], history=history)
     theta, coordinates = problem.prior.rvs(50, np.random.default_rng(0)), LogPosterior(problem).coordinates
     z = coordinates.to_sampled(theta)
     np.testing.assert_allclose(z, by_numpy(lambda: coordinates.to_sampled(theta)), rtol=1e-12, atol=1e-12)

@@ -506,6 +506,8 @@ def square_gained(const double[:, ::1] drive, const double[:, ::1] reached, cons
     `drive` (H, n) is where creep goes in each hold, `reached` (T, n) the share of it reached, `which` (H,) of these.
     """
     cdef Py_ssize_t n = drive.shape[1], holds = drive.shape[0], i, j
+    if reached.shape[1] != n or which.shape[0] != holds:
+        raise ValueError("drive, reached and which are of different sizes")
     out, past = np.zeros(n), np.zeros(n)
     cdef double[::1] square = out, carried = past
     cdef double gained
