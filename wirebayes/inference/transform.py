@@ -93,8 +93,8 @@ class _Ridge:
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
         if compiled.kernel is not None and not self.effects:
-            wide = [np.ascontiguousarray(np.broadcast_to(a, (len(a), len(theta)))) for a in (drive, reached)]
-            square = compiled.kernel.square_gained(*wide, self.which_time, self.kept)
+            every, share = (np.ascontiguousarray(np.broadcast_to(a, (len(a), len(theta)))) for a in (drive, reached))
+            square = compiled.kernel.square_gained(every, share, self.which_time, self.kept)
         else:
             square = self._square_gained(drive, reached, theta)
         # the floor keeps the logarithm finite
