@@ -200,3 +200,10 @@ def test_degrees_of_freedom_reach_the_density():
     x = np.array([[3.0], [0.5]])
     light = mixture.Mixture(np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1)), 40.0)
     assert light.log_density(x) == pytest.approx(stats.t(40.0).logpdf(x[:, 0]))
+
+
+def test_points_that_a_map_has_sent_beyond_all_numbers_are_refused():
+    z = np.random.default_rng(0).normal(size=(100, 3))
+    z[:, 2] = np.nan
+    with np.errstate(all="ignore"), pytest.raises(np.linalg.LinAlgError):
+        mixture.fit(Points.weighted(z, np.zeros(100)), np.random.default_rng(0))

@@ -122,6 +122,8 @@ def fit(
     scale = ((x - middle) * share[:, None]).T @ (x - middle)
     root = np.linalg.cholesky(scale + 1e-9 * np.diag(np.diag(scale)))
     x = np.linalg.solve(root, (x - middle).T).T
+    if not np.isfinite(x).all():  # a map fitted to too few points may overflow
+        raise np.linalg.LinAlgError("the points do not span their space")
 
     def starts() -> Iterator[Mixture]:
         if before is not None and len(before.weights) == most:
