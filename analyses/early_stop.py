@@ -77,9 +77,12 @@ def main() -> None:
         early = [r for r in part if r["early"]]
         differ = [r for r in early if (r["p"] <= ALPHA) != (r["p_of_all"] <= ALPHA)]
         near = sum(0.01 < r["p_of_all"] < 0.1 for r in part)
-        alarms = rate(r["p"] <= ALPHA for r in part)
         print(f"{kind}: {len(part)} files, {len(early)} stop early, {len(differ)} of them decide otherwise; "
-              f"{near} with .01 < p < .1; p <= {ALPHA} in {alarms}")  # fmt: skip
+              f"{near} with .01 < p < .1")  # fmt: skip
+        alarms = rate(r["p"] <= ALPHA for r in part)
+        if alarms:
+            low, value, high = (100 * alarms[key] for key in ("low", "value", "high"))
+            print(f"   p <= {ALPHA} in {alarms['k']}: {value:.1f} % [{low:.1f}, {high:.1f}]")
         for r in differ:
             print("   ", r)
 

@@ -115,8 +115,8 @@ def examine(
     while True:
         report("simulations", len(simulated), len(blocks))
         made = len(simulated[0].z) if simulated else 0
-        # half of them first, which is enough for most tests; more than all of them where p is close to the level
-        n = (made if made >= simulations else simulations - made) if made else (simulations + 1) // 2
+        total = _next_total(made, simulations)
+        n = total - made
         more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
         pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
         simulated = [screening.joined_replicates(parts) for parts in pairs]
@@ -130,11 +130,18 @@ def examine(
             if test.p > alpha or is_close(test.p, alpha, len(test.null)):
                 test = larger.test(simulated, test)
             report("larger effects", 1, 1)
-        if made + n >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
+        if total >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
             break
     report("simulations", len(blocks), len(blocks))
     further = larger.log_bayes if larger is not None and beyond_linear else {}
     return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test, further)
+
+
+def _next_total(made: int, simulations: int) -> int:
+    """How many simulations the next look has: half of those asked for, which decide most tests, all, then doubled."""
+    if not made:
+        return (simulations + 1) // 2
+    return simulations if made < simulations else 2 * made
 
 
 def is_close(p: float, alpha: float, simulations: int) -> bool:

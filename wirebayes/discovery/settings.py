@@ -15,7 +15,7 @@ SIMULATIONS = 999  # half of them where these decide, more where p is close to t
 # How surprising a value of a name is, from simulations.
 UPPER = 0.2  # share of them that a line is fitted to
 ONE_NAT = 100.0  # of these that the prior of its slope is worth, one nat to a factor of e
-ABOVE_COUNT = 1.0  # nats that the line may lie above the count, as it does where one exceeds the value and three would
+ABOVE_COUNT = 1.0  # nats that the line may lie above the count, as where one exceeds a value that three should
 
 # Prior over models. A single effect of any name has weight 1.
 UNKNOWN_WEIGHT = 1.0  # a remainder and no effect, to one name: a person who finds a gap is as ready for either

@@ -32,7 +32,6 @@ from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
 from wirebayes.wire import compiled
-from wirebayes.wire.compiled import has_formula
 from wirebayes.wire.effect import Effect, HoldContext, Placed
 
 # of points (m, d) and row numbers (m,): log densities (m,), and the same with their residuals (k, m)
@@ -101,6 +100,7 @@ class _Ridge:
         return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
     def _square_gained(self, drive: Array, reached: Array, theta: Array) -> Array:
+        """What `compiled.kernel.square_gained` computes, by numpy; effects on the amount of creep included."""
         carried, square = 0.0 * reached[0], 0.0 * drive[0]
         effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
         for j, time in enumerate(self.which_time):
@@ -178,7 +178,7 @@ class Transformation:
                 moved -= {"k1"}  # specimens' values have coordinates of their own, and without B's nothing is known
             shifted |= {columns[name] for name in moved}
             if moved:
-                effects = tuple(e for e in sample.model.at("amount") if has_formula(e))  # others may ask for B
+                effects = tuple(e for e in sample.model.at("amount") if compiled.has_formula(e))  # others may ask for B
                 for column in (c for e in effects for c in e.columns()):
                     name = problem.column(column, sample)
                     if name in names:

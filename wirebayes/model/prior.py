@@ -62,6 +62,7 @@ class Prior:
     def log_density(self) -> Callable[[Array], Array]:
         """A function of (n, d) parameters that returns the (n,) log density."""
         forms = [_parsed(d) for d in self.distributions.values()]
+        # most columns are of this form, and a call for each would take longer than the arithmetic
         positive = [i for i, d in enumerate(forms) if d.name == "lognorm" and d.loc == 0.0]
         together = _lognormal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("shape", "scale")))
         others = [(i, fast_logpdf(d)) for i, d in enumerate(self.distributions.values()) if i not in positive]
