@@ -22,6 +22,19 @@ def autocorrelation_steps(values: Array) -> Array:
     return np.where(moving, steps * between, np.inf)
 
 
+def slowest_autocorrelation_steps(values: Array) -> Array:
+    """(d,) the longest of three autocorrelation times in steps: of the values, and of falling into either 5 % tail.
+
+    Intervals need the tails, which a sampler may know worse than the mean.
+
+    Parameters
+    ----------
+    values : (ensembles, steps, walkers, d) array
+    """
+    low, high = np.quantile(values.reshape(-1, values.shape[-1]), _TAILS, axis=0)
+    return np.maximum.reduce([autocorrelation_steps(each) for each in (values, values < low, values > high)])
+
+
 def nested_r_hat(values: Array) -> Array:
     """(d,) nested R-hat of (ensembles, steps, walkers, d) draws, each ensemble a super-chain of its walkers."""
     walker_means = values.mean(axis=1)
@@ -29,3 +42,6 @@ def nested_r_hat(values: Array) -> Array:
     within_walkers = values.var(axis=1, ddof=1).mean(axis=1)
     between = walker_means.mean(axis=1).var(axis=0, ddof=1)
     return np.sqrt(1.0 + between / (between_walkers + within_walkers).mean(axis=0))
+
+
+_TAILS = (0.05, 0.95)  # the ends of a 90 % interval, as ArviZ's tail ESS has them

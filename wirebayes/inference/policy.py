@@ -13,14 +13,14 @@ class Policy:
     ensembles, walkers : int
         Independent ensembles, and walkers in each: an even number, for an ensemble moves in halves.
     ess : float
-        Effective draws wanted of every parameter, all ensembles together.
+        Effective draws wanted of every parameter's mean and of both its 5 % tails, all ensembles together.
     r_hat : float
         Largest nested R-hat allowed.
     rounds, most_rounds : int
         Burn-in: at least so many fits of the proposal; more, up to the second number, while too few of its draws would
         be accepted or it leaves out a tail.
     round_draws : int
-        Draws of the proposal that a round takes; the first two take a quarter and half as many.
+        Draws of the proposal that a round takes; the first three take fewer where there are few modes.
     tail : float
         A proposal leaves out a tail when the log of posterior over proposal, at its 99.9 % quantile over the posterior,
         lies this far above its median: walkers that reach such places stay there for very long.
@@ -29,7 +29,7 @@ class Policy:
     acceptance : float
         Below this share after burn-in, the learned move gives way to differential evolution alone.
     block, most_steps : int
-        Kept steps before the first look at the stop rule, which says how many to add; the most of them.
+        Kept steps come in blocks of this size, so that pools of draws are large; the most steps.
 
     Examples
     --------

@@ -118,13 +118,24 @@ def burning(overlooked: float = 0.0, **state: object) -> BurnIn:
 
 
 @pytest.mark.parametrize(
-    ("round_", "overlooked", "draws"),
-    [(1, 0.0, 1024), (2, 0.0, 2048), (3, 0.0, 4096), (7, 0.0, 4096), (3, 6.0, 4 * 4096), (1, 6.0, 4096)],
+    ("round_", "modes", "overlooked", "draws"),
+    [
+        (1, 1, 0.0, 1024),
+        (2, 1, 0.0, 1024),
+        (3, 1, 0.0, 2048),
+        (4, 1, 0.0, 4096),
+        (7, 1, 0.0, 4096),
+        (4, 1, 6.0, 4 * 4096),
+        (1, 1, 6.0, 2048),
+        (1, 3, 0.0, 3072),  # many hills are not learned from few draws
+        (3, 16, 0.0, 4096),
+    ],
 )
-def test_the_first_rounds_take_a_quarter_and_half_as_many_draws(round_: int, overlooked: float, draws: int) -> None:
+def test_the_first_rounds_take_fewer_draws(round_: int, modes: int, overlooked: float, draws: int) -> None:
     target = gaussian(D)
     policy = Policy(round_draws=4096)
-    state, (z, value, base) = burn_in._drawn(target, burning(overlooked, round=round_), policy)  # type: ignore[arg-type]
+    begun = burning(overlooked, round=round_).knowing(modes=modes)
+    state, (z, value, base) = burn_in._drawn(target, begun, policy)  # type: ignore[arg-type]
     assert len(z) == draws and state.evaluations == 5 + draws
     assert value == pytest.approx(target(z)) and base == pytest.approx(NORMAL.log_density(z))
 

@@ -6,6 +6,8 @@ import pytest
 from scipy import stats
 
 from wirebayes.inference.convergence import autocorrelation_steps
+from wirebayes.inference.sampler import net
+from wirebayes.inference.sampler.components import Components
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 
@@ -58,23 +60,32 @@ def test_a_circle_that_begins_where_the_walker_stands_fails(monkeypatch):
     assert min(stats.kstest(at, "norm").pvalue for at in places) < 1e-12
 
 
-def test_effective_draws_are_those_of_importance_sampling_and_reported_as_they_are():
-    """A sign does not know the weight: 1 / E_p[p/q] effective draws each, sqrt(7) / 4 here, less what the walker's own
-    place takes of its pool and what is drawn between pools."""
+def test_effective_draws_are_reported_as_they_are_and_exceed_those_of_importance_sampling():
+    """A sign does not know the weight: independent draws of the proposal would have 1 / E_p[p/q], sqrt(7) / 4 here."""
     chain = walked(20_000, 256, 64).get_chain()
     sign = np.sign(chain).reshape(256, 4, 5000, 1).swapaxes(0, 1)
     found = 1.0 / autocorrelation_steps(sign)[0]
-    assert 0.85 * np.sqrt(7) / 4 < found < np.sqrt(7) / 4
+    assert found > 3.0 * np.sqrt(7) / 4
     # the spread of means over many runs of 100 walkers, in place of the walkers' own
     runs = sign.reshape(4, 256, 50, 100).mean(axis=(1, 3)).ravel()
     assert 1.0 / (256 * 100 * runs.var(ddof=1)) == pytest.approx(found, rel=0.3)
 
 
-def test_steps_that_moved_are_counted_and_the_steps_between_are_spread_evenly():
+def test_independent_draws_in_a_pool_are_worth_importance_sampling(monkeypatch):
+    """As before, with nets that know nothing of the walker: less what its own place takes of its pool."""
+    monkeypatch.setattr(
+        net, "around", lambda given, size, random: random.uniform(size=(len(given), size, given.shape[1]))
+    )
+    chain = walked(20_000, 256, 64).get_chain()
+    found = 1.0 / autocorrelation_steps(np.sign(chain).reshape(256, 4, 5000, 1).swapaxes(0, 1))[0]
+    assert 0.8 * np.sqrt(7) / 4 < found < np.sqrt(7) / 4
+
+
+def test_steps_that_moved_are_counted_and_the_steps_between_begin_the_pools():
     sampler = walked(50, 70, 32)
     chain = sampler.get_chain()[..., 0]
     still = np.flatnonzero((chain[1:] == chain[:-1]).all(axis=1)) + 1
-    assert list(still) == [24, 47]  # 24, 23 and 23 steps
+    assert list(still) == [32, 64, 68]  # 32, 32, 4 and 2 steps
     assert np.array_equal(sampler.backend.accepted, (np.diff(chain, axis=0) != 0).sum(axis=0))
     assert np.array_equal(sampler.get_log_prob(), -0.5 * chain**2)
 
@@ -137,17 +148,15 @@ def test_without_straightening_some_steps_lead_from_mode_to_mode():
     assert arrived.mean() == pytest.approx(0.05, abs=0.01)
 
 
-class Unasked:
-    """A proposal that nobody may draw from."""
+def test_steps_too_few_for_a_pool_are_those_of_the_other_move(monkeypatch):
+    """One step leaves no place for draws; so do steps when pools may have one only."""
 
-    def rvs(self, n, random):
+    def unasked(self, points, random):
         raise AssertionError("drawn from")
 
-
-def test_steps_too_few_for_a_pool_are_those_of_the_other_move():
-    """One step leaves no place for draws; so do steps when pools may have one only."""
+    monkeypatch.setattr(Components, "from_cube", unasked)
     for steps, most in ((1, 64), (5, 1)):
-        move = PoolMove(Unasked(), Stay(), steps, most)
+        move = PoolMove(WIDE, Stay(), steps, most)
         sampler = emcee.EnsembleSampler(6, 1, density, moves=move, vectorize=True)
         start = np.linspace(-1.0, 1.0, 6)[:, None]
         sampler.run_mcmc(start, steps, skip_initial_state_check=True)
@@ -155,9 +164,17 @@ def test_steps_too_few_for_a_pool_are_those_of_the_other_move():
 
 
 @pytest.mark.parametrize(
-    ("steps", "most", "sizes"), [(10, 4, [4, 3, 3]), (8, 4, [4, 4]), (3, 64, [3]), (9, 2, [2, 2, 2, 2, 1])]
+    ("steps", "most", "sizes"),
+    [
+        (10, 4, [4, 4, 2]),
+        (8, 4, [4, 4]),
+        (3, 64, [2, 1]),
+        (9, 2, [2, 2, 2, 2, 1]),
+        (96, 64, [64, 32]),
+        (70, 100, [64, 4, 2]),
+    ],
 )
-def test_steps_are_cut_into_pools_of_nearly_one_size_and_none_is_larger(steps, most, sizes, monkeypatch):
+def test_steps_are_cut_into_pools_of_powers_of_two_and_none_is_larger(steps, most, sizes, monkeypatch):
     asked = []
 
     def pooled(self, model, state, k, true=PoolMove._pooled):

@@ -5,9 +5,10 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from tests.statistical.targets import gaussian
-from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
+from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.policy import Policy, describe
 from wirebayes.inference.sampler import burn_in, ensemble, kept, stop_rule
 from wirebayes.inference.sampler import state as sampler_state
@@ -58,6 +59,19 @@ def test_good_draws_converge_and_what_is_said_of_them_is_right() -> None:
 def test_autocorrelation_is_that_of_the_process(memory: float) -> None:
     found = autocorrelation_steps(by_ensemble(draws(2000, memory)))
     assert found == pytest.approx((1 + memory) / (1 - memory), rel=0.5)  # sd sqrt(2 / 128) = 0.125
+
+
+def test_a_tail_that_is_known_worse_than_the_mean_counts() -> None:
+    """Signs come anew at every step, sizes are remembered: the mean does not know of it, both tails do."""
+    z = draws(2000)
+    size = np.abs(draws(2000, 0.95, seed=1))
+    values = by_ensemble(np.sign(z) * size)
+    assert autocorrelation_steps(values) == pytest.approx(np.ones(D), rel=0.5)
+    tail = autocorrelation_steps(values > np.quantile(values, 0.95, axis=(0, 1, 2)))
+    assert (tail > 4.0).all() and (slowest_autocorrelation_steps(values) >= tail).all()
+    low = np.where(values < 0, values, z.reshape(values.shape))  # each of the two tails alone
+    for each in (low, -low):
+        assert (slowest_autocorrelation_steps(each) > 3.0).all()
 
 
 def test_what_does_not_move_has_no_end_of_its_memory() -> None:
@@ -139,11 +153,13 @@ def after(steps: int, ess: float, memory: float = 1.0, evaluations: int = 0, **l
 @pytest.mark.parametrize(
     ("steps", "ess", "memory", "most_steps", "more"),
     [
-        (100, 2000.0, 1.0, 4000, 50),  # effective draws grow with the steps: half as many again are missing
-        (100, 2900.0, 1.0, 4000, 8),  # three steps would do; the rule is not looked at so often
-        (100, 1000.0, 1.0, 4000, 100),  # no further than it has looked
-        (100, 2900.0, 25.0, 4000, 25),  # five autocorrelation times are 125 steps
-        (100, 2000.0, 1.0, 120, 20),  # the last step is the last
+        (128, 2000.0, 1.0, 4000, 64),  # effective draws grow with the steps: half as many again are missing
+        (128, 1900.0, 1.0, 4000, 96),  # 74 steps are missing; whole blocks
+        (128, 2900.0, 1.0, 4000, 32),  # five steps would do; a block is the least
+        (128, 500.0, 1.0, 4000, 128),  # no further than it has looked
+        (128, 2900.0, 31.0, 4000, 32),  # five autocorrelation times are 155 steps
+        (128, 2900.0, 33.0, 4000, 64),  # 165
+        (128, 2000.0, 1.0, 140, 12),  # the last step is the last
     ],
 )
 def test_a_block_has_the_steps_that_are_missing(
@@ -153,10 +169,11 @@ def test_a_block_has_the_steps_that_are_missing(
     assert kept.block_steps(after(steps, ess, memory), policy) == more
 
 
-def test_a_short_first_block_may_be_followed_by_short_ones() -> None:
-    policy = Policy(ess=3000.0, block=4)
-    assert kept.block_steps(replace(after(4, 1.0), diagnostics=None), policy) == 4
-    assert kept.block_steps(after(8, 2999.0), policy) == 4
+@pytest.mark.parametrize(("ess", "steps"), [(100.0, 32), (9830.0, 32), (9831.0, 64), (20_000.0, 96), (1e9, 4000)])
+def test_the_first_block_has_as_many_steps_as_usual_draws_need(ess: float, steps: int) -> None:
+    """Of 512 walkers at 0.6 effective draws each: 9830.4 in 32 steps."""
+    nothing = replace(after(0, 1.0), diagnostics=None)
+    assert kept.block_steps(nothing, Policy(ess=ess)) == steps
 
 
 @pytest.mark.parametrize(("ess", "again"), [(2100.0, False), (1900.0, True)])
@@ -192,7 +209,7 @@ def test_a_block_is_kept_with_its_densities_and_what_it_cost(monkeypatch: pytest
     move_of = Mock(wraps=kept.move_of)
     monkeypatch.setattr(kept, "move_of", move_of)
     target = gaussian(D)
-    policy = Policy(ensembles=ENSEMBLES, walkers=WALKERS, block=16)
+    policy = Policy(ensembles=ENSEMBLES, walkers=WALKERS, ess=1000.0, block=16)
     rng = np.random.RandomState(0)
     z = rng.normal(size=(ENSEMBLES * WALKERS, D))
     wide = Mixture(np.ones(1), np.zeros((1, D)), np.eye(D)[None])
@@ -266,11 +283,13 @@ def test_the_last_look_decides_which_draws_are_weighed(monkeypatch: pytest.Monke
 def test_effective_draws_are_all_draws_over_their_memory_and_no_more_than_all() -> None:
     z = by_ensemble(draws(200, 0.5))
     found = stop_rule._diagnosed(gaussian(D), z)  # type: ignore[arg-type]
-    memory = autocorrelation_steps(z)
+    memory = slowest_autocorrelation_steps(z)
     assert found.autocorrelation == pytest.approx(memory) and (memory > 1.5).all()
     assert found.ess == pytest.approx(200 * ENSEMBLES * WALKERS / memory)
     zigzag = z.copy()
-    zigzag[:, ::2] = -zigzag[:, 1::2]  # a memory below one step is rounded up
+    place = np.random.default_rng(1).permuted(np.broadcast_to(np.arange(200), (ENSEMBLES, WALKERS, D, 200)), axis=-1)
+    zigzag[:] = np.moveaxis(norm.ppf((place + 0.5) / 200), -1, 1)  # every walker goes everywhere: no memory, and less
+    assert (slowest_autocorrelation_steps(zigzag) < 0.1).all()  # a memory below one step is rounded up
     assert stop_rule._diagnosed(gaussian(D), zigzag).ess == pytest.approx(200 * ENSEMBLES * WALKERS)  # type: ignore[arg-type]
 
 

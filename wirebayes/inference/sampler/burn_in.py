@@ -1,7 +1,7 @@
 """Burn-in: from a search for modes to a proposal that can be frozen, and walkers distributed over the modes.
 
 The annealed population of the search gives the first proposal. Then, round by round, the proposal is fitted to its own
-draws, weighted by posterior over proposal. These weights also measure its quality: the acceptance rate it would have,
+draws, which fill it evenly (`wirebayes.inference.sampler.net`), weighted by posterior over proposal. These weights also measure its quality: the acceptance rate it would have,
 and the distance from the median of the log weight under the posterior to its 99.9 % quantile. Until it is frozen, the
 proposal draws more from its wide components than afterwards, because the tails would otherwise be learned from few
 draws. While hardly a draw would be accepted, walkers explore the density to a power below one: it has the same modes,
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference.modes import LEAST_CURVATURE, Optimum, search
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import mixture, proposal
+from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
@@ -190,8 +190,9 @@ def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn,
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
     drawn_from = state.learned.proposal
     most = policy.round_draws * (_TO_FIND_MORE if state.learned.overlooked else 1)
-    n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS))
-    z = drawn_from.rvs(n, state.generator)
+    n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS * state.learned.modes))
+    points = net.even(n, len(target.problem.names) + 1, state.generator)
+    z = proposal.components(drawn_from).from_cube(points, state.generator)
     before = target.evaluations
     value = target(z)
     state = replace(state, evaluations=state.evaluations + target.evaluations - before)
@@ -276,7 +277,7 @@ _EFFECTIVE = 0.1  # of the places that a proposal is learned from
 _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
 _GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, independent draws are some 7 steps apart
 _PASSING = 4000  # points for a proposal that only the next round draws from
-_IN_FULL, _LEAST_DRAWS = 3, 1024  # the round from which on there are the full number of draws; the fewest before
+_IN_FULL, _LEAST_DRAWS = 4, 1024  # the round from which on there are all draws; the fewest for each mode before
 _TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where the last proposal overlooked places
 # steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
 _LONGEST_SETTLING = 8

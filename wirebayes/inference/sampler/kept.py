@@ -55,13 +55,15 @@ def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
 
 
 def block_steps(state: Sampling, policy: Policy) -> int:
-    """As many steps as the last look promises to be enough, but no more than were kept so far."""
+    """As many steps as the last look promises to be enough, in whole blocks, but no more than were kept so far.
+
+    Before the first look, as many as usual draws need.
+    """
     kept, last = state.kept.steps, state.diagnostics
     if last is None:
-        return policy.block
-    missing = kept * max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)
-    wanted = int(np.clip(np.ceil(missing), min(_LEAST_BLOCK, policy.block), kept))
-    return min(wanted, policy.most_steps - kept)
-
-
-_LEAST_BLOCK = 8  # steps between two looks at the stop rule, which is not to be evaluated after every one
+        missing, most = policy.ess / (stop_rule.USUAL * policy.ensembles * policy.walkers), policy.most_steps
+    else:
+        short = max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)
+        missing, most = kept * short, kept
+    blocks = np.ceil(np.clip(missing, 1, most) / policy.block)
+    return min(policy.block * int(blocks), policy.most_steps - kept)

@@ -17,12 +17,15 @@ DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough t
 
 @dataclass(frozen=True)
 class Mixture:
-    """Weights ``(k,)``, centres ``(k, d)``, lower Cholesky factors ``(k, d, d)`` of the scales, degrees of freedom."""
+    """Weights ``(k,)``, centres ``(k, d)``, lower Cholesky factors ``(k, d, d)`` of the scales, degrees of freedom.
+
+    These are one number for all components, or an array ``(k,)``.
+    """
 
     weights: Array
     centres: Array
     factors: Array
-    degrees: float = DEGREES
+    degrees: Any = DEGREES
 
     def to_arrays(self) -> dict[str, Any]:
         """What `from_arrays` makes the same mixture of."""
@@ -35,7 +38,7 @@ class Mixture:
 
     def log_density(self, x: Array) -> Array:
         """(n,) log density of points (n, d)."""
-        return log_sum(self._log_parts(self._distances(x)))
+        return log_sum(self.log_parts(self._distances(x)))
 
     def rvs(self, n: int, rng: Any) -> Array:
         """(n, d) draws; `rng` is a numpy RandomState or Generator."""
@@ -59,12 +62,14 @@ class Mixture:
         y = (x @ product.astype(x.dtype) - middle.astype(x.dtype)).reshape(len(x), k, d)
         return np.einsum("nkd,nkd->kn", y, y)
 
-    def _log_parts(self, distances: Array) -> Array:
+    def log_parts(self, distances: Array) -> Array:
         """(k, n) log of weight times density of each component."""
-        d, nu = self.centres.shape[1], self.degrees
+        d, nu = self.centres.shape[1], np.reshape(self.degrees, (-1, 1))
         constant = gammaln(0.5 * (nu + d)) - gammaln(0.5 * nu) - 0.5 * d * np.log(nu * np.pi)
-        constant = constant + np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
-        return np.asarray(constant[:, None].astype(distances.dtype) - 0.5 * (nu + d) * np.log1p(distances / nu))
+        own = np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
+        kind = distances.dtype
+        heavy, nu = (-0.5 * (nu + d)).astype(kind), nu.astype(kind)
+        return np.asarray((constant + own[:, None]).astype(kind) + heavy * np.log1p(distances / nu))
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:
@@ -151,7 +156,7 @@ def _em(x: Array, weight: Array, mixture: Mixture, iterations: int = 60) -> Mixt
     last = -np.inf
     for _ in range(iterations):
         distances = mixture._distances(x)
-        logs = mixture._log_parts(distances)
+        logs = mixture.log_parts(distances)
         total = log_sum(logs)
         share = np.exp(logs - total) * weight
         members = share.sum(axis=1, dtype=float)

@@ -7,12 +7,14 @@ coordinates where the straightening map extrapolates badly. The mixture of the s
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.sampler import mixture, transport_map
+from wirebayes.inference.sampler.components import Components
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.transport_map import Straight
@@ -65,12 +67,28 @@ class Proposal:
         parts = [*straightened, self.plain.log_density(x), self.start.log_density(x)]
         return log_sum(np.array(parts) + np.log(self.shares)[:, None])
 
+    @cached_property
+    def components(self) -> Components:
+        """All components of the four parts."""
+        parts = [getattr(self, name) for name in _MIXTURES]
+        together = Mixture(
+            np.concatenate([share * part.weights for share, part in zip(self.shares, parts, strict=True)]),
+            np.concatenate([part.centres for part in parts]),
+            np.concatenate([part.factors for part in parts]),
+            np.concatenate([np.full(len(part.weights), part.degrees) for part in parts]),
+        )
+        return Components(together, self.straight, len(self.close.weights) + len(self.wide.weights))
+
     def rvs(self, n: int, rng: Any) -> Array:
-        """(n, d) draws; `rng` is a numpy RandomState or Generator."""
-        counts = rng.multinomial(n, self.shares)
-        straightened = np.concatenate([self.close.rvs(counts[0], rng), self.wide.rvs(counts[1], rng)])
-        as_they_are = [self.plain.rvs(counts[2], rng), self.start.rvs(counts[3], rng)]
-        return np.concatenate([self.straight.inverse(straightened), *as_they_are])[rng.permutation(n)]
+        """(n, d) independent draws; `rng` is a numpy RandomState or Generator."""
+        return self.components.from_cube(rng.uniform(size=(n, len(self.straight.order) + 1)), rng)
+
+
+def components(of: Mixture | Proposal) -> Components:
+    """The components of what the learned move draws from."""
+    if isinstance(of, Proposal):
+        return of.components
+    return Components(replace(of, degrees=np.full(len(of.weights), of.degrees)))
 
 
 def fit(

@@ -21,7 +21,7 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
 
 POOL = 64  # steps of which one does not trust the proposal; more gain little
-_EXPLORING = 3  # the same in burn-in, which looks for what the proposal leaves out
+_EXPLORING = 4  # the same in burn-in, which looks for what the proposal leaves out
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,10 @@ class Kept:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """(d,) autocorrelation in steps, effective sample size and nested R-hat of the kept draws."""
+    """(d,) autocorrelation in steps, effective sample size and nested R-hat of the kept draws.
+
+    The first two are those of the mean or of a 5 % tail, whichever is known worst.
+    """
 
     autocorrelation: Array
     ess: Array

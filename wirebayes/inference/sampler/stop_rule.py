@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
+from wirebayes.inference.convergence import ENOUGH, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
 from wirebayes.inference.sampler.state import POOL, Diagnostics, Sampling, by_ensemble
@@ -61,7 +61,7 @@ def _diagnosed(target: LogPosterior, z: Array) -> Diagnostics:
     theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1])).reshape(z.shape)
     # Logarithms of positive parameters: a heavy tail must not hide the walk.
     values = np.where(target.coordinates.log_columns, np.log(np.abs(theta) + 1e-300), theta)
-    autocorrelation = np.maximum(autocorrelation_steps(values), 1.0)
+    autocorrelation = np.maximum(slowest_autocorrelation_steps(values), 1.0)
     draws = values.shape[0] * values.shape[1] * values.shape[2]
     return Diagnostics(autocorrelation, draws / autocorrelation, nested_r_hat(values))
 
@@ -80,10 +80,10 @@ def promises_more(state: Sampling, policy: Policy) -> bool:
     least = state.diagnostics.ess.min()
     going_on = state.kept.evaluations * (policy.ess / least - 1.0)
     poor = least < _POOR * state.kept.evaluations
-    return bool(poor or going_on > policy.ess / _USUAL + policy.round_draws)
+    return bool(poor or going_on > policy.ess / USUAL + policy.round_draws)
 
 
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
 _WEIGHED = 16384  # kept draws whose weights are looked at
 _MOST_AGAIN = 5  # times that the proposal may be learned once more for what it overlooks
-_USUAL, _POOR = 0.4, 0.2  # effective draws per kept evaluation
+USUAL, _POOR = 0.6, 0.2  # effective draws per kept evaluation
