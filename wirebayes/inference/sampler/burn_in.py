@@ -1,11 +1,11 @@
 """Burn-in: from a search for modes to a proposal that can be frozen, and walkers distributed over the modes.
 
 The annealed population of the search gives the first proposal. Then, round by round, the proposal is fitted to its own
-draws, which fill it evenly (`wirebayes.inference.sampler.net`), weighted by posterior over proposal. These weights also measure its quality: the acceptance rate it would have,
-and the distance from the median of the log weight under the posterior to its 99.9 % quantile. Until it is frozen, the
-proposal draws more from its wide components than afterwards, because the tails would otherwise be learned from few
-draws. While hardly a draw would be accepted, walkers explore the density to a power below one: it has the same modes,
-with lower barriers between them.
+draws, which fill it evenly (`wirebayes.inference.sampler.net`), weighted by posterior over proposal. These weights also
+measure its quality: the acceptance rate it would have, and the distance from the median of the log weight under the
+posterior to its 99.9 % quantile. Until it is frozen, the proposal draws more from its wide components than afterwards,
+because the tails would otherwise be learned from few draws. While hardly a draw would be accepted, walkers explore the
+density to a power below one: it has the same modes, with lower barriers between them.
 
 At the end walkers are placed by weight, so that none is left in a distant mode of negligible weight.
 """

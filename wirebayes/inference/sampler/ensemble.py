@@ -3,8 +3,8 @@
 Policy. Burn-in (`wirebayes.inference.sampler.burn_in`) ends with a frozen proposal. Then draws are kept, block by
 block, until for every parameter
 
-- the effective sample size, from the spread of the walkers' means, is at least `Policy.ess`, of the parameter itself and
-  of the share of draws in either 5 % tail,
+- the effective sample size, from the spread of the walkers' means, is at least `Policy.ess`, for the parameter's mean
+  and for the share of draws in either 5 % tail,
 - the kept steps span five autocorrelation times, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`, and
 - no region of the posterior is underrated by the frozen proposal so much that one place there outweighs a pool of draws
