@@ -30,6 +30,9 @@ from wirebayes.wire import compiled
 
 BATCH, REPEATS, SEEDS = 256, 7, 20
 BATCHES = (64, 256, 1024)  # the sampler cuts larger ones into pieces
+PER_EVALUATION = tuple(
+    f"{of}_per_{which}" for of in ("ess", "ess_of_means") for which in ("kept_evaluation", "evaluation")
+)
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
 
 
@@ -135,9 +138,9 @@ def with_effects(keys):
 
 
 def draws(problem):
-    """Effective draws per likelihood evaluation for 20,000 of them: of the kept ones, and of all; over seeds."""
+    """Effective draws per likelihood evaluation for 20,000 of them: of the kept ones and all; by means alone."""
     runs = [ours(problem, seed, 0.0)[0] for seed in range(SEEDS)]
-    return {key: [r[key] for r in runs] for key in ("ess_per_kept_evaluation", "ess_per_evaluation")}
+    return {key: [r[key] for r in runs] for key in PER_EVALUATION}
 
 
 def main():
@@ -164,13 +167,14 @@ def main():
     for likelihood in LIKELIHOODS:
         out["share"][likelihood] = share = share_in_likelihood(build([wire], likelihood=likelihood), 0)
         print(f"  {wire.name}, {likelihood}: " + ", ".join(f"{k} {v:.2f}" for k, v in share.items()), flush=True)
-    print("\neffective draws per evaluation: after burn-in, and all counted (least, median, largest of the seeds)")
+    print("\neffective draws per evaluation: after burn-in, and all counted; the same of means alone")
+    print("(least, median, largest of the seeds)")
     out["draws"] = {}
     for experiment in experiments():
         for likelihood in LIKELIHOODS:
             found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(build([experiment], likelihood=likelihood))
             cells = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
-            print(f"  {experiment.name + ', ' + likelihood:24s} {cells[0]}    {cells[1]}", flush=True)
+            print(f"  {experiment.name + ', ' + likelihood:24s}", "    ".join(cells), flush=True)
     out["with_effects"] = with_effects(singles)
     write_json(options.output / "cost.json", out)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat
+from wirebayes.inference.convergence import ENOUGH, autocorrelation_steps, nested_r_hat, slowest_autocorrelation_steps
 
 WANTED = 20_000
 R_HAT = 1.01
@@ -39,23 +39,27 @@ class Costs:
 def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergences=0, weights_ess=None):
     """Effective draws, convergence and the rate with all costs counted, from (groups, steps, walkers, d) draws.
 
-    The slowest parameter counts. Of many walkers their means tell the effective draws, of a few chains ArviZ's bulk
-    estimate, which knows negative autocorrelation. `weights_ess` is for weighted independent draws (nested sampling).
+    The slowest parameter counts, by its mean or by a 5 % tail, whichever is known worse. Of many walkers their means
+    tell the effective draws, of a few chains ArviZ's bulk and tail estimates, which know negative autocorrelation.
+    `weights_ess` is for weighted independent draws (nested sampling). `of_means` counts means alone.
     """
     out = {"cpu_s": costs.cpu, "wall_s": costs.wall, "divergences": divergences}
     if weights_ess is None:
         if values.shape[2] > 1:
-            ess = values.shape[0] * values.shape[1] * values.shape[2] / autocorrelation_steps(values)
+            draws = values.shape[0] * values.shape[1] * values.shape[2]
+            of_means, ess = draws / autocorrelation_steps(values), draws / slowest_autocorrelation_steps(values)
         else:
             import arviz_stats
 
-            ess = np.array([arviz_stats.ess(values[:, :, 0, k], method="bulk") for k in range(values.shape[-1])])
+            chains = np.moveaxis(values[:, :, 0], 2, 0)
+            of_means = np.array([arviz_stats.ess(each, method="bulk") for each in chains])
+            ess = np.minimum(of_means, [arviz_stats.ess(each, method="tail") for each in chains])
         r_hat = float(_r_hat(values).max())
         steps_enough = values.shape[1] >= ENOUGH * values.shape[0] * values.shape[1] * values.shape[2] / ess.min()
         converged = r_hat <= R_HAT and divergences == 0 and bool(steps_enough or values.shape[2] == 1)
-        out |= {"ess": float(ess.min()), "r_hat": r_hat, "converged": converged}
+        out |= {"ess": float(ess.min()), "ess_of_means": float(of_means.min()), "r_hat": r_hat, "converged": converged}
     else:
-        out |= {"ess": float(weights_ess), "r_hat": None, "converged": True}
+        out |= {"ess": float(weights_ess), "ess_of_means": float(weights_ess), "r_hat": None, "converged": True}
     before = {k: sum(v for part, v in book.items() if part != "sample") for k, book in
               (("cpu", costs.cpu), ("wall", costs.wall))}  # fmt: skip
     for k, book in (("cpu", costs.cpu), ("wall", costs.wall)):
@@ -63,10 +67,11 @@ def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergence
         out[f"sampling_per_{k}_s"] = sampling
         out[f"all_costs_per_{k}_s"] = WANTED / (before[k] + WANTED / sampling)
     if evaluations is not None:
-        burn = evaluations - kept_evaluations
-        per_kept = out["ess"] / kept_evaluations
-        out |= {"evaluations": evaluations, "ess_per_kept_evaluation": per_kept,
-                "ess_per_evaluation": WANTED / (burn + WANTED / per_kept)}  # fmt: skip
+        burn, out["evaluations"] = evaluations - kept_evaluations, evaluations
+        for of in ("ess", "ess_of_means"):
+            per_kept = out[of] / kept_evaluations
+            out |= {f"{of}_per_kept_evaluation": per_kept,
+                    f"{of}_per_evaluation": WANTED / (burn + WANTED / per_kept)}  # fmt: skip
     return out
 
 
