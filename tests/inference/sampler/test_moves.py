@@ -221,3 +221,18 @@ def test_straightened_steps_pay_for_the_volume_that_the_map_changes():
     moves, long = np.abs(np.log(y / x)), 2.38 / np.sqrt(2.0)
     shares = [np.isclose(moves, length).mean() for length in (long, 0.5 * long)]
     assert shares == pytest.approx([0.5, 0.5], abs=0.04) and sum(shares) == 1.0
+
+
+def test_a_draw_beyond_all_numbers_has_no_weight(monkeypatch):
+    """Every eighth one, such as a map makes where it overflows: the others go on as if it had not been drawn."""
+
+    def overflowing(self, points, random, true=Components.from_cube):
+        y = true(self, points, random)
+        y[::8] = np.inf
+        return y
+
+    monkeypatch.setattr(Components, "from_cube", overflowing)
+    places = walked(20_000, 32, 32).get_chain()[..., 0]
+    assert np.isfinite(places).all()
+    for at in places[::5]:
+        assert stats.kstest(at, "norm").pvalue > 1e-4

@@ -73,7 +73,10 @@ class PoolMove(Move):  # type: ignore[misc]
         points = net.around(self.components.to_cube(state.coords, random), k + 1, random)
         # not in the net's own order: that goes to and fro between halves of the cube, as equal steps do not expect
         y = self.components.from_cube(points[:, 1 + random.permutation(k)].reshape(n * k, -1), random)
-        value = np.column_stack([state.log_prob, model.compute_log_prob_fn(y)[0].reshape(n, k)])
+        beyond = ~np.isfinite(y).all(axis=1)  # the map that straightens may overflow far out, where nobody goes
+        y[beyond] = np.repeat(state.coords, k, axis=0)[beyond]
+        drawn = np.where(beyond, -np.inf, model.compute_log_prob_fn(y)[0])
+        value = np.column_stack([state.log_prob, drawn.reshape(n, k)])
         pool = np.concatenate([state.coords[:, None], y.reshape(n, k, d)], axis=1)
         weight = value - self._log_proposal(pool)
         weight = np.exp(weight - weight.max(axis=1, keepdims=True))
