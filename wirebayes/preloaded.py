@@ -4,11 +4,14 @@ That process ends with the command, even while it still loads: whoever reads the
 """
 
 import ctypes
+import gc
 import signal
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux's <sys/prctl.h>
 
 ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+
+gc.set_threshold(100_000, 50, 100)  # as for a command (`wirebayes.cli`)
 
 import wirebayes.discovery.model_check  # noqa: E402
 import wirebayes.results.store  # noqa: E402, F401
