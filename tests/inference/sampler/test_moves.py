@@ -236,3 +236,15 @@ def test_a_draw_beyond_all_numbers_has_no_weight(monkeypatch):
     assert np.isfinite(places).all()
     for at in places[::5]:
         assert stats.kstest(at, "norm").pvalue > 1e-4
+
+
+def test_a_step_beyond_all_numbers_is_not_taken():
+    class Overflowing(Round):
+        def inverse(self, u):
+            return np.where(np.arange(len(u))[:, None] % 2, np.inf, u)
+
+    random = np.random.RandomState(1)
+    x, others = random.normal(size=(2, 10, 3))
+    y, log_factor = EvolutionMove(1, Overflowing()).get_proposal(x, [others], random)
+    assert np.array_equal(y[1::2], x[1::2]) and (y[::2] != x[::2]).any(axis=1).all()
+    assert np.array_equal(log_factor, np.zeros(10))

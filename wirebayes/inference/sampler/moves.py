@@ -73,8 +73,7 @@ class PoolMove(Move):  # type: ignore[misc]
         points = net.around(self.components.to_cube(state.coords, random), k + 1, random)
         # not in the net's own order: that goes to and fro between halves of the cube, as equal steps do not expect
         y = self.components.from_cube(points[:, 1 + random.permutation(k)].reshape(n * k, -1), random)
-        beyond = ~np.isfinite(y).all(axis=1)  # the map that straightens may overflow far out, where nobody goes
-        y[beyond] = np.repeat(state.coords, k, axis=0)[beyond]
+        y, beyond = _within(y, np.repeat(state.coords, k, axis=0))
         drawn = np.where(beyond, -np.inf, model.compute_log_prob_fn(y)[0])
         value = np.column_stack([state.log_prob, drawn.reshape(n, k)])
         pool = np.concatenate([state.coords[:, None], y.reshape(n, k, d)], axis=1)
@@ -138,8 +137,14 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         # short steps for the walker whom long ones do not serve
         lengths = (scale, 0.5 * scale) if self.straight else (scale, scale, scale, scale, 1.0)
         u = u + random.choice(lengths, size=(n, 1)) * (pool[own + one] - pool[own + other])
-        y = self.straight.inverse(u) if self.straight else u
+        y, _ = _within(self.straight.inverse(u) if self.straight else u, x)
         return y, slope - self._forward(y)[1]
 
     def _forward(self, x: Array) -> tuple[Array, Array]:
         return self.straight.forward(x) if self.straight else (x, np.zeros(len(x)))
+
+
+def _within(y: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Places (n, d), those of x where one lies beyond all numbers, as where the map overflows; which (n,) these are."""
+    beyond = ~np.isfinite(y).all(axis=1)
+    return np.where(beyond[:, None], x, y), beyond
