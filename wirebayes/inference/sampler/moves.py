@@ -146,5 +146,5 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
 
 def _within(y: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Places (n, d), those of x where one lies beyond all numbers, as where the map overflows; which (n,) these are."""
-    beyond = ~np.isfinite(y).all(axis=1, keepdims=True)
-    return np.where(beyond, x, y), beyond[:, 0]
+    beyond: NDArray[np.bool_] = np.any(~np.isfinite(y), axis=1)
+    return np.where(beyond[:, None], x, y), beyond
