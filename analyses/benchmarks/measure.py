@@ -41,7 +41,8 @@ def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergence
 
     The slowest parameter counts, by its mean or by a 5 % tail, whichever is known worse. Of many walkers their means
     tell the effective draws, of a few chains ArviZ's bulk and tail estimates, which know negative autocorrelation.
-    `weights_ess` is for weighted independent draws (nested sampling). `of_means` counts means alone.
+    `weights_ess` is for weighted independent draws (nested sampling). In what is returned, ``ess_of_means``
+    counts means alone.
     """
     out = {"cpu_s": costs.cpu, "wall_s": costs.wall, "divergences": divergences}
     if weights_ess is None:

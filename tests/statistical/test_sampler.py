@@ -89,16 +89,16 @@ def test_moments_are_right_in_as_many_dimensions_as_samples_fitted_together_have
 
 
 def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(monkeypatch):
-    again = sample(TARGETS["two_modes"](), 2, HASTY)
+    again = sample(TARGETS["two_modes"](), 3, HASTY)
     t, ratio = worst(gaussian, HASTY)
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
     monkeypatch.setattr(stop_rule, "promises_more", lambda state, policy: False)
-    stubborn = sample(TARGETS["two_modes"](), 2, HASTY)
+    stubborn = sample(TARGETS["two_modes"](), 3, HASTY)
     assert again.converged and stubborn.converged
     assert again.kept_evaluations == again.log_density.size  # none of those kept before
     assert again.ess.min() / again.kept_evaluations > 2.0 * stubborn.ess.min() / stubborn.kept_evaluations
-    assert again.evaluations < 0.75 * stubborn.evaluations
+    assert again.evaluations < 0.6 * stubborn.evaluations
 
 
 class _ForgetsTheProposal(moves.PoolMove):
@@ -177,18 +177,17 @@ def test_without_its_witness_and_by_means_alone_the_sampler_believes_a_funnel_wi
     ],
 )
 def test_sixteen_modes_have_their_shares_or_are_refused(centres, runs):
-    """In one run of forty, or so, a share is half of what it should be, and the run is believed."""
-    converged, wrong = 0, 0
+    converged = 0
     for seed in range(runs):
         chains = sample(sixteen_modes(centres), seed, Policy(most_steps=800))
         z = chains.z.reshape(-1, centres.shape[1])
         nearest = (((z[:, None] - centres) ** 2).sum(axis=2)).argmin(axis=1)
         share = np.bincount(nearest, minlength=16) / len(z)
         converged += chains.converged
-        # 0.0625 each, with 4000 effective draws known to 0.004
-        wrong += chains.converged and not (share.min() > 0.044 and share.max() < 0.081)
-    print(f"{converged} of {runs} converged, {wrong} of them with a wrong share")
-    assert converged >= runs / 2 and wrong <= runs / 20
+        if chains.converged:  # 0.0625 each, with 4000 effective draws known to 0.004
+            assert share.min() > 0.044 and share.max() < 0.081
+    print(f"{converged} of {runs} converged")
+    assert converged >= runs / 2
 
 
 def test_a_tail_that_the_proposal_overlooked_at_first_comes_out_or_the_fit_is_refused():
