@@ -1,7 +1,9 @@
-"""What benchmarks measure of a fit: its parts add up to the whole."""
+"""What benchmarks measure of a fit: its parts add up to the whole; the model that peers sample is the package's."""
 
+import numpy as np
 import pytest
 
+from analyses.benchmarks import model
 from analyses.benchmarks.plain import ours
 from wirebayes.io import paper
 from wirebayes.model.problem import build
@@ -12,3 +14,10 @@ def test_a_fit_is_timed_in_its_parts():
     assert found["cpu_s"].keys() == {"burn", "sample"} and min(found["cpu_s"].values()) > 0
     assert found["sampling_per_cpu_s"] == pytest.approx(found["ess"] / found["cpu_s"]["sample"])
     assert found["all_costs_per_cpu_s"] < found["sampling_per_cpu_s"] and values.shape[-1] == 8
+
+
+@pytest.mark.parametrize("likelihood", ["chain", "hold"])
+@pytest.mark.parametrize("wire", range(4))
+def test_peers_sample_the_same_posterior(wire, likelihood):
+    problem = build([paper.experiments()[wire]], likelihood=likelihood)
+    assert model.difference(np, problem, 0) < 1e-8

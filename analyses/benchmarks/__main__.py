@@ -13,8 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from analyses.benchmarks import gradient, measure, model, parsed, plain
-from wirebayes.inference.modes import modes
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
@@ -33,18 +31,6 @@ PEERS = {
     "nutpie, natural": lambda p, s, t: gradient.nutpie_run(p, s, t, True),
     "nutpie, our coordinates": lambda p, s, t: gradient.nutpie_run(p, s, t, False),
 }
-
-
-def check(problem, seed):
-    """Largest difference of the two log likelihoods and log posteriors over draws about the mode."""
-    target, rng = LogPosterior(problem), np.random.default_rng(seed)
-    found = modes(target, rng)
-    z = found.z[0] + rng.normal(size=(20, len(found.z[0]))) @ np.linalg.cholesky(found.covariance[0]).T
-    theta = target.coordinates.to_natural(z.copy())
-    likelihood, convert = model.log_likelihood(jnp, problem), model.natural(jnp, problem, target.coordinates)
-    values = [float(likelihood(dict(zip(problem.names, row, strict=True)))) for row in theta]
-    whole = [float(convert(row)[1]) + value for row, value in zip(z, values, strict=True)]
-    return max(np.abs(problem.log_likelihood(theta) - values).max(), np.abs(target(z) - whole).max())
 
 
 def main():
@@ -76,7 +62,7 @@ def main():
 
 
 def run(problem, title, options):
-    difference = check(problem, options.seed)
+    difference = model.difference(jnp, problem, options.seed)
     print(f"\n{title}: log density differs from the peers' by {difference:.1e} at most", flush=True)
     if difference > 1e-8:
         raise SystemExit("the peers' model is not the package's")

@@ -1,13 +1,16 @@
 """The posterior of one wire written once more, from the equations, for libraries that differentiate.
 
-Nothing here is shared with the package but the data, the prior's numbers and the constants of the coordinates. `xp` is
-the array library: ``jax.numpy`` or ``pytensor.tensor``. Holds are padded to the same number of readings, so that JAX
-compiles one hold and scans over them; PyTensor gets them one after the other.
+Nothing of the model is shared with the package but the data, the prior's numbers and the constants of the coordinates.
+`xp` is the array library: ``jax.numpy``, ``pytensor.tensor`` or ``numpy``. Holds are padded to the same number of
+readings, so that JAX compiles one hold and scans over them; the others get them one after the other.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from wirebayes.inference.modes import modes
+from wirebayes.inference.transform import LogPosterior
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -151,6 +154,8 @@ def natural(xp, problem, coordinates):
 
         _, square = loop(xp, step, (0.0, 0.0), (ridge.log_tension - middle, log_t))
         creep = U * middle + 0.5 * xp.log(square / len(ridge.which_time))
+        softened = xp.logaddexp(0.0, v["B"] - ridge.log_step) if "k1" in ridge.shifted else 0.0
+        v["k1"] = v["k1"] + softened
         v["B"] = v["B"] - creep - v["k1"] + ridge.log_length
         theta = {name: xp.exp(v[name]) if positive else v[name] for name, positive, *_ in terms}
         # the map is triangular: in logarithms its Jacobian is one, so the prior is normal in v (up to constant scales)
@@ -158,3 +163,15 @@ def natural(xp, problem, coordinates):
         return theta, prior + float(np.log(coordinates.scale).sum())
 
     return convert
+
+
+def difference(xp, problem, seed):
+    """Largest difference from the package's log likelihood and log posterior, over 20 draws about the mode."""
+    target, rng = LogPosterior(problem), np.random.default_rng(seed)
+    found = modes(target, rng)
+    z = found.z[0] + rng.normal(size=(20, len(found.z[0]))) @ np.linalg.cholesky(found.covariance[0]).T
+    theta = target.coordinates.to_natural(z.copy())
+    likelihood, convert = log_likelihood(xp, problem), natural(xp, problem, target.coordinates)
+    values = [float(likelihood(dict(zip(problem.names, row, strict=True)))) for row in theta]
+    whole = [float(convert(row)[1]) + value for row, value in zip(z, values, strict=True)]
+    return max(np.abs(problem.log_likelihood(theta) - values).max(), np.abs(target(z) - whole).max())
