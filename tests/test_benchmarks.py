@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analyses.benchmarks import model
+from analyses.benchmarks import measure, model
 from analyses.benchmarks.plain import ours
 from wirebayes.io import paper
 from wirebayes.model.problem import build
@@ -21,3 +21,12 @@ def test_a_fit_is_timed_in_its_parts():
 def test_peers_sample_the_same_posterior(wire, likelihood):
     problem = build([paper.experiments()[wire]], likelihood=likelihood)
     assert model.difference(np, problem, 0) < 1e-8
+
+
+@pytest.mark.parametrize("walkers", [1, 64])
+def test_independent_draws_are_effective_draws(walkers):
+    steps = 64_000 // walkers
+    values = np.random.default_rng(1).normal(size=(4, steps // 4, walkers, 2))
+    found = measure.judged(measure.Costs({"sample": 1.0}, {"sample": 1.0}), values)
+    assert found["converged"]
+    assert found["ess"] == pytest.approx(64_000, rel=0.25) and found["ess_of_means"] == pytest.approx(64_000, rel=0.25)

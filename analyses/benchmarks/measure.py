@@ -54,7 +54,7 @@ def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergence
 
             chains = np.moveaxis(values[:, :, 0], 2, 0)
             of_means = np.array([arviz_stats.ess(each, method="bulk") for each in chains])
-            ess = np.minimum(of_means, [arviz_stats.ess(each, method="tail") for each in chains])
+            ess = np.minimum(of_means, [arviz_stats.ess(each, method="tail", prob=(0.05, 0.95)) for each in chains])
         r_hat = float(_r_hat(values).max())
         steps_enough = values.shape[1] >= ENOUGH * values.shape[0] * values.shape[1] * values.shape[2] / ess.min()
         converged = r_hat <= R_HAT and divergences == 0 and bool(steps_enough or values.shape[2] == 1)
