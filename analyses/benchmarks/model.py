@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.inference.modes import modes
+from wirebayes.inference.slack_edge import DECADES
 from wirebayes.inference.transform import LogPosterior
 
 LOG_2PI = float(np.log(2.0 * np.pi))
@@ -141,6 +142,10 @@ def natural(xp, problem, coordinates):
 
     def convert(z):
         v = {name: z[i] * float(coordinates.scale[i]) for i, name in enumerate(names)}  # logarithms have scale 1
+        if "U" in ridge.shifted:
+            hazards, powers = ridge.powers
+            along = xp.clip(v["k2"] - hazards[:-1], 0.0, np.diff(hazards))  # linear between the hazards
+            v["U"] = v["U"] + powers[0] + xp.sum(along * (np.diff(powers) / np.diff(hazards)))
         v["k2"] = v["k2"] - xp.exp(v["N"]) * float(np.log(0.5 * ridge.hold_s))
         U, k2, N = xp.exp(v["U"]), xp.exp(v["k2"]), xp.exp(v["N"])
         middle = float(ridge.log_tension.mean())
@@ -158,8 +163,17 @@ def natural(xp, problem, coordinates):
         v["k1"] = v["k1"] + softened
         v["B"] = v["B"] - creep - v["k1"] + ridge.log_length
         theta = {name: xp.exp(v[name]) if positive else v[name] for name, positive, *_ in terms}
-        # the map is triangular: in logarithms its Jacobian is one, so the prior is normal in v (up to constant scales)
-        prior = sum(-0.5 * ((v[name] - m) / s) ** 2 - float(np.log(s)) - 0.5 * LOG_2PI for name, _, m, s in terms)
+        volume = 0.0
+        for slack in coordinates.slack_edges:  # the benchmark's wires have no threshold of creep
+            near = (v["preload"] - slack.at) / slack.width
+            far = -near - 2.0 * DECADES
+            v["preload"] = slack.at + slack.width * (xp.logaddexp(0.0, near) - xp.logaddexp(0.0, far))
+            volume = xp.logaddexp(-xp.logaddexp(0.0, -near), -xp.logaddexp(0.0, -far))
+            theta["preload"] = v["preload"]
+        # the map is triangular: but for the preload its Jacobian in logarithms is one (up to constant scales)
+        prior = volume + sum(
+            -0.5 * ((v[name] - m) / s) ** 2 - float(np.log(s)) - 0.5 * LOG_2PI for name, _, m, s in terms
+        )
         return theta, prior + float(np.log(coordinates.scale).sum())
 
     return convert

@@ -106,7 +106,7 @@ def _with(block: LaplaceFit, found: Refit) -> LogPosterior:
     problem = block.problem_with(found.effect)
     name = problem.names[column_of(problem, found.effect)]
     free = problem.prior.distributions | {name: stats.norm(found.amplitude, found.sd)}
-    return LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)))
+    return LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
 
 
 def _derivative(target: LogPosterior, z: Array, column: int) -> float:

@@ -416,7 +416,7 @@ def _with_effect(block: LaplaceFit, ladder: AmplitudePath, places: Sequence[Arra
     # A prior that is not felt, in whose standard deviations the column counts.
     wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
     free = problem.prior.distributions | {problem.names[column]: wide}
-    target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)))
+    target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
     theta = []
     for z in places:
         values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))

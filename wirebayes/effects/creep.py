@@ -142,6 +142,7 @@ class CreepThreshold(Effect):
     name = "creep_threshold"
     place = "drive"
     formula = "threshold"
+    no_creep_below = "creep_threshold.tau_c"
     scope = "material"
     amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 2.0)),)
     sentence = "Below a threshold tension the wire does not creep."

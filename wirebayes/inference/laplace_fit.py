@@ -119,7 +119,9 @@ def fitted(
     -------
     LaplaceFit
     """
-    target = LogPosterior(integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)))
+    target = LogPosterior(
+        integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)), for_draws=False
+    )
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
     return LaplaceFit(
@@ -143,7 +145,7 @@ def _with_expected_setting_error(target: LogPosterior, found: Optimum, rng: np.r
         return np.empty((0, found.z.shape[1]))
     every = problem.prior.distributions
     held = {n: stats.lognorm(_AS_HELD, scale=d.median()) for n, d in every.items() if n.startswith("setting_sd")}
-    bound = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=every | held)))
+    bound = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=every | held)), for_draws=False)
     return target.coordinates.to_sampled(bound.coordinates.to_natural(modes(bound, rng).z[:1]))
 
 
@@ -167,7 +169,7 @@ class Pinned:
         problem = block.problem_with(effect)
         self.column = column_of(problem, effect)
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
-        self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)))
+        self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:

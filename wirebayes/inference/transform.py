@@ -5,16 +5,20 @@ what is standard normal under their prior, so that no proposal leaves the suppor
 deviations of their prior. Then, one after the other,
 
 - log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
+- log U becomes its distance from the power of tension that suits the measured losses best at this hazard
+  (`wirebayes.inference.power_of_tension`);
 - log B becomes the log tension lost in a hold, root mean square over the holds of the test, with the first readings
   taken as the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
   creep is linear in B, so G does not depend on B and takes one pass along the holds. Effects on the amount of creep
   belong to G;
+- the preload becomes what is wide where the first hold hardly creeps (`wirebayes.inference.slack_edge`);
 - log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost / step)``, with the tension lost
   in a hold over the root mean square of the steps between first readings. Where all creep is over before a first
   reading, the readings see this stiffness alone; where there is little, it is k1.
 
-The map is triangular and these steps have unit Jacobian. Values of partially pooled specimens come last
-(`wirebayes.inference.specimens`).
+The map is triangular, and its steps but that of the preload have unit Jacobian. Those of U and the preload are for
+proposals to draw from: Laplace approximations, as the search for effects compares them, do without. Values of partially
+pooled specimens come last (`wirebayes.inference.specimens`).
 
 The proposal learns the remaining curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the
 columns are ordered: errors before what they widen, the shape of the creep before its amount and the stiffness.
@@ -28,6 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.edges import edge
+from wirebayes.inference.power_of_tension import suiting_powers
+from wirebayes.inference.slack_edge import slack_edge
 from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
@@ -40,6 +46,7 @@ Residuals = Callable[[Array, Array], tuple[Array, Array]]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
 _STEEPEST = 1.6  # a larger U of a pool is of no ridge that data see; to follow it would only bend the prior's tail
+_NONE = np.zeros(1), np.zeros(1)  # where U is sampled as it is
 _ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
 
@@ -48,7 +55,8 @@ _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays i
 class _Ridge:
     """Columns of one material's parameters (or fixed values), which of them are shifted, and the map's constants.
 
-    `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured.
+    `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured. `powers`
+    are log hazards and the log U that suits the losses best at each of them.
     """
 
     where: dict[str, int]
@@ -64,10 +72,15 @@ class _Ridge:
     log_length: float
     effects: tuple[Effect, ...]
     holds: tuple[HoldContext, ...]
+    powers: tuple[Array, Array]
 
     def get(self, theta: Array, name: str) -> Any:
         """(n,) a parameter of the material, or the number that it is fixed at."""
         return theta[:, self.where[name]] if name in self.where else self.fixed[name]
+
+    def log_power(self, z: Array) -> Array:
+        """(n,) log U that suits the measured losses best at the hazards of sampled coordinates (n, d)."""
+        return np.interp(z[:, self.where["k2"]], *self.powers)
 
     def softened(self, z: Array) -> Array:
         """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
@@ -134,13 +147,19 @@ class Noises:
 class Transformation:
     """The map between natural parameters ``(n, d)`` and sampled ones ``(n, d)``.
 
+    Parameters
+    ----------
+    problem : Problem
+    for_draws : bool
+        Whether U and the preload have coordinates in which proposals suit them better.
+
     Attributes
     ----------
     noises : tuple of Noises
         Of every sample of which neither noise is fixed.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, for_draws: bool = True) -> None:
         names = problem.names
         self.problem = problem
         self.log_columns = np.array([name in problem.prior.logarithmic for name in names])
@@ -150,6 +169,8 @@ class Transformation:
         for i, distribution in free:
             if i not in self.edges:
                 self.scale[i] = _spread(distribution)
+        slack = [slack_edge(problem, sample) for sample in problem.samples] if for_draws else []
+        self.slack_edges = [s for s in slack if s and not self.log_columns[s.preload] and s.preload not in self.edges]
         self.log_spread = np.ones(len(names))
         for i in np.flatnonzero(self.log_columns).tolist():
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
@@ -173,9 +194,15 @@ class Transformation:
             }
             if len(where) + len(fixed) < len(MATERIAL):
                 continue  # a user's prior that allows negative values: leave this material's columns as they are
-            moved = frozenset({"k2", "B", "k1"} & {name for name in where if columns[name] not in shifted})
-            if self.specimens is not None or "B" not in moved:
-                moved -= {"k1"}  # specimens' values have coordinates of their own, and without B's nothing is known
+            moved = frozenset({"k2", "U", "B", "k1"} & {name for name in where if columns[name] not in shifted})
+            if not for_draws:
+                moved -= {"U"}
+            if self.specimens is not None:
+                moved -= {"k1", "U"}  # specimens' values have coordinates of their own
+            if "B" not in moved:
+                moved -= {"k1"}  # the tension lost in a hold is not known
+            if "k2" not in moved or sample.model.history != "saturating" or problem.likelihood != "chain":
+                moved -= {"U"}  # no hold misses what earlier ones gained, or how fast the creep is is not known
             shifted |= {columns[name] for name in moved}
             if moved:
                 effects = tuple(e for e in sample.model.at("amount") if compiled.has_formula(e))  # others may ask for B
@@ -185,7 +212,7 @@ class Transformation:
                         where[column] = names.index(name)
                     else:
                         fixed[column] = problem.prior.fixed[name]
-                self.ridges.append(_ridge(where, fixed, moved, steepest, sample, problem.likelihood, effects))
+                self.ridges.append(_ridge(where, fixed, moved, steepest, problem, sample, effects))
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -200,10 +227,14 @@ class Transformation:
         z[:, self.log_columns] = np.log(theta[:, self.log_columns])
         for i, at in self.edges.items():
             z[:, i] = at.score(theta[:, i])
+        for slack in self.slack_edges:
+            z[:, slack.preload] = slack.score(theta) / self.scale[slack.preload]
         for ridge in self.ridges:
             creep, hazard = self._shifts(theta, ridge)
             if "k2" in ridge.shifted:
                 z[:, ridge.where["k2"]] += hazard
+            if "U" in ridge.shifted:
+                z[:, ridge.where["U"]] -= ridge.log_power(z)
             if "B" in ridge.shifted:
                 z[:, ridge.where["B"]] += creep
             if "k1" in ridge.shifted:
@@ -222,12 +253,16 @@ class Transformation:
             for ridge in self.ridges:
                 if "k2" in ridge.shifted:
                     theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
+                if "U" in ridge.shifted:
+                    theta[:, ridge.where["U"]] = np.exp(z[:, ridge.where["U"]] + ridge.log_power(z))
                 if "k1" in ridge.shifted:
                     theta[:, ridge.where["k1"]] = np.exp(z[:, ridge.where["k1"]] + ridge.softened(z))
                 if "B" in ridge.shifted:
                     theta[:, ridge.where["B"]] = np.exp(z[:, ridge.where["B"]] - self._shifts(theta, ridge)[0])
             if self.specimens is not None:
                 theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
+            for slack in self.slack_edges:
+                theta[:, slack.preload] = slack.value(theta[:, slack.preload], theta)
         return theta
 
     def log_jacobian(self, theta: Array) -> Array:
@@ -235,6 +270,8 @@ class Transformation:
         total = np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum()
         for i, at in self.edges.items():
             total = total + at.log_slope(theta[:, i])
+        for slack in self.slack_edges:
+            total = total + slack.log_slope(theta)
         if self.specimens is not None:
             total = total + self.specimens.log_jacobian(theta)
         return np.asarray(total)
@@ -249,6 +286,8 @@ class Transformation:
         """
         # other coordinates than logarithms have a standard deviation of one already
         out = np.where(self.log_columns, np.log(np.where(self.log_columns, theta, 1.0)), z) / self.log_spread
+        for slack in self.slack_edges:
+            out[:, slack.preload] = theta[:, slack.preload] / self.scale[slack.preload]
         if self.specimens is not None:
             own, lines, spreads = (
                 theta[:, i] for i in (self.specimens.own, self.specimens.lines, self.specimens.spreads)
@@ -288,8 +327,8 @@ def _ridge(
     fixed: dict[str, float],
     shifted: frozenset[str],
     steepest: float,
+    problem: Problem,
     sample: Sample,
-    likelihood: str,
     effects: tuple[Effect, ...],
 ) -> _Ridge:
     recorded = np.flatnonzero(sample.protocol.recorded)
@@ -299,18 +338,31 @@ def _ridge(
     log_step = 0.5 * float(np.log(np.mean(np.diff(tension, prepend=0.0) ** 2)))
     hold_s = sample.typical_hold_s
     duration = sample.protocol.duration_s
-    times, which = np.unique(np.where(duration > 0, duration, hold_s), return_inverse=True)
-    kept = 1.0 if sample.model.history == "saturating" and likelihood == "chain" else 0.0
+    durations = np.where(duration > 0, duration, hold_s)
+    times, which = np.unique(durations, return_inverse=True)
+    kept = 1.0 if sample.model.history == "saturating" and problem.likelihood == "chain" else 0.0
     length = sample.model.length_ref_mm or sample.protocol.length_mm
     holds = tuple(
         HoldContext(**hold, length_ref_mm=length, tension_ref_N=sample.model.tension_ref_N, theta={},
                     initial_tension=np.full((1, 1), first))
         for hold, first in zip(sample.protocol.holds, tension, strict=True)
     )  # fmt: skip
+    powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s)) if "U" in shifted else _NONE
     return _Ridge(
         where, fixed, shifted, steepest, np.log(tension), log_step, times, which, kept, hold_s, float(np.log(length)),
-        effects, holds,
+        effects, holds, powers,
     )  # fmt: skip
+
+
+def _powers(problem: Problem, sample: Sample, log_tension: Array, relative_s: Array) -> tuple[Array, Array]:
+    """Log hazards and the log U that suits the losses of a sample's holds best at each of them."""
+    readings, seen = sample.readings[..., 0], sample.protocol.mask & sample.protocol.recorded[:, None]
+    last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
+    lost = np.where(seen.sum(axis=1) > 1, readings[:, 0] - readings[np.arange(len(last)), last], np.nan)
+    power, exponent = (problem.column(name, sample) for name in ("U", "N"))
+    low, middle, high = np.log(problem.prior.distributions[power].ppf([_ONE_SD[0], 0.5, _ONE_SD[1]]))
+    N = problem.prior.fixed.get(exponent) or problem.prior.distributions[exponent].median()
+    return suiting_powers(lost, log_tension, relative_s, float(N), float(middle), 0.5 * float(high - low))
 
 
 def _spread(distribution: Any) -> float:
@@ -321,14 +373,16 @@ def _spread(distribution: Any) -> float:
 class LogPosterior:
     """The log posterior density in the sampled coordinates, batched, counting its evaluations."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem, self.coordinates = problem, Transformation(problem)
+    def __init__(self, problem: Problem, for_draws: bool = True) -> None:
+        self.problem, self.coordinates = problem, Transformation(problem, for_draws)
+        self._for_draws = for_draws
         self.log_prior = problem.prior.log_density()
         self.evaluations = 0
         self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LogPosterior, (self.problem,)  # what else there is has closures, which no other process can be sent
+        # what else there is has closures, which no other process can be sent
+        return LogPosterior, (self.problem, self._for_draws)
 
     def __call__(self, z: Array, readings: Any = None) -> Array:
         """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""
