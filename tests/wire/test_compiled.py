@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
@@ -52,8 +52,8 @@ models = st.builds(
 
 
 def by_numpy(compute: Callable[[], Any]) -> Any:
-    """What a function returns where nothing was compiled."""
-    with pytest.MonkeyPatch.context() as patch:
+    """What a function returns where nothing was compiled; creep that feeds on itself may leave all numbers."""
+    with pytest.MonkeyPatch.context() as patch, np.errstate(over="ignore", invalid="ignore"):
         patch.setattr(compiled, "kernel", None)
         return compute()
 
@@ -78,6 +78,7 @@ def test_readings_and_derivatives_are_those_of_numpy(p, model, rows, seed):
     theta = drawn(model, rows, seed)
     assert compiled.call(p, theta, model) is not None
     line, expected = linearise(p, theta, model), by_numpy(lambda: linearise(p, theta, model))
+    assume(all(np.isfinite(value).all() for value in vars(expected).values()))
     for name, value in vars(expected).items():
         same(getattr(line, name), value, theta["k1"].max())
     setting = np.random.default_rng(seed).normal(0.0, 0.1, (len(p.displacement_mm), len(rows)))
