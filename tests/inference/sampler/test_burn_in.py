@@ -127,6 +127,7 @@ def burning(overlooked: float = 0.0, **state: object) -> BurnIn:
         (7, 1, 0.0, 4096),
         (4, 1, 6.0, 4 * 4096),
         (1, 1, 6.0, 2048),
+        (4, 1, -6.0, 4096),  # once only
         (1, 3, 0.0, 3072),  # many hills are not learned from few draws
         (3, 16, 0.0, 4096),
     ],
@@ -134,7 +135,8 @@ def burning(overlooked: float = 0.0, **state: object) -> BurnIn:
 def test_the_first_rounds_take_fewer_draws(round_: int, modes: int, overlooked: float, draws: int) -> None:
     target = gaussian(D)
     policy = Policy(round_draws=4096)
-    begun = burning(overlooked, round=round_).knowing(modes=modes)
+    again = 2 if overlooked > 0.0 else 1
+    begun = burning(abs(overlooked), round=round_).knowing(modes=modes, again=again)
     state, (z, value, base) = burn_in._drawn(target, begun, policy)  # type: ignore[arg-type]
     assert len(z) == draws and state.evaluations == 5 + draws
     assert value == pytest.approx(target(z)) and base == pytest.approx(NORMAL.log_density(z))

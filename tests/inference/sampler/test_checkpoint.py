@@ -185,7 +185,8 @@ def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
     with path.open("wb") as stream:
         np.savez(stream, x=objects)
     with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("state.json", json.dumps({"format": checkpoint.FORMAT, "fit": OF_FIT, "values": {}}))
+        state = {"format": checkpoint.FORMAT, "fit": OF_FIT, "values": {}, "arrays": ["x"]}
+        archive.writestr("state.json", json.dumps(state))
     with pytest.raises(InputError, match="Object arrays"):
         checkpoint.read(path, OF_FIT)
 

@@ -24,11 +24,12 @@ def bent(n: int, rng: np.random.Generator) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def learned() -> Proposal:
-    """Of four parts, two of them of straightened coordinates, all with shares that matter."""
+    """Of five parts, three of them of straightened coordinates, all with shares that matter."""
     rng = np.random.default_rng(0)
     start = Mixture(np.array([0.3, 0.7]), np.array([[0.0] * D, [6.0] * D]), np.repeat(np.eye(D)[None], 2, axis=0))
     points = Points.equal(bent(4000, rng))
-    return proposal.fit(points, points, start, np.arange(D), rng, (0.4, 0.2, 0.2, 0.2), most=3)
+    known = proposal.fit(points, points, start, np.arange(D), rng, (0.3, 0.2, 0.2, 0.1, 0.2), most=3)
+    return replace(known, excess=Mixture(np.ones(1), np.full((1, D), 3.0), 0.5 * np.eye(D)[None]))
 
 
 def test_draws_of_uniform_points_have_the_proposal_s_density(learned: Proposal) -> None:
@@ -43,12 +44,14 @@ def test_draws_of_uniform_points_have_the_proposal_s_density(learned: Proposal) 
 
 
 def test_points_of_draws_are_uniform_and_independent_of_one_another(learned: Proposal) -> None:
-    """Draws by a way of their own: the four parts one by one, each by its own generator of draws."""
+    """Draws by a way of their own: the five parts one by one, each by its own generator of draws."""
     rng = np.random.default_rng(2)
     n = 20_000
     counts = rng.multinomial(n, learned.shares)
-    straight = [part.rvs(k, rng) for part, k in zip((learned.close, learned.wide), counts, strict=False)]
-    plain = [part.rvs(k, rng) for part, k in zip((learned.plain, learned.start), counts[2:], strict=True)]
+    assert learned.excess is not None
+    bent_parts = (learned.close, learned.wide, learned.excess)
+    straight = [part.rvs(k, rng) for part, k in zip(bent_parts, counts[[0, 1, 4]], strict=True)]
+    plain = [part.rvs(k, rng) for part, k in zip((learned.plain, learned.start), counts[2:4], strict=True)]
     x = np.concatenate([learned.straight.inverse(np.concatenate(straight)), *plain])
     points = components(learned).to_cube(x, rng)
     assert points.shape == (n, D + 1)
@@ -63,9 +66,8 @@ def test_points_of_draws_are_uniform_and_independent_of_one_another(learned: Pro
 def test_a_point_leads_back_to_where_the_draw_was(learned: Proposal) -> None:
     """But for how far out it lies in its component, which is left to chance: with very light tails nothing is."""
     rng = np.random.default_rng(3)
-    light = replace(
-        learned, **{part: replace(getattr(learned, part), degrees=1e12) for part in ("close", "wide", "plain", "start")}
-    )
+    parts = ("close", "wide", "plain", "start", "excess")
+    light = replace(learned, **{part: replace(getattr(learned, part), degrees=1e12) for part in parts})
     x = light.rvs(500, rng)
     assert components(light).from_cube(components(light).to_cube(x, rng), rng) == pytest.approx(x, abs=1e-4)
 

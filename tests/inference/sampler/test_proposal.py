@@ -11,6 +11,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, mixture, moves, proposal, transport_map
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.state import BurnIn
+from wirebayes.inference.sampler.stop_rule import OUTWEIGHS
 
 
 def crescent(n, rng):
@@ -207,3 +208,94 @@ def test_points_that_a_map_has_sent_beyond_all_numbers_are_refused():
     z[:, 2] = np.nan
     with np.errstate(all="ignore"), pytest.raises(np.linalg.LinAlgError):
         mixture.fit(Points.weighted(z, np.zeros(100)), np.random.default_rng(0))
+
+
+def neck(n, rng):
+    """A hill, a five-hundredth of its mass in a neck 9 standard deviations away."""
+    z = rng.normal(size=(n, 3))
+    z[: n // 500] = 0.1 * z[: n // 500] + [9.0, 0.0, 0.0]
+    return z
+
+
+def without_excess(points, rng):
+    """A proposal that knows the hill alone."""
+    hill = Points.equal(points[len(points) // 500 :])
+    start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
+    return proposal.fit(hill, hill, start, np.arange(3), rng, proposal.SHARES, most=2)
+
+
+def log_neck(z):
+    hill, far = stats.norm.logpdf(z).sum(axis=1), stats.norm.logpdf(z, [9.0, 0.0, 0.0], 0.1).sum(axis=1)
+    return np.logaddexp(np.log(0.998) + hill, np.log(0.002) + far)
+
+
+def test_what_the_proposal_makes_too_little_of_becomes_a_part_of_it():
+    rng = np.random.default_rng(0)
+    points = neck(20_000, rng)
+    value, before = log_neck(points), without_excess(points, rng)
+    found = proposal.with_excess(before, Points(points, np.ones(len(points))), value, rng)
+    assert found.excess is not None and len(found.excess.weights) <= 4
+
+    def over(q):
+        ratio = value - q.log_density(points)
+        return (ratio - np.median(ratio))[: len(points) // 500]
+
+    assert np.median(over(before)) > 10.0 and over(found).max() < OUTWEIGHS
+    drawn = found.rvs(20_000, rng)
+    assert (drawn[:, 0] > 8.0).mean() == pytest.approx(proposal.SHARES[-1], abs=0.01)
+    weight = np.exp(log_neck(drawn) - found.log_density(drawn))
+    assert weight.mean() == pytest.approx(1.0, abs=4 * weight.std() / np.sqrt(len(weight)))
+
+
+def test_weights_say_how_much_mass_a_place_of_excess_has():
+    """A neck of great weight among points, though few of them, has the largest component."""
+    rng = np.random.default_rng(1)
+    points = neck(20_000, rng)
+    other = 0.1 * rng.normal(size=(40, 3)) - [9.0, 0.0, 0.0]
+    every = np.concatenate([points, other])
+    weight = np.append(np.ones(len(points)), np.full(len(other), 20.0))
+    value = np.append(log_neck(points), np.full(len(other), 0.0))
+    found = proposal.with_excess(without_excess(points, rng), Points(every, weight), value, rng)
+    largest = np.argmax(found.excess.weights)
+    assert found.straight.inverse(found.excess.centres)[largest, 0] == pytest.approx(-9.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("above", "places", "part"), [(0.9, 40, False), (1.1, 40, True), (9.0, 4, False), (9.0, 5, True)]
+)
+def test_there_is_excess_from_one_nat_and_five_places_on(above, places, part):
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(4000, 3))
+    q = without_excess(points, rng)
+    value = q.log_density(points)
+    value[:places] += above
+    found = proposal.with_excess(q, Points(points, np.ones(len(points))), value, rng)
+    assert (found.excess is not None) is part
+
+
+def test_without_excess_the_other_parts_share_all():
+    rng = np.random.default_rng(3)
+    q = without_excess(neck(4000, rng), rng)
+    assert q.components.mixture.weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert q.components.mixture.weights[: len(q.close.weights)].sum() == pytest.approx(0.684 / 0.95, abs=1e-12)
+    again = proposal.Proposal.from_arrays(q.to_arrays())
+    assert again.excess is None and np.array_equal(again.log_density(np.eye(3)), q.log_density(np.eye(3)))
+
+
+def test_a_mixture_of_few_points_leans_on_what_they_lie_around():
+    """One point: the other covariance, so many times wider, around it; many points: their own."""
+    rng = np.random.default_rng(4)
+    around = mixture.Mixture(
+        np.array([0.5, 0.5]), np.array([[-1.0, 0.0], [1.0, 0.0]]), np.repeat(np.eye(2)[None], 2, 0)
+    )
+    mean, covariance = around.moments
+    drawn = around.rvs(400_000, rng)
+    assert mean == pytest.approx(drawn.mean(axis=0), abs=0.02)
+    assert covariance == pytest.approx(np.cov(drawn.T), abs=0.05)
+    one = mixture.fit_around(Points(np.array([[7.0, 7.0]]), np.ones(1)), around, rng, most=4, wider=1.5)
+    assert one.centres == pytest.approx(np.array([[7.0, 7.0]]))
+    expected = 1.5 * covariance * 2.0 / 3.0  # two points' worth of it, and one point without a width
+    assert one.factors[0] @ one.factors[0].T == pytest.approx(expected, rel=0.05)
+    many = mixture.fit_around(Points.equal(rng.normal(size=(4000, 2)) * [0.1, 3.0]), around, rng, most=1, wider=1.5)
+    # a Student-t fitted to normal points has a third more variance
+    assert many.moments[1] == pytest.approx(np.diag([0.013, 12.0]), rel=0.1, abs=0.02)

@@ -3,9 +3,10 @@
 The annealed population of the search gives the first proposal. Then, round by round, the proposal is fitted to its own
 draws, which fill it evenly (`wirebayes.inference.sampler.net`), weighted by posterior over proposal. These weights also
 measure its quality: the acceptance rate it would have, and the distance from the median of the log weight under the
-posterior to its 99.9 % quantile. Until it is frozen, the proposal draws more from its wide components than afterwards,
-because the tails would otherwise be learned from few draws. While hardly a draw would be accepted, walkers explore the
-density to a power below one: it has the same modes, with lower barriers between them.
+posterior to its 99.9 % quantile. Where the draws of all rounds show that it makes too little of some places, these get
+a part of their own. Until it is frozen, the proposal draws more from its wide components than afterwards, because the
+tails would otherwise be learned from few draws. While hardly a draw would be accepted, walkers explore the density to a
+power below one: it has the same modes, with lower barriers between them.
 
 At the end walkers are placed by weight, so that none is left in a distant mode of negligible weight.
 """
@@ -24,7 +25,7 @@ from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.resampling import next_power, truncated_rows
+from wirebayes.resampling import effective_number, next_power, truncated_rows
 from wirebayes.typing import Array
 
 
@@ -103,6 +104,7 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
     if acceptance >= _USEFUL:
         seen = _weighted_twice(z, value, base)
         state = _fitted(target, state, policy, *seen, points=proposal.ENOUGH if last else _PASSING)
+        state = _with_excess(state, z, value, weight)
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
     steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
     return _frozen(target, state, policy, (z, value, base), steps) if last else state
@@ -123,6 +125,20 @@ def _frozen(
     return Sampling(settled.walkers, learned, state.generator, state.evaluations + settled.evaluations)
 
 
+def _with_excess(state: BurnIn, z: Array, value: Array, log_weight: Array) -> BurnIn:
+    """The proposal with a part for what it makes too little of, as these places and those of earlier rounds show."""
+    drawn = Points.weighted(np.column_stack([z, value]), log_weight)
+    drawn = drawn.worth(effective_number(drawn.weight))
+    if state.drawn is not None:
+        drawn = state.drawn.joined(drawn)
+        drawn = Points(drawn.z[-_REMEMBERED:], drawn.weight[-_REMEMBERED:])
+    state = replace(state, drawn=drawn)
+    if not isinstance(state.learned.proposal, Proposal):
+        return state
+    places = replace(drawn, z=drawn.z[:, :-1])
+    return state.knowing(proposal=proposal.with_excess(state.learned.proposal, places, drawn.z[:, -1], state.generator))
+
+
 def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     """Count the kept draws as burn-in, learn the proposal from them, and go on with rounds as before.
 
@@ -136,10 +152,11 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     value = np.concatenate(state.kept.log_density).ravel()
     learned = replace(state.learned, again=state.learned.again + 1)
     done = policy.rounds - 1
-    if learned.overlooked:  # few rounds of many draws: what is overlooked is rare
+    if _hard_to_find(learned):  # few rounds of many draws: what is overlooked is rare
         done = max(done, policy.most_rounds - _FEW_ROUNDS)
     seen = _weighted_twice(z, value, value)
-    return _fitted(target, BurnIn(state.walkers, learned, state.generator, state.evaluations, done), policy, *seen)
+    burning = BurnIn(state.walkers, learned, state.generator, state.evaluations, done)
+    return _with_excess(_fitted(target, burning, policy, *seen), z, value, np.zeros(len(z)))
 
 
 def overlooked(learned: Learned, z: Array, value: Array) -> float:
@@ -174,6 +191,11 @@ def overlooked(learned: Learned, z: Array, value: Array) -> float:
     return float(max(high, np.quantile(left, 0.99)) - middle)
 
 
+def _hard_to_find(learned: Learned) -> bool:
+    """Whether places are overlooked by a proposal that was learned from kept draws already."""
+    return learned.overlooked > 0.0 and learned.again > 1
+
+
 def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
     power = _WARM[min(state.learned.walks, len(_WARM) - 1)]
@@ -189,7 +211,7 @@ def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn
 def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
     drawn_from = state.learned.proposal
-    most = policy.round_draws * (_TO_FIND_MORE if state.learned.overlooked else 1)
+    most = policy.round_draws * (_TO_FIND_MORE if _hard_to_find(state.learned) else 1)
     n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS * state.learned.modes))
     points = net.even(n, len(target.problem.names) + 1, state.generator)
     z = proposal.components(drawn_from).from_cube(points, state.generator)
@@ -206,7 +228,7 @@ def _fitted(
     policy: Policy,
     hot: Points,
     cold: Points,
-    shares: tuple[float, float, float, float] = proposal.EXPLORING,
+    shares: proposal.Shares = proposal.EXPLORING,
     points: int = proposal.ENOUGH,
 ) -> BurnIn:
     """Fit the proposal to points of the warm density and of the density, and to those of the round before."""
@@ -266,6 +288,7 @@ def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> 
     return drawn[:n], values[:n]
 
 
+_REMEMBERED = 50_000  # places of all rounds
 # nats a coordinate from the density at a typical place of a normal hill to its mass, where it is as wide as the prior
 _WIDEST = 0.5 * float(1.0 + np.log(2.0 * np.pi / LEAST_CURVATURE))
 _NEXT_TO_NOTHING = float(np.log(1e-3))  # share of the mass: far less than shows in any summary
@@ -278,7 +301,7 @@ _USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than
 _GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, independent draws are some 7 steps apart
 _PASSING = 4000  # points for a proposal that only the next round draws from
 _IN_FULL, _LEAST_DRAWS = 4, 1024  # the round from which on there are all draws; the fewest for each mode before
-_TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where the last proposal overlooked places
+_TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where places are hard to find
 # steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
 _LONGEST_SETTLING = 8
 _MOST_COMPONENTS = 24  # however many modes there are

@@ -1,7 +1,8 @@
 """The resume file: plain values as JSON and named arrays in one zip archive, whose content is never executed.
 
-``state.json`` holds the number of the format, the fit to which the file belongs, and the plain values; it is read and
-checked before any array. Arrays are ``.npy`` files beside it, as in numpy's ``.npz``; nested names are joined by dots.
+``state.json`` holds the number of the format, the fit to which the file belongs, the plain values and the names of the
+arrays; it is read and checked before any array. Arrays are ``.npy`` files beside it, as in numpy's ``.npz``; nested
+names are joined by dots.
 """
 
 import json
@@ -16,7 +17,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import differences, plain, stored_results, write_bytes
 
-FORMAT = 3  # raise it whenever what is stored changes its meaning
+FORMAT = 4  # raise it whenever what is stored changes its meaning
 _VALUES = "state.json"
 INSTEAD = "remove this file to restart the fit"
 
@@ -34,10 +35,11 @@ def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays:
     arrays : mapping
         Of arrays, or of such mappings; None is left out.
     """
-    content = BytesIO()
+    content, flat = BytesIO(), _flat(arrays)
+    state = {"format": FORMAT, "fit": plain(fit), "values": values, "arrays": sorted(flat)}
     with zipfile.ZipFile(content, "w") as archive:
-        archive.writestr(_VALUES, json.dumps({"format": FORMAT, "fit": plain(fit), "values": values}))
-        for name, array in _flat(arrays).items():
+        archive.writestr(_VALUES, json.dumps(state))
+        for name, array in flat.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
                 np.lib.format.write_array(stream, np.asarray(array), allow_pickle=False)
     write_bytes(path, content.getvalue())
@@ -62,7 +64,8 @@ def read(path: Path, fit: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
         if different:
             raise InputError(f"{path}: belongs to another fit: {different[0]}; {INSTEAD}")
         with np.load(path, allow_pickle=False) as arrays:
-            return stored["values"], _nested({name: arrays[name] for name in arrays.files if name != _VALUES})
+            # an archive whose directory was damaged may seem to hold fewer
+            return stored["values"], _nested({name: arrays[name] for name in stored["arrays"]})
 
 
 def _flat(arrays: Mapping[str, Any]) -> dict[str, Any]:

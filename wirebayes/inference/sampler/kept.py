@@ -28,8 +28,7 @@ def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | Bu
     state = stop_rule.apply(target, more(target, state, policy), policy)
     if state.finished:
         return state
-    worth_it = stop_rule.doubtful(state) or not state.learned.again and stop_rule.promises_more(state, policy)
-    return burn_in.again(target, state, policy) if worth_it else state
+    return burn_in.again(target, state, policy) if stop_rule.worth_learning_again(state, policy) else state
 
 
 def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
@@ -57,13 +56,11 @@ def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
 def block_steps(state: Sampling, policy: Policy) -> int:
     """As many steps as the last look promises to be enough, in whole blocks, but no more than were kept so far.
 
-    Before the first look, as many as usual draws need.
+    Before the first look one block: it shows whether the proposal is to be learned once more.
     """
     kept, last = state.kept.steps, state.diagnostics
     if last is None:
-        missing, most = policy.ess / (stop_rule.USUAL * policy.ensembles * policy.walkers), policy.most_steps
-    else:
-        short = max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)
-        missing, most = kept * short, kept
-    blocks = np.ceil(np.clip(missing, 1, most) / policy.block)
+        return min(policy.block, policy.most_steps)
+    short = max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)
+    blocks = np.ceil(np.clip(kept * short, 1, kept) / policy.block)
     return min(policy.block * int(blocks), policy.most_steps - kept)

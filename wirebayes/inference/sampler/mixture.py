@@ -49,6 +49,16 @@ class Mixture:
             "nij,nj->ni", self.factors[which], rng.standard_normal((n, d))
         )
 
+    @property
+    def moments(self) -> tuple[Array, Array]:
+        """(d,) mean and (d, d) covariance; more than two degrees of freedom."""
+        mean = self.weights @ self.centres
+        apart = self.centres - mean
+        within = np.einsum(
+            "k,kij,klj->il", self.weights * self.degrees / (self.degrees - 2.0), self.factors, self.factors
+        )
+        return mean, within + np.einsum("k,ki,kj->ij", self.weights, apart, apart)
+
     @cached_property
     def _whitening(self) -> tuple[Array, Array]:
         """What all components' whitened points are made of, in one product: (d, k d) and (k d,)."""
@@ -148,8 +158,45 @@ def fit(
     raise np.linalg.LinAlgError("the points do not span their space")
 
 
-def _em(x: Array, weight: Array, mixture: Mixture, iterations: int = 60) -> Mixture:
-    """Expectation-maximisation, in single precision: half the work, and no proposal needs more than a few digits."""
+def fit_around(points: Points, of: Mixture, rng: np.random.Generator, *, most: int, wider: float) -> Mixture:
+    """A mixture of few points, the components of which lean on the covariance of another mixture.
+
+    Parameters
+    ----------
+    points : Points
+        However few.
+    of : Mixture
+        Of what the points lie around.
+    rng : numpy.random.Generator
+    most : int
+        Largest number of components; no more than the points are worth, each as many as there are coordinates.
+    wider : float
+        Times the other covariance: what every component counts as much as so many points as there are coordinates.
+
+    Returns
+    -------
+    Mixture
+    """
+    middle, covariance = of.moments
+    d = len(middle)
+    root = np.linalg.cholesky(wider * covariance)
+    x = np.linalg.solve(root, (points.z - middle).T).T
+    k = int(np.clip(points.weight.sum() / d, 1, most))
+    centres = x[spread_rows(x, k, rng, points.weight / points.weight.sum())]
+    k = len(centres)
+    start = Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0))
+    found = _em(x, points.weight, start, of_the_whole=float(d), fewest=0.0)
+    return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors)
+
+
+def _em(
+    x: Array, weight: Array, mixture: Mixture, iterations: int = 60, *, of_the_whole: float = 3.0, fewest: float = 3.0
+) -> Mixture:
+    """Expectation-maximisation, in single precision: half the work, and no proposal needs more than a few digits.
+
+    The unit covariance counts as much as `of_the_whole` points in every component, for one that holds few points would
+    shrink onto those; with fewer points than `fewest` for each coordinate it takes the others with it: stop there.
+    """
     x, weight = x.astype(np.float32), weight.astype(np.float32)
     (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
@@ -160,17 +207,15 @@ def _em(x: Array, weight: Array, mixture: Mixture, iterations: int = 60) -> Mixt
         total = log_sum(logs)
         share = np.exp(logs - total) * weight
         members = share.sum(axis=1, dtype=float)
-        # A component that holds too few points for its own covariance takes the others with it: stop there.
-        if not (members >= 3.0 * d).all():
+        if not (members >= fewest * d).all():
             raise np.linalg.LinAlgError("empty component")
         heavy = share * (degrees + d) / (degrees + distances)
         mass = heavy.sum(axis=1)
         centres = (heavy @ x) / mass[:, None]
         scale = (heavy @ squares).reshape(k, d, d) - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
         centres, scale = centres.astype(float), scale.astype(float)
-        # without a share of all points, a component that holds few of them shrinks onto those
-        scale += _OF_THE_WHOLE * np.eye(d)
-        factors = np.linalg.cholesky(scale / (members + _OF_THE_WHOLE)[:, None, None])
+        scale += of_the_whole * np.eye(d)
+        factors = np.linalg.cholesky(scale / (members + of_the_whole)[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
         log_likelihood = float(weight @ total)
         if log_likelihood - last < 4e-3 * members.sum():
@@ -203,6 +248,3 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None
         chosen.append(int(rng.choice(len(x), p=share * nearest / (share @ nearest))))
         nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
     return chosen
-
-
-_OF_THE_WHOLE = 3.0  # points' worth of the covariance of all points in that of every component

@@ -72,7 +72,8 @@ def to_arrays(state: State) -> dict[str, Any]:
     }
     if isinstance(state, BurnIn):
         seen = {} if state.seen is None else {"hot": asdict(state.seen[0]), "cold": asdict(state.seen[1])}
-        return out | {"walk": _numbered(state.walk), "seen": seen}
+        drawn = {} if state.drawn is None else {"drawn": asdict(state.drawn)}
+        return out | {"walk": _numbered(state.walk), "seen": seen} | drawn
     kept = state.kept
     blocks = {name: np.concatenate(v) for name, v in (("z", kept.z), ("log_density", kept.log_density)) if v}
     return out | {"kept": blocks} | (asdict(state.diagnostics) if state.diagnostics else {})
@@ -95,7 +96,8 @@ def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
     run = walkers, learned, generator, values["evaluations"]
     if values["stage"] == "burn-in":
         seen = (Points(**arrays["seen"]["hot"]), Points(**arrays["seen"]["cold"])) if "seen" in arrays else None
-        return BurnIn(*run, values["round"], _tuple(arrays, "walk"), seen)
+        drawn = Points(**arrays["drawn"]) if "drawn" in arrays else None
+        return BurnIn(*run, values["round"], _tuple(arrays, "walk"), seen, drawn)
     blocks = arrays.get("kept", {})
     z, log_density = ((blocks[name],) if name in blocks else () for name in ("z", "log_density"))
     kept = Kept(z, log_density, **values["kept"])

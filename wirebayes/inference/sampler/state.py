@@ -92,6 +92,8 @@ class BurnIn:
         Places that the last walk came by, their log densities, and the log density walked.
     seen : tuple of Points, optional
         Hot and cold points that the proposal was last fitted to.
+    drawn : Points, optional
+        Places of all rounds, by posterior mass, with their log densities as one more column.
     """
 
     walkers: Walkers
@@ -101,6 +103,7 @@ class BurnIn:
     round: int = 0
     walk: tuple[Array, Array, Array] | None = None
     seen: tuple[Points, Points] | None = None
+    drawn: Points | None = None
 
     def knowing(self, **changes: Any) -> "BurnIn":
         """The state with something else learned."""

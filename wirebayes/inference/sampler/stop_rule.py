@@ -27,20 +27,20 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     z = by_ensemble(state.kept.z, policy)
     steps, d = z.shape[1], z.shape[-1]
     found = _diagnosed(target, z)
-    state = replace(state, diagnostics=found, learned=replace(state.learned, overlooked=0.0))
+    beyond = 0.0
+    if state.learned.trusted:
+        some = slice(None, None, 1 + z[..., 0].size // _WEIGHED)
+        places, heights = (np.concatenate(kept) for kept in (state.kept.z, state.kept.log_density))
+        beyond = burn_in.overlooked(state.learned, places.reshape(-1, d)[some], heights.ravel()[some])
+    learned = replace(state.learned, overlooked=beyond if beyond > OUTWEIGHS else 0.0)
+    state = replace(state, diagnostics=found, learned=learned)
     long_enough = steps >= ENOUGH * found.autocorrelation.max()
     if long_enough and (found.ess >= policy.ess).all() and (found.r_hat <= policy.r_hat).all():
-        beyond = 0.0
-        if state.learned.trusted:
-            some = slice(None, None, 1 + z[..., 0].size // _WEIGHED)
-            places, heights = (np.concatenate(kept) for kept in (state.kept.z, state.kept.log_density))
-            beyond = burn_in.overlooked(state.learned, places.reshape(-1, d)[some], heights.ravel()[some])
-        state = replace(state, learned=replace(state.learned, overlooked=beyond))
-        if beyond <= OUTWEIGHS:
+        if not learned.overlooked:
             least, most = float(found.ess.min()), float(found.r_hat.max())
             why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
             return replace(state, finished=True, converged=True, why=why)
-        if state.learned.again >= _MOST_AGAIN:
+        if learned.again >= _MOST_AGAIN:
             why = (
                 f"not converged after {steps} steps: the proposal makes too little of some places, by a factor of "
                 f"e^{beyond:.1f} (allowed e^{OUTWEIGHS:.1f}); a narrow neck or a far mode may be missing"
@@ -66,9 +66,10 @@ def _diagnosed(target: LogPosterior, z: Array) -> Diagnostics:
     return Diagnostics(autocorrelation, draws / autocorrelation, nested_r_hat(values))
 
 
-def doubtful(state: Sampling) -> bool:
-    """Whether draws would be enough, were it not for places that the proposal overlooks."""
-    return state.learned.overlooked > OUTWEIGHS
+def worth_learning_again(state: Sampling, policy: Policy) -> bool:
+    """Whether the proposal is to be learned once more: for what it overlooks, or because that promises more draws."""
+    again = state.learned.again
+    return state.learned.overlooked > 0.0 and again < _MOST_AGAIN or again < _FOR_MORE and promises_more(state, policy)
 
 
 def promises_more(state: Sampling, policy: Policy) -> bool:
@@ -86,4 +87,5 @@ def promises_more(state: Sampling, policy: Policy) -> bool:
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
 _WEIGHED = 16384  # kept draws whose weights are looked at
 _MOST_AGAIN = 5  # times that the proposal may be learned once more for what it overlooks
+_FOR_MORE = 3  # times that it may be learned once more for more effective draws
 USUAL, _POOR = 0.6, 0.2  # effective draws per kept evaluation
