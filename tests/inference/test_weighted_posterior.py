@@ -97,7 +97,8 @@ def test_the_share_overlooked_is_the_mass_of_places_that_are_hardly_drawn() -> N
         pool = importance._weighted(
             lambda z: two_hills(z)[:, None], importance.widened(modes(*drawn)), 20_000, 1000.0, rng
         )
-        return overlooked(target(), pool, importance.widened(modes(*others)), rng)  # type: ignore[arg-type]
+        known = importance.widened(modes(*others))
+        return overlooked(target(), pool.proposal, pool.log_integral[0], known, rng)  # type: ignore[arg-type]
 
     assert share((0,), (0, 1)) == pytest.approx(1.0 / 9.0, rel=0.3)
     assert share((0, 1), (0, 1)) < 0.01 and share((0,), (0,)) < 0.01

@@ -7,6 +7,8 @@ import arviz_stats
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.integrate import quad
+from scipy.special import expit
 
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
@@ -24,14 +26,14 @@ from wirebayes.prediction.leave_one_hold_out import (
 from wirebayes.prediction.left_out_density import without_hold
 
 
-@pytest.mark.parametrize("converging", [True, False])
+@pytest.mark.parametrize(("converging", "shared"), [(True, 10.1), (False, 10.1), (True, 9.9)])
 @pytest.mark.parametrize(("tail", "sampled"), [(0.49, False), (0.5, False), (0.51, True), (np.nan, True)])
 def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
-    tail: float, sampled: bool, converging: bool, monkeypatch: pytest.MonkeyPatch
+    tail: float, sampled: bool, converging: bool, shared: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Above Pareto k of 0.5, or where it is not defined; what was not sampled counts as converged.
 
-    What is not settled by weights is fitted.
+    What is not settled by weights is fitted. A bridge on fewer than ten draws does not replace what weights say.
     """
     rng = np.random.default_rng(0)
     log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
@@ -50,14 +52,14 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
 
     fitted: list[int] = []
     monkeypatch.setattr(module, "fit", fit_without)
-    monkeypatch.setattr(module, "log_mean", lambda low, high: 7.0)
+    monkeypatch.setattr(module, "log_mean", lambda low, high: (7.0, shared))
     monkeypatch.setattr(module, "log_densities", ratios)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
     found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
-    assert list(found.refitted) == [sampled] * 4 and found.converged is (converging or not sampled)
+    assert list(found.refitted) == [sampled] * 4 and found.converged is (converging and shared > 10.0 or not sampled)
     assert fitted == [2] * sampled and shares == [0.0] * sampled + [1.0]
-    assert found.elpd == pytest.approx([1.0, 2.0, 7.0, 4.0] if sampled else known)
+    assert found.elpd == pytest.approx([1.0, 2.0, 7.0 if shared > 10.0 else 3.0, 4.0] if sampled else known)
 
 
 def test_weights_that_are_no_numbers_ask_for_sampling(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,7 +86,7 @@ def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch
         return SimpleNamespace(flat=np.zeros((500, 8)), converged=len(asked) != 2)
 
     monkeypatch.setattr(module, "fit", fit_without)
-    monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
+    monkeypatch.setattr(module, "log_mean", lambda low, high: (2.0, 1e3))
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
     found = smoothed_leave_one_hold_out(stub, exact=True, progress=shares.append)  # type: ignore[arg-type]
@@ -154,7 +156,7 @@ def test_log_mean_is_the_normalising_constant_of_a_normal(centre: float, width: 
         return -0.5 * ((x - centre) / width) ** 2
 
     weighted = variance * centre / width**2 + np.sqrt(variance) * rng.normal(size=(400, 3000))
-    estimates = [log_mean(log_p(rng.normal(size=4000)), log_p(draws)) for draws in weighted]
+    estimates = [log_mean(log_p(rng.normal(size=4000)), log_p(draws))[0] for draws in weighted]
     truth = 0.5 * np.log(width**2 / (1.0 + width**2)) - 0.5 * centre**2 / (1.0 + width**2)
     # the estimate is unbiased in the mean itself; 5 standard errors of 400 runs
     shares = np.exp(np.array(estimates) - truth)
@@ -166,7 +168,21 @@ def test_log_mean_is_the_normalising_constant_of_a_normal(centre: float, width: 
 def test_log_mean_bears_draws_where_the_density_is_zero() -> None:
     rng = np.random.default_rng(4)
     log_p = np.where(rng.uniform(size=20000) < 0.25, 0.0, -np.inf)
-    assert log_mean(log_p, np.zeros(5000)) == pytest.approx(np.log(0.25), abs=0.05)
+    assert log_mean(log_p, np.zeros(5000))[0] == pytest.approx(np.log(0.25), abs=0.05)
+
+
+@pytest.mark.parametrize("centre", [2.0, 4.0, 5.0])
+def test_the_draws_that_a_bridge_stands_on_say_how_well_it_is_known(centre: float) -> None:
+    """Two standard normals apart: what they share by quadrature, and a variance of nearly its inverse."""
+    rng = np.random.default_rng(6)
+    found = []
+    for _ in range(200):
+        one, other = rng.normal(size=1000), centre + rng.normal(size=1000)
+        found.append(log_mean(centre * one, centre * other))
+    values, shared = np.array(found).T
+    common = quad(lambda x: stats.norm.pdf(x) * expit(centre * (x - 0.5 * centre)), -10.0, 15.0)[0]
+    assert shared.mean() == pytest.approx(1000.0 * common, rel=0.05)
+    assert 0.4 < np.var(values) * shared.mean() < 1.2
 
 
 def test_difference_and_its_standard_error() -> None:
@@ -188,14 +204,14 @@ def test_a_bridge_between_two_lots_of_draws_balances_them(seed: int) -> None:
     """With n draws of the one and m of the other, the root of sum 1/(1 + m/n r/p) = sum 1/(1 + n/m p/r) is r."""
     rng = np.random.default_rng(seed)
     one, other = rng.normal(size=300), 0.5 + rng.normal(size=200)
-    r = np.exp(log_mean(one, other))
+    r = np.exp(log_mean(one, other)[0])
     from_one = (1.0 / (1.0 + 200.0 / 300.0 * np.exp(one) / r) * np.exp(one)).mean()
     from_other = (1.0 / (1.0 + 200.0 / 300.0 * np.exp(other) / r)).mean()
     assert from_one / from_other == pytest.approx(r, rel=1e-9)
     # far from zero, and of densities that are all the same
-    assert log_mean(one - 2000.0, other - 2000.0) == pytest.approx(np.log(r) - 2000.0, rel=1e-12)
+    assert log_mean(one - 2000.0, other - 2000.0)[0] == pytest.approx(np.log(r) - 2000.0, rel=1e-12)
     for n, m in ((300, 200), (1, 1), (3000, 1), (1, 3000)):  # however few there are of either
-        assert log_mean(np.full(n, -7.0), np.full(m, -7.0)) == pytest.approx(-7.0)
+        assert log_mean(np.full(n, -7.0), np.full(m, -7.0))[0] == pytest.approx(-7.0)
 
 
 def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,7 +219,7 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
     monkeypatch.setattr(module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, 0.9)))
-    monkeypatch.setattr(module, "log_mean", lambda low, high: 2.0)
+    monkeypatch.setattr(module, "log_mean", lambda low, high: (2.0, 1e3))
     asked: list[tuple[int, object]] = []
 
     def together(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -103,6 +103,7 @@ def by_themselves(monkeypatch: pytest.MonkeyPatch, converged: bool = True) -> li
         # the full one's integral is 2 pi, as it is there
         return SimpleNamespace(log_evidence=np.log(2.0 * np.pi) - Normals.elpd[hold], converged=converged)
 
+    monkeypatch.setattr(module, "contradicting", lambda *given: None)
     monkeypatch.setattr(module, "without_hold", lambda problem, sample, hold: hold)
     monkeypatch.setattr(module, "weighted_posterior", alone)
     return asked
@@ -116,6 +117,23 @@ def test_ratios_of_integrals_are_found_also_where_a_posterior_is_apart(
     elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
     assert settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
     assert pools == [4] and not asked
+
+
+def test_what_a_further_search_contradicts_is_sampled_by_itself(
+    pools: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each density that weights settle has a search of its own, with the integral that was found for it."""
+    asked, seen = by_themselves(monkeypatch), []
+
+    def contradicting(left: LogPosterior, drawn_from: object, log_integral: float, rng: object, most: float) -> object:
+        assert most == 0.5
+        seen.append(log_integral)
+        return "modes" if len(seen) == 2 else None
+
+    monkeypatch.setattr(module, "contradicting", contradicting)
+    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+    assert asked == [1] and settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
+    assert seen == pytest.approx(np.log(2.0 * np.pi) - np.array(Normals.elpd), abs=0.15)
 
 
 def test_what_is_given_up_is_sampled_by_itself(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,7 +189,7 @@ def test_a_hold_that_is_apart_agrees_with_thermodynamic_integration() -> None:
         theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
         log_p.append(problem.leave_one_hold_out(theta)[0][0])
     steps = zip(np.diff(powers), log_p[:-1], log_p[1:], strict=True)
-    expected = sum(log_mean(step * low, step * high) for step, low, high in steps)
+    expected = sum(log_mean(step * low, step * high)[0] for step, low, high in steps)
     fitted = fit(problem, 1, policy=Policy(walkers=64, round_draws=2048, ess=2000.0))
     found = [smoothed_leave_one_hold_out(fitted, seed).elpd[0] for seed in (1, 2, 3)]
     print(f"log density of the hold: {expected:.2f} by integration, {np.round(found, 2).tolist()} found")

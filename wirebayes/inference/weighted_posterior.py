@@ -15,8 +15,9 @@ import numpy as np
 from wirebayes.inference import importance
 from wirebayes.inference.fit import Fit
 from wirebayes.inference.importance import Weighted, effective, tail
-from wirebayes.inference.modes import distinct, search
+from wirebayes.inference.modes import Optimum, distinct, search
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
@@ -48,6 +49,7 @@ class WeightedPosterior:
 
 
 Posterior = Fit | WeightedPosterior
+_NEXT_TO_NOTHING = 0.05  # share of the mass: without it, log densities change by that at most
 
 
 def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPosterior:
@@ -100,29 +102,56 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
         pool = importance.sample(density, start, nothing, target.coordinates.order, rng, ess)
         if not pool.settled[0]:
             break
-        others = search(target, rng, starts=_STARTS).modes
-        if overlooked(target, pool, importance.widened(others), rng) <= _NEXT_TO_NOTHING:
+        others = contradicting(target, pool.proposal, pool.log_integral[0], rng)
+        if others is None:
             return pool
         known = distinct([known, others])
     return replace(pool, settled=np.zeros(1, bool))
 
 
-def overlooked(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.random.Generator) -> float:
-    """Share of the posterior, by draws of another proposal, that lies where the pool's proposal hardly draws.
+def contradicting(
+    target: LogPosterior,
+    drawn_from: Mixture | Proposal,
+    log_integral: float,
+    rng: np.random.Generator,
+    most: float = _NEXT_TO_NOTHING,
+) -> Optimum | None:
+    """Modes of a further search, if mass lies around them where a proposal hardly draws.
 
     Parameters
     ----------
     target : LogPosterior
-    pool : Weighted
-        Its integral is taken for that of the posterior; what it misses comes on top, and the share may exceed one.
+    drawn_from : Mixture or Proposal
+    log_integral : float
+        Of the posterior density, by draws of the proposal.
+    rng : numpy Generator
+    most : float
+        Share of the mass that may lie there.
+    """
+    others = search(target, rng, starts=_STARTS).modes
+    share = overlooked(target, drawn_from, log_integral, importance.widened(others), rng)
+    return others if share > most else None
+
+
+def overlooked(
+    target: LogPosterior, drawn_from: Mixture | Proposal, log_integral: float, others: Mixture, rng: np.random.Generator
+) -> float:
+    """Share of the posterior, by draws of another proposal, that lies where a proposal hardly draws.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    drawn_from : Mixture or Proposal
+    log_integral : float
+        Of the posterior density, by draws of the proposal; what it misses comes on top, and the share may exceed one.
     others : Mixture
         Where else to draw.
     rng : numpy Generator
     """
     z = others.rvs(_WITNESSES, rng)
-    height = target(z) - pool.log_integral[0]
+    height = target(z) - log_integral
     share = np.exp(height - others.log_density(z)) / len(z)
-    return float(share[height - pool.proposal.log_density(z) > _HARDLY].sum())
+    return float(share[height - drawn_from.log_density(z) > _HARDLY].sum())
 
 
 _DRAWS = 4000  # as many as predictions take
@@ -130,4 +159,3 @@ _STARTS = 18  # of climbs, twice as many as before a walk: walkers still find wh
 _SEARCHES = 3  # that may contradict, before it is left to walkers
 _WITNESSES = 2000  # a hill with a hundredth of the mass has some twenty of them, where a search found it
 _HARDLY = 3.0  # nats of posterior over proposal: a place drawn twenty times too seldom
-_NEXT_TO_NOTHING = 0.05  # share of the mass: without it, log densities change by that at most

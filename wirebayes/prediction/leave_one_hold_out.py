@@ -27,6 +27,7 @@ from wirebayes.typing import Floats
 LARGEST_K = 0.5
 # a quarter of a fit's draws: elpd differences count from 4, and a hold's density is known to a tenth here
 REFIT = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=1200)
+_SHARED = 10.0  # draws: with fewer a bridge's standard error exceeds 0.3
 _DRAWS = 4000  # the error of a hold's elpd by their number is then some hundredths, of differences that count from 4
 
 
@@ -132,8 +133,10 @@ def smoothed_leave_one_hold_out(
         progress(done / len(alone))
         s, j = where[i]
         without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta)
-        elpd[i] = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
-        converged &= without.converged
+        bridge, shared = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
+        if exact or shared >= _SHARED:  # else what importance sampling says, settled or not, is nearer
+            elpd[i] = bridge
+        converged &= without.converged and shared >= _SHARED
     progress(1.0)
     names = tuple(problem.samples[s].name for s, _ in where)
     numbers = np.array([problem.samples[s].protocol.number[j] for s, j in where])
@@ -147,11 +150,12 @@ def thinned(theta: Floats, draws: int = _DRAWS) -> Floats:
     return kept
 
 
-def log_mean(log_p: Floats, log_p_weighted: Floats) -> float:
+def log_mean(log_p: Floats, log_p_weighted: Floats) -> tuple[float, float]:
     """Logarithm of the mean of p under a density q, from draws of q and of the density proportional to q p.
 
     The bridge between the two with the least variance: it is where draws of the one, weighed by how likely they belong
-    to the other, balance the reverse.
+    to the other, balance the reverse. Where hardly any do, the two have next to nothing in common, and the bridge no
+    ground.
 
     Parameters
     ----------
@@ -159,6 +163,12 @@ def log_mean(log_p: Floats, log_p_weighted: Floats) -> float:
         At draws of q.
     log_p_weighted : (m,) array
         At draws of the density proportional to q p.
+
+    Returns
+    -------
+    float
+    float
+        How many draws of q might as well be of the other density; the variance is nearly its inverse.
 
     References
     ----------
@@ -172,7 +182,8 @@ def log_mean(log_p: Floats, log_p_weighted: Floats) -> float:
 
     low, high = min(one.min(), other.min()), max(one.max(), other.max())
     span = high - low + np.log(len(log_p) + len(other)) + 1.0
-    return float(brentq(unbalanced, low - span, high + span, maxiter=1000) + np.log(len(other) / len(log_p)))
+    middle = brentq(unbalanced, low - span, high + span, maxiter=1000)
+    return float(middle + np.log(len(other) / len(log_p))), float(expit(one - middle).sum())
 
 
 def standard_error(values: Floats) -> float:
