@@ -19,6 +19,13 @@ def made(law="hooke", effects=(), **truth):
     return draw([BENCH], Truth(TRUTH | truth, law=law, effects=tuple(named(e) for e in effects)), 1)
 
 
+def knowing(**fixed):
+    """The problem with some parameters known."""
+    problem = made().problem
+    left = {name: d for name, d in problem.prior.distributions.items() if name not in fixed}
+    return replace(problem, prior=replace(problem.prior, distributions=left, fixed=fixed))
+
+
 def found(of):
     return slack_edge(of.problem, of.problem.samples[0])
 
@@ -73,6 +80,21 @@ def test_only_where_the_first_hold_is_seen_to_be_taut_and_to_creep(share, lost, 
     changed = replace(of.problem, samples=(replace(sample, readings=readings),))
     assert (slack_edge(changed, changed.samples[0]) is not None) is edge
     assert bool(Transformation(changed).slack_edges) is edge
+
+
+@pytest.mark.parametrize(("known", "edge"), [({"setting_sd": 0.0}, None), ({"setting_sd": 0.01}, 0.04)])
+def test_without_setting_errors_the_density_does_not_jump(known, edge):
+    """A posterior with exact positions is sampled all the same."""
+    of = knowing(**known)
+    found = slack_edge(of, of.samples[0])
+    assert (found and found.width) == edge
+    z = Transformation(of).to_sampled(of.prior.rvs(20, np.random.default_rng(0)))
+    assert np.isfinite(z).all()
+
+
+def test_a_known_preload_has_no_coordinate():
+    of = knowing(preload=0.3)
+    assert slack_edge(of, of.samples[0]) is None
 
 
 def test_holds_by_themselves_and_climbs_that_are_compared_do_without():

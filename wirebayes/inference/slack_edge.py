@@ -87,8 +87,8 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
     Returns
     -------
     SlackEdge or None
-        None where the preload is known or shares a column with another quantity, and where the first hold is not
-        clearly seen to be taut and to creep: then it may be slack, and the edge lies amid the posterior.
+        None where the preload is known, where there are no setting errors, and where the first hold is not clearly seen
+        to be taut and to creep: then it may be slack, and the edge lies amid the posterior.
     """
     prior, protocol, readings = problem.prior, sample.protocol, sample.readings[..., 0]
 
@@ -102,10 +102,12 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
     if first[0] < _CLEARLY * largest or first[0] - first[-1] < _CLEARLY * first[0]:
         return None
     setting = problem.column("setting_sd", sample)
-    typical = prior.fixed[setting] if setting in prior.fixed else prior.distributions[setting].median()
+    typical = float(prior.fixed[setting] if setting in prior.fixed else prior.distributions[setting].median())
+    if not typical > 0.0:
+        return None
     below = [column for e in sample.model.effects if (column := e.no_creep_below)]
     return SlackEdge(
-        preload, -float(protocol.displacement_mm[0]), _WIDTH * float(typical), protocol.length_mm,
+        preload, -float(protocol.displacement_mm[0]), _WIDTH * typical, protocol.length_mm,
         sample.model.law == "modified", place("k1"), place(below[0]) if below else 0.0,
     )  # fmt: skip
 

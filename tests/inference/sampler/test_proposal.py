@@ -273,6 +273,19 @@ def test_there_is_excess_from_one_nat_and_five_places_on(above, places, part):
     assert (found.excess is not None) is part
 
 
+@pytest.mark.parametrize(("away", "part"), [(1e4, True), (1e9, False)])
+def test_excess_far_away_has_a_part_as_long_as_there_are_digits(away, part):
+    """In single precision a part ten thousand standard deviations away has no width."""
+    rng = np.random.default_rng(3)
+    hill, far = rng.normal(size=(4000, 3)), away + rng.normal(size=(40, 3))
+    q, points = without_excess(hill, rng), np.concatenate([hill, far])
+    value = np.append(q.log_density(hill), np.zeros(len(far)))
+    found = proposal.with_excess(q, Points(points, np.ones(len(points))), value, rng)
+    assert (found.excess is not None) is part
+    if found.excess is not None:
+        assert found.excess.moments[0] == pytest.approx(q.straight.forward(far)[0].mean(axis=0), rel=1e-3)
+
+
 def test_without_excess_the_other_parts_share_all():
     rng = np.random.default_rng(3)
     q = without_excess(neck(4000, rng), rng)

@@ -176,6 +176,11 @@ def fit_around(points: Points, of: Mixture, rng: np.random.Generator, *, most: i
     Returns
     -------
     Mixture
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the points are so far from the other mixture that a component has no digits left.
     """
     middle, covariance = of.moments
     d = len(middle)
@@ -185,19 +190,27 @@ def fit_around(points: Points, of: Mixture, rng: np.random.Generator, *, most: i
     centres = x[spread_rows(x, k, rng, points.weight / points.weight.sum())]
     k = len(centres)
     start = Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0))
-    found = _em(x, points.weight, start, of_the_whole=float(d), fewest=0.0)
+    found = _em(x, points.weight, start, kind=np.float64, of_the_whole=float(d), fewest=0.0)
     return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors)
 
 
 def _em(
-    x: Array, weight: Array, mixture: Mixture, iterations: int = 60, *, of_the_whole: float = 3.0, fewest: float = 3.0
+    x: Array,
+    weight: Array,
+    mixture: Mixture,
+    iterations: int = 60,
+    *,
+    kind: type[np.floating[Any]] = np.float32,
+    of_the_whole: float = 3.0,
+    fewest: float = 3.0,
 ) -> Mixture:
     """Expectation-maximisation, in single precision: half the work, and no proposal needs more than a few digits.
 
-    The unit covariance counts as much as `of_the_whole` points in every component, for one that holds few points would
-    shrink onto those; with fewer points than `fewest` for each coordinate it takes the others with it: stop there.
+    Unless points lie far from the origin. The unit covariance counts as much as `of_the_whole` points in every
+    component, for one that holds few points would shrink onto those; with fewer points than `fewest` for each
+    coordinate it takes the others with it: stop there.
     """
-    x, weight = x.astype(np.float32), weight.astype(np.float32)
+    x, weight = x.astype(kind), weight.astype(kind)
     (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
     last = -np.inf

@@ -203,7 +203,10 @@ def with_excess(of: Proposal, drawn: Points, value: Array, rng: np.random.Genera
     if some.sum() < _TOO_FEW or not np.isfinite(u).all():
         return of
     points = Points(u, weight[some]).worth(effective_number(weight[some]))
-    return replace(of, excess=mixture.fit_around(points, of.close, rng, most=_EXCESS_COMPONENTS, wider=_WIDER))
+    try:
+        return replace(of, excess=mixture.fit_around(points, of.close, rng, most=_EXCESS_COMPONENTS, wider=_WIDER))
+    except np.linalg.LinAlgError:
+        return of
 
 
 _PARTS = ("close", "wide", "plain", "start", "excess")
