@@ -15,7 +15,7 @@ import numpy as np
 from wirebayes.inference import importance
 from wirebayes.inference.fit import Fit
 from wirebayes.inference.importance import Weighted, effective, tail
-from wirebayes.inference.modes import Optimum, distinct, search
+from wirebayes.inference.modes import distinct, search
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import LogPosterior
@@ -49,7 +49,6 @@ class WeightedPosterior:
 
 
 Posterior = Fit | WeightedPosterior
-_NEXT_TO_NOTHING = 0.05  # share of the mass: without it, log densities change by that at most
 
 
 def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPosterior:
@@ -102,35 +101,12 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
         pool = importance.sample(density, start, nothing, target.coordinates.order, rng, ess)
         if not pool.settled[0]:
             break
-        others = contradicting(target, pool.proposal, pool.log_integral[0], rng)
-        if others is None:
+        others = search(target, rng, starts=_STARTS).modes
+        share = overlooked(target, pool.proposal, pool.log_integral[0], importance.widened(others), rng)
+        if share <= _NEXT_TO_NOTHING:
             return pool
         known = distinct([known, others])
     return replace(pool, settled=np.zeros(1, bool))
-
-
-def contradicting(
-    target: LogPosterior,
-    drawn_from: Mixture | Proposal,
-    log_integral: float,
-    rng: np.random.Generator,
-    most: float = _NEXT_TO_NOTHING,
-) -> Optimum | None:
-    """Modes of a further search, if mass lies around them where a proposal hardly draws.
-
-    Parameters
-    ----------
-    target : LogPosterior
-    drawn_from : Mixture or Proposal
-    log_integral : float
-        Of the posterior density, by draws of the proposal.
-    rng : numpy Generator
-    most : float
-        Share of the mass that may lie there.
-    """
-    others = search(target, rng, starts=_STARTS).modes
-    share = overlooked(target, drawn_from, log_integral, importance.widened(others), rng)
-    return others if share > most else None
 
 
 def overlooked(
@@ -159,3 +135,4 @@ _STARTS = 18  # of climbs, twice as many as before a walk: walkers still find wh
 _SEARCHES = 3  # that may contradict, before it is left to walkers
 _WITNESSES = 2000  # a hill with a hundredth of the mass has some twenty of them, where a search found it
 _HARDLY = 3.0  # nats of posterior over proposal: a place drawn twenty times too seldom
+_NEXT_TO_NOTHING = 0.05  # share of the mass: without it, log densities change by that at most

@@ -1,7 +1,8 @@
 """Log densities of holds given all others, as ratios of integrals: of the full posterior and of those without a hold.
 
-All are sampled by importance from one proposal (`wirebayes.inference.importance`). Posteriors without a hold that are
-far from the others are sampled by themselves, from a search of their own.
+All are sampled by importance from one proposal (`wirebayes.inference.importance`). A search of its own bears witness
+against each of them, for one proposal may miss a mode that only the readings of a hold exclude. Posteriors without a
+hold that are far from the others, or that this search contradicts, are sampled by themselves.
 """
 
 from collections.abc import Callable
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 
 from wirebayes.inference import importance
 from wirebayes.inference.fit import seed_of
+from wirebayes.inference.modes import search
 from wirebayes.inference.transform import LogPosterior
-from wirebayes.inference.weighted_posterior import contradicting, weighted_posterior
+from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
 
@@ -46,7 +48,8 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
         left = LogPosterior(without_hold(problem, *holds[m]))
         left.coordinates = target.coordinates  # they depend on readings, but any serve
         log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
-        settled[m] = contradicting(left, pool.proposal, log_integral, rng, _MISSED) is None
+        others = importance.widened(search(left, rng).modes)
+        settled[m] = overlooked(left, pool.proposal, log_integral, others, rng) <= _MISSED
     for m in np.flatnonzero(~settled).tolist():
         s, j = holds[m]
         alone = weighted_posterior(without_hold(problem, s, j), seed_of(seed, str(s), str(j)), _ALONE)
