@@ -436,3 +436,21 @@ def test_ticks_of_pairs_are_few_round_and_within_their_cells() -> None:
         assert 1 <= len(labels) <= 4
         assert (places > 0.04).all()
         assert (places < 0.96).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("sensor_sd,", ["sensor_sd,"]),
+        ("tension_dependent_rate.m", ["tension_", "dependent_rate.m"]),
+        ("second_relaxation.time_s", ["second_", "relaxation.time_s"]),
+        ("a" * 30, ["a" * 30]),
+        ("", [""]),
+    ],
+)
+def test_a_long_name_stays_within_its_cell(name: str, lines: list[str]) -> None:
+    """Seventeen letters a line, broken after underscores, nothing lost."""
+    from wirebayes.report.figures import _narrow
+
+    found = _narrow(name)
+    assert found.split("\n") == lines and found.replace("\n", "") == name

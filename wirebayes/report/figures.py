@@ -210,7 +210,7 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure 
     if count < 2:
         return None
     # One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw.
-    left, below = 0.75, 0.7
+    left, below = 0.9, 0.8  # room for three lines
     width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
     figure = Figure(figsize=(width, height))
     axes: Any = figure.add_axes((left / width, below / height, 1.1 * count / width, 1.05 * count / height))
@@ -227,7 +227,7 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure 
         stairs = bottom + 0.92 * _SIDE * heights / heights.max()
         axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
         ticks, labels = _few_ticks(values, is_log)
-        words = named(name, effects).replace(", ", ",\n")
+        words = "\n".join(_narrow(line) for line in named(name, effects).replace(", ", ",\n").split("\n"))
         axes.text(i + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
         _ticks(axes, [(i + _SIDE * t, 0.0) for t in ticks], (0.0, -_TICK))
         for t, label in zip(ticks, labels, strict=True):
@@ -241,6 +241,16 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure 
     frames = [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for i in range(count) for j in range(i + 1)]
     axes.add_collection(PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8))
     return figure
+
+
+def _narrow(line: str) -> str:
+    """A name in as many lines as it takes to stay within its cell, broken after underscores."""
+    lines = [""]
+    for part in line.replace("_", "_\n").split("\n"):
+        if lines[-1] and len(lines[-1] + part) > _LONGEST:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
 
 
 def _straight(values: Array) -> tuple[Array, bool]:
@@ -304,6 +314,7 @@ def _regions(axes: Any, x: Array, y: Array, corner: tuple[float, float]) -> None
 
 _MOST_TICKS = 4  # so that labels do not touch
 _SIDE, _GAP, _TICK = 0.92, 0.08, 0.035  # of a cell, between cells and of a tick, in units of both together
+_LONGEST = 17  # letters of a name that fit into a cell
 _CELLS = 22  # of a region's grid along each axis: fine enough to look smooth
 
 
