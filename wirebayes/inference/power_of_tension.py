@@ -1,4 +1,4 @@
-"""Which power U of the tension suits the losses that a test measured, if the creep were as fast or as slow as one says.
+"""Which power U of the tension suits the losses that a test measured, for each rate that the creep may have.
 
 Where creep is slow, a hold loses tension in proportion to the power of its tension. Where creep is over within a hold,
 what earlier holds gained is missing, and only the step of the power is left: it takes a larger power to lose as much.

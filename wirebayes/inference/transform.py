@@ -202,7 +202,7 @@ class Transformation:
             if "B" not in moved:
                 moved -= {"k1"}  # the tension lost in a hold is not known
             if "k2" not in moved or sample.model.history != "saturating" or problem.likelihood != "chain":
-                moved -= {"U"}  # no hold misses what earlier ones gained, or how fast the creep is is not known
+                moved -= {"U"}  # every hold creeps anew, or the rate of the creep is not sampled here
             shifted |= {columns[name] for name in moved}
             if moved:
                 effects = tuple(e for e in sample.model.at("amount") if compiled.has_formula(e))  # others may ask for B
@@ -356,12 +356,13 @@ def _ridge(
 
 def _powers(problem: Problem, sample: Sample, log_tension: Array, relative_s: Array) -> tuple[Array, Array]:
     """Log hazards and the log U that suits the losses of a sample's holds best at each of them."""
-    readings, seen = sample.readings[..., 0], sample.protocol.mask & sample.protocol.recorded[:, None]
-    last = seen.shape[1] - 1 - np.argmax(seen[:, ::-1], axis=1)
-    lost = np.where(seen.sum(axis=1) > 1, readings[:, 0] - readings[np.arange(len(last)), last], np.nan)
+    readings, protocol = sample.readings[..., 0], sample.protocol
+    last = readings[np.arange(len(readings)), protocol.last_reading]
+    lost = np.where(protocol.mask.sum(axis=1) > 1, readings[:, 0] - last, np.nan)
     power, exponent = (problem.column(name, sample) for name in ("U", "N"))
     low, middle, high = np.log(problem.prior.distributions[power].ppf([_ONE_SD[0], 0.5, _ONE_SD[1]]))
-    N = problem.prior.fixed.get(exponent) or problem.prior.distributions[exponent].median()
+    fixed = problem.prior.fixed
+    N = fixed[exponent] if exponent in fixed else problem.prior.distributions[exponent].median()
     return suiting_powers(lost, log_tension, relative_s, float(N), float(middle), 0.5 * float(high - low))
 
 

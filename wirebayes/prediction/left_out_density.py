@@ -6,6 +6,7 @@ hold that are far from the others, or that this search contradicts, are sampled 
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -45,8 +46,8 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
     elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
     for m in np.flatnonzero(settled).tolist():
-        left = LogPosterior(without_hold(problem, *holds[m]))
-        left.coordinates = target.coordinates  # they depend on readings, but any serve
+        left = copy(target)  # in the same coordinates, under the same prior
+        left.problem = without_hold(problem, *holds[m])
         log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
         others = importance.widened(search(left, rng).modes)
         settled[m] = overlooked(left, pool.proposal, log_integral, others, rng) <= _MISSED
