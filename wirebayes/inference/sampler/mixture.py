@@ -204,11 +204,11 @@ def _em(
     of_the_whole: float = 3.0,
     fewest: float = 3.0,
 ) -> Mixture:
-    """Expectation-maximisation, in single precision: half the work, and no proposal needs more than a few digits.
+    """Expectation-maximisation, in single precision: half the work, and enough digits for points near the origin.
 
-    Unless points lie far from the origin. The unit covariance counts as much as `of_the_whole` points in every
-    component, for one that holds few points would shrink onto those; with fewer points than `fewest` for each
-    coordinate it takes the others with it: stop there.
+    The unit covariance counts as much as `of_the_whole` points in every component, because a component that holds few
+    points would shrink onto them. One with fewer points than `fewest` for each coordinate is an error: it would take
+    the others with it.
     """
     x, weight = x.astype(kind), weight.astype(kind)
     (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
