@@ -268,7 +268,7 @@ def test_given_first_readings_are_regressed_on_within_their_own_history() -> Non
     requested = np.array([True, True, True, True, False])
     first = np.array([np.nan, 1.5, -0.5, 2.0, 9.0])
     request = PredictionRequest(wire().protocol(), 2, requested, first)
-    found = predictive._given_first(drawn.copy(), request)
+    found = predictive.given_first(drawn.copy(), request)
 
     def moved(readings: np.ndarray, known: list[int]) -> np.ndarray:
         given = drawn[known, 0]
@@ -282,7 +282,7 @@ def test_given_first_readings_are_regressed_on_within_their_own_history() -> Non
         assert found[j] == pytest.approx(moved(drawn[j], known), abs=1e-9)
         assert (found[j, 0] == first[j]).all()
     free = replace(request, first_N=np.array([np.nan, np.nan, 1.0, np.nan, np.nan]))
-    later = predictive._given_first(drawn.copy(), free)
+    later = predictive.given_first(drawn.copy(), free)
     first = free.first_N
     assert later[3] == pytest.approx(moved(drawn[3], [2]), abs=1e-9) and np.ptp(later[3, 0]) > 0.1
 

@@ -14,7 +14,7 @@ from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.prediction.leave_one_hold_out import thinned
-from wirebayes.prediction.predictive import PredictionRequest, predict
+from wirebayes.prediction.predictive import PredictionRequest, given_first, predict
 from wirebayes.typing import Array
 from wirebayes.wire.staircase import linearise
 
@@ -137,7 +137,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
         for j in np.flatnonzero(requested):
             only = np.arange(len(requested)) == j
             request = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
-            drawn[j] = predict(problem, theta, here, request, rng)[j]
+            drawn = given_first(drawn, request)
     else:
         drawn = predict(problem, theta, here, PredictionRequest(whole, trained, requested, tension[:, 0]), rng)
         elpd_given = _hold_scores(fitted, experiment, sample, requested)
@@ -187,16 +187,18 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
     rows, n = draws.shape
     levels = np.linspace(0.0, 1.0, 101)
     pit = (np.argsort(np.argsort(draws, axis=1), axis=1) + 0.5) / n
-    shares = np.stack([(pit <= level).mean(axis=0) for level in levels])
-    own = ((draws < observed[:, None]).mean(axis=1)[:, None] <= levels).mean(axis=0)
-    ordered = np.sort(shares, axis=1)
+    own = ((draws < observed[:, None]).mean(axis=1)[:, None] <= levels).sum(axis=0)
+    # how many readings lie below each level; how many draws have so many, or fewer
+    counts = np.stack([(pit <= level).sum(axis=0) for level in levels])
+    draws_with = np.stack([np.bincount(c, minlength=rows + 1) for c in counts])
+    with_at_most = np.cumsum(draws_with, axis=1)
     # the level at which a course is extreme, in the pointwise two-sided sense; its minimum over all levels
-    everything = np.column_stack([shares, own])
-    below = np.stack([np.searchsorted(o, e, side="right") for o, e in zip(ordered, everything, strict=True)])
-    above = n - np.stack([np.searchsorted(o, e, side="left") for o, e in zip(ordered, everything, strict=True)])
+    everything = np.column_stack([counts, own])
+    below = np.take_along_axis(with_at_most, everything, axis=1)
+    above = n - below + np.take_along_axis(draws_with, everything, axis=1)
     extreme = 2.0 * np.minimum(below, above).min(axis=0) / n
     pointwise = np.quantile(extreme[:-1], 1.0 - probability)
-    ends = np.quantile(shares, [min(pointwise / 2.0, 0.5), max(1.0 - pointwise / 2.0, 0.5)], axis=1)
+    ends = np.quantile(counts / rows, [min(pointwise / 2.0, 0.5), max(1.0 - pointwise / 2.0, 0.5)], axis=1)
     return np.vstack([levels, ends]), float(np.mean(extreme[:-1] <= extreme[-1]))
 
 

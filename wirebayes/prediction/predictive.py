@@ -71,7 +71,7 @@ def predict(
         for start in range(0, len(theta), _CHUNK)
     ]
     drawn = np.concatenate(parts, axis=-1)
-    return drawn if problem.likelihood == "hold" else _given_first(drawn, request)
+    return drawn if problem.likelihood == "hold" else given_first(drawn, request)
 
 
 def _readings(
@@ -180,8 +180,20 @@ def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: F
     return out
 
 
-def _given_first(drawn: Floats, request: PredictionRequest) -> Floats:
-    """Condition a hold's readings on the first readings given up to it; a replicate on its own alone."""
+def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
+    """Condition the requested holds on the first readings given up to them; a replicate on its own alone.
+
+    Parameters
+    ----------
+    drawn : (H, R, n) array
+        Joint draws of all readings, N, of a likelihood along the chain; changed in place.
+    request : PredictionRequest
+
+    Returns
+    -------
+    (H, R, n) array
+        The same array.
+    """
     given = request.requested & np.isfinite(request.first_N)
     for j in np.flatnonzero(request.requested)[::-1]:
         known = np.array([j] if given[j] else [], int)
