@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import CATALOGUE
-from wirebayes.effects.creep import SteadyCreepCarried
+from wirebayes.effects.creep import Memory, SteadyCreepCarried
 from wirebayes.effects.elastic import LengthDependence, StrainStiffening
-from wirebayes.effects.rivals import Logarithmic
+from wirebayes.effects.instrument import ReadingDelay
+from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model import likelihoods
@@ -41,11 +42,12 @@ def forms() -> list[Effect]:
 
 
 FORMS = forms()
+LAWS_OF_CREEP = [rival() for rival in RIVALS.values()]  # nothing is their neutral value
 models = st.builds(
     Model,
     st.sampled_from(["hooke", "modified"]),
     st.sampled_from(["saturating", "additive"]),
-    st.lists(st.sampled_from(FORMS), max_size=4, unique_by=lambda e: e.name).map(tuple),
+    st.lists(st.sampled_from(FORMS + LAWS_OF_CREEP), max_size=4, unique_by=lambda e: e.name).map(tuple),
     st.just(3.0),
     st.sampled_from([0.0, 800.0]),
 )
@@ -133,11 +135,34 @@ def test_each_effect_moves_the_compiled_readings(effect):
     same(moved, by_numpy(lambda: simulate(p, theta | typical, model)), 1.0)
 
 
+@pytest.mark.parametrize("law", LAWS_OF_CREEP, ids=lambda e: e.name)
+@pytest.mark.parametrize("beside", [(), (Memory(),), (ReadingDelay(),)], ids=["alone", "memory", "delay"])
+def test_each_law_of_creep_moves_the_compiled_readings(law, beside):
+    p = protocol([*ONE_WAY, 3.0, 1.0], [TIMES] * 8)
+    model = Model(effects=(law, *beside), tension_ref_N=3.0)
+    theta = {name: np.array([value]) for name, value in PLAIN.items()}
+    theta |= {
+        c: np.array([a.prior.ppf(0.8)]) for e in model.effects for c, a in zip(e.columns(), e.amplitudes, strict=True)
+    }
+    found = simulate(p, theta, model)
+    assert np.abs(found - simulate(p, theta, Model(effects=beside, tension_ref_N=3.0))).max() > 1e-3
+    same(found, by_numpy(lambda: simulate(p, theta, model)), 1.0)
+
+
 class Own(StrainStiffening):
     """A user's effect that is derived from one of the catalogue and computes something else."""
 
     def apply(self, value, own, hold):
         return value * (1.0 - own["c"] * value)
+
+
+class WithoutFormula(Effect):
+    """A user's effect."""
+
+    name, place, scope, amplitudes = "own", "strain", "material", ()
+
+    def apply(self, value, own, hold):
+        return 0.9 * value
 
 
 def test_an_effect_with_a_function_of_its_own_has_lost_its_parent_s_formula():
@@ -151,7 +176,7 @@ def test_an_effect_with_a_function_of_its_own_has_lost_its_parent_s_formula():
 def test_numpy_computes_what_has_no_formula_and_what_is_complex():
     p = protocol(ONE_WAY, [TIMES] * 6)
     theta = {name: np.array([value]) for name, value in PLAIN.items()}
-    assert compiled.call(p, theta | {"logarithmic.t0": np.array([10.0])}, Model(effects=(Logarithmic(),))) is None
+    assert compiled.call(p, theta, Model(effects=(WithoutFormula(),))) is None
     assert compiled.call(p, theta | {"k1": np.array([900.0 + 1e-30j])}, Model()) is None
     step = simulate(p, theta, Model(), np.full((6, 1), 1e-30j))
     assert np.iscomplexobj(step)

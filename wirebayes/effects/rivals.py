@@ -21,6 +21,7 @@ class AtOnce(Effect):
 
     name = "at_once"
     place = "strain"
+    formula = "at_once"
     scope = "material"
     amplitudes = ()
     sentence = "All creep of eq (2) happens before the first reading."
@@ -52,6 +53,7 @@ class NotInTime(Effect):
 
     name = "not_in_time"
     place = "fraction"
+    formula = "not_in_time"
     scope = "material"
     amplitudes = ()
     sentence = "Nothing changes while a position is held."
@@ -65,6 +67,7 @@ class Logarithmic(Effect):
 
     name = "logarithmic"
     place = "fraction"
+    formula = "logarithmic"
     scope = "material"
     amplitudes = (Amplitude("t0", "s", np.nan, stats.lognorm(1.5, scale=10.0), is_shape=True),)
     sentence = "Creep grows with the logarithm of time."
@@ -79,6 +82,7 @@ class PowerLaw(Effect):
 
     name = "power_law"
     place = "fraction"
+    formula = "power_of_time"
     scope = "material"
     amplitudes = (Amplitude("n", "-", np.nan, stats.lognorm(0.7, scale=0.25), is_shape=True),)
     sentence = "Creep grows with a power of time."
@@ -92,6 +96,7 @@ class TwoModes(Effect):
 
     name = "two_modes"
     place = "fraction"
+    formula = "two_modes"
     scope = "material"
     amplitudes = (
         Amplitude("slow_share", "-", np.nan, stats.uniform(0.0, 1.0)),

@@ -18,14 +18,17 @@ MOST_EFFECTS = _MOST_EFFECTS
 cdef enum Formula:
     STIFFENING, TOE, SERIES, THERMAL, LENGTH_POWER, PERMANENT, MEMORY, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
     AGEING, THRESHOLD, SLIP, WAIT, DELAY, DRIFT, SQUARE, TRANSIENT, LOST_MOTION, FRICTION
+    AT_ONCE, NOT_IN_TIME, LOGARITHMIC, POWER_OF_TIME, TWO_MODES
 
 FORMULAS = (
     "stiffening", "toe", "series", "thermal", "length_power", "permanent", "memory", "second_mode", "flow",
     "flow_carried", "rate_power", "ageing", "threshold", "slip", "wait", "delay", "drift", "square", "transient",
-    "lost_motion", "friction",
+    "lost_motion", "friction", "at_once", "not_in_time", "logarithmic", "power_of_time", "two_modes",
 )
 
 cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
+cdef double DAY_S = 86400.0
+cdef int NEWTON_STEPS = 7  # as in `wirebayes.effects.rivals`
 
 
 cdef struct Dual:
@@ -60,7 +63,7 @@ cdef struct Wire:
     double k1, B, U, k2, N, base, length_mm, log_length_ratio, tension_ref_N, kept
     bint modified
     int effects
-    bint own_time
+    bint own_time, timed  # time passes differently from hold to hold; another law than eq (5) says how creep goes on
     int formula[_MOST_EFFECTS]
     double number[_MOST_EFFECTS]  # the hold of an event, the parameter that depends on the length
     double own[_MOST_EFFECTS][2]  # amplitudes
@@ -107,7 +110,26 @@ cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warmi
                 out = through(out, out.v - width * share, share)
         elif wire.formula[e] == SERIES:
             out = times(out, 1.0 / (1.0 + wire.own[e][0] * wire.k1 / wire.length_mm))
+        elif wire.formula[e] == AT_ONCE and out.v > 0:
+            out = elastic_part(wire, out)
     return out
+
+
+cdef inline Dual elastic_part(Wire* wire, Dual whole) noexcept nogil:
+    """What is elastic of a strain of which the creep of eq (2) is a part."""
+    cdef double log_creep = log(wire.B / wire.length_mm) + wire.U * log(wire.k1), log_s, elastic, crept, move
+    cdef int step
+    log_s = log(whole.v)
+    if (log_s - log_creep) / wire.U < log_s:
+        log_s = (log_s - log_creep) / wire.U
+    for step in range(NEWTON_STEPS):
+        elastic, crept = exp(log_s), exp(log_creep + wire.U * log_s)
+        move = (elastic + crept - whole.v) / (elastic + wire.U * crept)
+        log_s -= move
+        if fabs(move) < 1e-9:  # the next one would be lost in rounding
+            break
+    elastic, crept = exp(log_s), exp(log_creep + wire.U * log_s)
+    return through(whole, elastic, elastic / (elastic + wire.U * crept))
 
 
 cdef inline Dual tension_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
@@ -168,6 +190,23 @@ cdef inline Dual fraction_of(Wire* wire, Dual rate, double time_s) noexcept nogi
     return through(rate, -gone, reach * (1.0 + gone))
 
 
+cdef inline double law_of_time(Wire* wire, double time_s) noexcept nogil:
+    """Share of the amount reached after a time by another law than eq (5): the last one named."""
+    cdef double share = 0.0, a
+    cdef int e
+    for e in range(wire.effects):
+        a = wire.own[e][0]
+        if wire.formula[e] == NOT_IN_TIME:
+            share = 0.0
+        elif wire.formula[e] == LOGARITHMIC:
+            share = log1p(time_s / a) / log1p(DAY_S / a)
+        elif wire.formula[e] == POWER_OF_TIME:
+            share = pow(time_s / DAY_S, a)
+        elif wire.formula[e] == TWO_MODES:
+            share = -(1.0 - a) * expm1(-wire.k2 * time_s) - a * expm1(-wire.k2 * time_s / wire.own[e][1])
+    return share
+
+
 cdef inline Dual reading_of(Wire* wire, Hold* hold, Dual tension, double time_s) noexcept nogil:
     """What the sensor says of a tension."""
     cdef double a
@@ -213,7 +252,7 @@ cdef inline Dual remembered(
     cdef double total = 0.0, share, age, k2
     cdef int i
     for i in range(earlier):
-        if wire.own_time:
+        if wire.own_time or wire.timed:
             age, k2 = hold.start_s - past[i, 0], past[i, 2]
             # a difference of two fractions of the creep
             share = expm1(-k2 * pow(age, wire.N)) - expm1(-k2 * pow(age + test.time_s[j, r], wire.N))
@@ -249,7 +288,7 @@ cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ss
     wire.k1, wire.B, wire.U, wire.k2, wire.N = theta[0, i], theta[1, i], theta[2, i], theta[3, i], theta[4, i]
     wire.length_mm, wire.base = test.length_mm, test.length_mm + theta[5, i]
     wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
-    wire.effects, wire.own_time = law.effects, False
+    wire.effects, wire.own_time, wire.timed = law.effects, False, False
     for e in range(law.effects):
         wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], 0.0
         for a in range(law.amplitudes[e]):
@@ -257,6 +296,8 @@ cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ss
             row += 1
         if law.formula[e] == RATE_POWER or law.formula[e] == DELAY:
             wire.own_time = True
+        elif law.formula[e] >= NOT_IN_TIME:
+            wire.timed = True
         if law.formula[e] == LENGTH_POWER:
             grown = exp(law.log_length_ratio * wire.own[e][0])
             if law.number[e] == 0:
@@ -267,7 +308,10 @@ cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ss
                 wire.U *= grown
             else:
                 wire.N *= grown
-    if not wire.own_time:
+    if wire.timed:
+        for t in range(test.times.shape[0]):
+            shares[t] = law_of_time(wire, test.times[t])
+    elif not wire.own_time:
         for t in range(test.times.shape[0]):
             shares[t] = -expm1(-wire.k2 * pow(test.times[t], wire.N))
 
@@ -323,7 +367,7 @@ cdef Dual follow(
         carried_beside[e] = wire.beside[e]
     for r in range(width):
         time_s = test.time_s[j, r]
-        if wire.own_time:
+        if wire.own_time and not wire.timed:
             grown = product(amount, fraction_of(wire, rate, clock_of(wire, hold, time_s, r == 0)))
         else:
             grown = times(amount, shares[test.which[j, r]])
