@@ -201,14 +201,14 @@ def test_a_search_finds_the_mode_with_most_of_the_mass(data):
 def test_with_a_ratio_kept_starts_are_led_to_it_and_without_noises_they_stay():
     target = simulated()
     start = target.coordinates.to_sampled(target.problem.prior.rvs(6, np.random.default_rng(3)))
-    led = modes._with_ratios(target, start)
+    [led] = modes._with_ratios(target, *target.rowwise(), [start])
     [pair] = target.coordinates.noises
     ratio = (led[:, pair.setting] - led[:, pair.sensor] - pair.middle) / pair.spread
     assert ratio == pytest.approx(np.tile([1.3, -1.3, 0.0], 2))
     assert (target(led) > target(start)).all()
     holds = simulated(likelihood="hold")
     begin = holds.coordinates.to_sampled(holds.problem.prior.rvs(6, np.random.default_rng(3)))
-    assert holds.coordinates.noises == () and modes._with_ratios(holds, begin) is begin
+    assert holds.coordinates.noises == () and modes._with_ratios(holds, *holds.rowwise(), [begin])[0] is begin
 
 
 def test_starts_are_spread_over_rates_and_powers_of_creep():
@@ -220,3 +220,65 @@ def test_starts_are_spread_over_rates_and_powers_of_creep():
     rank = np.stack([np.searchsorted(np.sort(z[:, i]), chosen[:, i]) / len(z) for i in (rate, power)], axis=1)
     level = np.select([rank < 0.25, rank > 0.75], [0, 2], 1)
     assert len({tuple(pair) for pair in level}) == 9 and (level[:3, 0] == 0).all() and (level[3:6, 0] == 2).all()
+
+
+def quartic(evaluated):
+    """A hill whose curvature vanishes at its top; `evaluated` gets the number of points of every call."""
+
+    def density(z, rows):
+        evaluated.append(len(z))
+        return -0.5 * (z**2).sum(axis=1) ** 2
+
+    return density
+
+
+def test_a_climb_is_given_up_where_a_mode_is_known_and_no_other_with_it():
+    start, known = (
+        np.array([[3.0, 3.0], [-3.0, 3.0]]),
+        modes.Optimum(*(np.zeros((1, 2)), np.zeros(1), np.eye(2)[None], np.ones(1, bool))),
+    )
+    nothing = known.rows([])
+    whole_cost, cost = [], []
+    whole = climb(quartic(whole_cost), start, of=np.arange(2))
+    left = climb(quartic(cost), start, of=np.arange(2), known=[nothing, known])
+    assert whole.converged.all() and left.converged.tolist() == [True, False]
+    assert np.isinf(left.log_density).tolist() == [False, True] and left.z[0] == pytest.approx(whole.z[0])
+    assert sum(cost) < 0.8 * sum(whole_cost)
+
+
+@pytest.mark.parametrize("of, both", [([0, 0], False), ([0, 1], True), (None, True)])
+def test_of_climbs_on_one_density_those_that_come_to_the_same_place_are_given_up(of, both):
+    start = np.array([[0.5, 0.0], [8.0, 6.0]])
+
+    def density(z, rows):
+        return -np.sqrt(1.0 + (z**2).sum(axis=1))
+
+    found = climb(density, start, of=None if of is None else np.array(of), tolerance=1e-8)
+    assert found.converged.tolist() == [True, both] and found.z[0] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "apart, higher, which, near",
+    [(1.99, -1.0, 0, True), (2.01, -1.0, 0, False), (1.99, 1e-9, 0, False), (1.99, -1.0, 1, False)],
+)
+def test_a_place_is_near_an_end_within_two_standard_deviations_and_below_it(apart, higher, which, near):
+    end = modes.Optimum(np.array([[1.0, 2.0]]), np.array([5.0]), np.diag([4.0, 1.0])[None], np.ones(1, bool))
+    ends = modes._Ends.of([end], 2)
+    for place in ([1.0 + 0.5 * apart, 2.0], [1.0, 2.0 - apart]):
+        assert ends.near(np.array([which]), np.array([place]), np.array([5.0 + higher]))[0] == near
+
+
+def test_searches_side_by_side_find_what_each_finds_alone():
+    """Of two sets of readings, one of them without a hold."""
+    target = simulated()
+    [measured] = [s.readings for s in target.problem.samples]
+    readings = np.repeat(measured, 2, axis=2)
+    readings[4, :, 1] = np.nan
+    together = modes.searches(target, np.random.default_rng(0), 2, [readings])
+    for i, found in enumerate(together):
+        density, residuals = target.rowwise([readings[..., [i]]])
+        alone = climb(density, found.modes.z[:1], residuals)
+        assert found.modes.log_density[0] == pytest.approx(alone.log_density[0], abs=1e-4)
+        other = modes.searches(target, np.random.default_rng(1), 1, [readings[..., [i]]])[0].modes
+        assert other.log_density[0] == pytest.approx(found.modes.log_density[0], abs=1e-3)
+    assert together[1].modes.log_density[0] != pytest.approx(together[0].modes.log_density[0], abs=0.1)

@@ -17,6 +17,7 @@ from tests.model.dense import (
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import named
 from wirebayes.model import likelihoods
+from wirebayes.wire import compiled
 from wirebayes.wire.staircase import Model, linearise, simulate
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
@@ -308,3 +309,26 @@ def test_a_hold_of_one_reading_says_nothing_of_itself_beside_others():
     y = measured(p, theta | {"setting_sd": 0.0})
     found = by_hold(p, theta, y)
     assert found[0] != 0.0 and found[1] == 0.0
+
+
+@pytest.mark.parametrize("kernel", [compiled.kernel, None], ids=["compiled", "numpy"])
+@pytest.mark.parametrize("hold", [0, 3, 5])
+def test_a_hold_whose_readings_are_nan_is_one_without_readings(kernel, hold, monkeypatch):
+    """In the rows where they are; other rows of the same batch see it."""
+    monkeypatch.setattr(compiled, "kernel", kernel)
+    theta = PLAIN | ERRORS
+    y = measured(LOADING, theta)
+    line = linearise(LOADING, {name: np.repeat(value, 2) for name, value in columns(theta).items()})
+    noise = np.full(2, theta["sensor_sd"] ** 2), np.full(2, theta["setting_sd"])
+    readings = np.repeat(y[..., None], 2, axis=2)
+    readings[hold, :, 1] = np.nan
+    masks = LOADING.mask, LOADING.mask & (np.arange(6) != hold)[:, None]
+    found = likelihoods.chain(line, readings, LOADING.mask, *noise)
+    value, residuals = likelihoods.standardised(line, readings, LOADING.mask, *noise)
+    for row, mask in enumerate(masks):
+        expected = likelihoods.chain(line, y[..., None], mask, *noise)
+        for name in ("log_likelihood", "carried_mean", "carried_var"):
+            assert getattr(found, name)[:, row] == pytest.approx(getattr(expected, name)[:, row], rel=1e-12)
+        log_likelihood, rest = likelihoods.standardised(line, y[..., None], mask, *noise)
+        assert value[row] == pytest.approx(log_likelihood[row], rel=1e-12)
+        assert (residuals[:, row] ** 2).sum() == pytest.approx((rest[:, row] ** 2).sum(), rel=1e-12)

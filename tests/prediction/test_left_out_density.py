@@ -1,7 +1,9 @@
 """Densities of holds from ratios of integrals: which posteriors are meant, and that their integrals are right."""
 
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -104,7 +106,8 @@ def by_themselves(monkeypatch: pytest.MonkeyPatch, converged: bool = True) -> li
         # the full one's integral is 2 pi, as it is there
         return SimpleNamespace(log_evidence=np.log(2.0 * np.pi) - Normals.elpd[hold], converged=converged)
 
-    monkeypatch.setattr(module, "search", lambda left, rng: SimpleNamespace(modes=None))
+    monkeypatch.setattr(module, "searches", lambda target, rng, n, readings: [SimpleNamespace(modes=None)] * n)
+    monkeypatch.setattr(module, "without_holds", lambda problem, holds: None)
     monkeypatch.setattr(importance, "widened", lambda modes: None)
     monkeypatch.setattr(module, "overlooked", lambda *given: 0.0)
     monkeypatch.setattr(module, "without_hold", lambda problem, sample, hold: hold)
@@ -202,3 +205,22 @@ def test_a_hold_that_is_apart_agrees_with_thermodynamic_integration(effects: tup
     print(f"log density of the hold: {expected:.2f} by integration, {np.round(found, 2).tolist()} found")
     # draws of both ways know the density to some 0.15
     assert np.mean(found) == pytest.approx(expected, abs=0.3)
+
+
+@pytest.mark.parametrize("likelihood", ["chain", "hold"])
+def test_searches_see_all_holds_but_one(likelihood: Literal["chain", "hold"]) -> None:
+    """The density that each climbs is that of the problem without the readings of its hold, and so are residuals."""
+    problem, holds = build(experiments()[:2], likelihood=likelihood), [(0, 3), (1, 0), (1, 9)]
+    target = LogPosterior(problem)
+    density, residuals = target.rowwise(module.without_holds(problem, holds))
+    z = target.coordinates.to_sampled(problem.prior.rvs(5, np.random.default_rng(0)))
+    for m, (s, j) in enumerate(holds):
+        left = copy(target)
+        left.problem = module.without_hold(problem, s, j)
+        rows = np.full(len(z), m)
+        value, every = residuals(z, rows)
+        assert density(z, rows) == pytest.approx(left(z), rel=1e-12) and value == pytest.approx(left(z), rel=1e-12)
+        # residuals of the hold that is not seen are there, and nothing
+        other = left.standardised(z)[1]
+        assert every[np.abs(every).max(axis=1) > 0] == pytest.approx(other[np.abs(other).max(axis=1) > 0], rel=1e-12)
+    assert not np.allclose(density(z, np.zeros(5, int)), density(z, np.ones(5, int)))

@@ -6,6 +6,7 @@ Every row is an optimisation of its own; rows may also have their own readings (
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,10 @@ class Optimum:
     curvature: Array
     converged: NDArray[np.bool_]
 
+    def rows(self, which: Any) -> "Optimum":
+        """Some of them, by number or mask."""
+        return Optimum(self.z[which], self.log_density[which], self.curvature[which], self.converged[which])
+
     @property
     def covariance(self) -> Array:
         """(n, d, d) covariance of the normal approximation."""
@@ -93,8 +98,60 @@ class _Local:
     curvature: Array
 
 
-def _nowhere(z: Array) -> NDArray[np.bool_]:
-    return np.zeros(len(z), bool)
+@dataclass(frozen=True)
+class _Ends:
+    """Where climbs of several densities have ended: which density (k,), place (k, d), value (k,), and curvature there.
+
+    The curvature is the square of `root` (k, d, d), from the left.
+    """
+
+    which: NDArray[np.int64]
+    z: Array
+    value: Array
+    root: Array
+
+    @classmethod
+    def of(cls, known: Sequence[Optimum], d: int) -> "_Ends":
+        out = cls(np.zeros(0, np.int64), np.zeros((0, d)), np.zeros(0), np.zeros((0, d, d)))
+        for which, found in enumerate(known):
+            eigen, vectors = _positive(found.curvature)
+            for i in range(len(found.z)):
+                out = out.joined(which, found.z[i], found.log_density[i], eigen[i], vectors[i])
+        return out
+
+    def joined(self, which: int, z: Array, value: float, eigen: Array, vectors: Array) -> "_Ends":
+        """With one more, if it is not near any.
+
+        Parameters
+        ----------
+        which : int
+            Its density.
+        z : (d,) array
+        value : float
+        eigen, vectors : (d,) and (d, d) arrays
+            Of the curvature.
+        """
+        if self.near(np.array([which]), z[None], np.array([value]))[0]:
+            return self
+        root = (vectors * np.sqrt(eigen)).T
+        return _Ends(
+            np.append(self.which, which), np.vstack([self.z, z]), np.append(self.value, value),
+            np.concatenate([self.root, root[None]]),
+        )  # fmt: skip
+
+    def near(self, which: NDArray[np.int64], z: Array, value: Array) -> NDArray[np.bool_]:
+        """(n,) whether places would count as one of these modes of their density; never where they are higher.
+
+        Parameters
+        ----------
+        which : (n,) int array
+            Their densities.
+        z : (n, d) array
+        value : (n,) array
+        """
+        apart = np.einsum("kij,nkj->nki", self.root, z[:, None] - self.z)
+        near = (apart**2).sum(axis=2) <= _ONE_MODE
+        return np.asarray((near & (self.which == which[:, None]) & (value[:, None] <= self.value)).any(axis=1))
 
 
 def climb(
@@ -104,7 +161,8 @@ def climb(
     *,
     iterations: int = 60,
     tolerance: float = 1e-5,
-    until: Callable[[Array], NDArray[np.bool_]] = _nowhere,
+    of: NDArray[np.int64] | None = None,
+    known: Sequence[Optimum] = (),
     reach: float = np.inf,
     curvature_at_end: bool = True,
 ) -> Optimum:
@@ -125,10 +183,14 @@ def climb(
     iterations : int
     tolerance : float
         Stop a row when half its squared Newton decrement is below this.
-    until : function of (m, d) points to (m,) bool
-        Give up the rows, after a step, for which it says so; their log density becomes -inf.
+    of : (n,) int array, optional
+        Which of several densities each row climbs. Given up, after a step, are then the rows that come so near to where
+        another row of the same density has ended that they would count as that mode; their log density becomes -inf.
+    known : sequence of Optimum
+        Modes of each of those densities that are known before: they are ends, too.
     reach : float
-        Give up, likewise, the rows that are lower than the best by more than this and ten times what they may gain.
+        Give up, likewise, the rows that are lower than the best by more than this and ten times what they may gain;
+        than the best of their density, if there are several.
     curvature_at_end : bool
         Where only the places matter, the curvature may stay that of the last step: the Hessian takes d² evaluations.
 
@@ -138,6 +200,8 @@ def climb(
     """
     n, d = start.shape
     look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
+    group = np.zeros(n, np.int64) if of is None else of
+    ends = _Ends.of(known, d)
     z, value = start.copy(), np.full(n, -np.inf)
     slope, eigen, vectors = np.zeros((n, d)), np.full((n, d), _NARROW**-2), np.tile(np.eye(d), (n, 1, 1))
     # Where to look next: at the end of a step, in the hope that it is taken, or, after another one, at `z`.
@@ -147,21 +211,18 @@ def climb(
         rows = np.flatnonzero(~done)
         if not len(rows):
             break
-        local = look(ahead[rows], rows, _composed(eigen[rows], vectors[rows]))
+        local = look(ahead[rows], rows, np.einsum("nij,nj->ni", vectors[rows] ** 2, eigen[rows]))
         least = np.where(arrived[rows], -np.inf, value[rows] + _ENOUGH * promised[rows])
         kept = np.isfinite(local.value) & (local.value > least)
         done[rows[arrived[rows] & ~kept]] = True
         failed = rows[~kept & ~arrived[rows]]
         if len(failed):
-            steps = _step(slope[failed], eigen[failed], vectors[failed], _DAMPINGS)
-            trial = z[failed, None] + steps
-            tried = density(trial.reshape(-1, d), np.repeat(failed, len(_DAMPINGS))).reshape(len(failed), -1)
-            best = np.argmax(tried, axis=1)
-            better = np.take_along_axis(tried, best[:, None], axis=1)[:, 0] > value[failed]
+            trial, tried, by = _damped(density, z[failed], failed, slope[failed], eigen[failed], vectors[failed])
+            better = tried > value[failed]
             done[failed] = ~better
-            moved, by = failed[better], best[better]
-            z[moved], value[moved] = trial[better, by], tried[better, by]
-            ahead[moved], arrived[moved], damping[moved] = z[moved], True, _DAMPINGS[by]
+            moved = failed[better]
+            z[moved], value[moved], damping[moved] = trial[better], tried[better], by[better]
+            ahead[moved], arrived[moved] = z[moved], True
         here = rows[kept]
         z[here], value[here] = ahead[here], local.value[kept]
         eigen[here], vectors[here] = _positive(local.curvature[kept])
@@ -173,11 +234,22 @@ def climb(
         ahead[here] = z[here] + _step(slope[here], eigen[here], vectors[here], damping[here, None])[:, 0]
         arrived[here] = False
         left = rows[~done[rows]]
-        hopeless = value[left] + _PATIENCE * promised[left] < value.max() - reach
-        left = left[hopeless | until(z[left])]
+        hopeless = value[left] + _PATIENCE * promised[left] < _best(value, group)[left] - reach
+        if of is not None:
+            for i in sorted(here[converged[here]], key=lambda i: -value[i]):
+                ends = ends.joined(of[i], z[i], value[i], eigen[i], vectors[i])
+            hopeless |= ends.near(of[left], z[left], value[left])
+        left = left[hopeless]
         done[left], value[left] = True, -np.inf
     found = Optimum(z, value, _composed(eigen, vectors), converged)
     return _curved(density, found, np.arange(n)) if curvature_at_end else found
+
+
+def _best(value: Array, group: NDArray[np.int64]) -> Array:
+    """(n,) the greatest of the values (n,) in each one's group (n,)."""
+    best = np.full(group.max(initial=0) + 1, -np.inf)
+    np.maximum.at(best, group, value)
+    return best[group]
 
 
 def _curved(density: Density, found: Optimum, which: NDArray[np.int64]) -> Optimum:
@@ -186,9 +258,21 @@ def _curved(density: Density, found: Optimum, which: NDArray[np.int64]) -> Optim
     if not len(rows):
         return found
     z, value, curvature = found.z[rows], found.log_density[rows], found.curvature.copy()
-    _, hessian = _derivatives(density, z, which[rows], value, _steps(curvature[rows]), sides=2)
+    bend = np.einsum("nii->ni", curvature[rows])
+    _, hessian = _derivatives(density, z, which[rows], value, _steps(bend), sides=2)
     curvature[rows] = _composed(*_positive(-hessian))
     return replace(found, curvature=curvature)
+
+
+def _damped(
+    density: Density, z: Array, rows: NDArray[np.int64], slope: Array, eigen: Array, vectors: Array
+) -> tuple[Array, Array, Array]:
+    """Places (n, d) to which the best of several damped steps leads, the density there, and the dampings (n,)."""
+    trial = z[:, None] + _step(slope, eigen, vectors, _DAMPINGS)
+    tried = density(trial.reshape(-1, z.shape[1]), np.repeat(rows, len(_DAMPINGS))).reshape(len(z), -1)
+    best = np.argmax(tried, axis=1)
+    i = np.arange(len(z))
+    return trial[i, best], tried[i, best], _DAMPINGS[best]
 
 
 def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:
@@ -210,7 +294,7 @@ def _positive(matrices: Array) -> tuple[Array, Array]:
     return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
 
 
-def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], before: Array) -> _Local:
+def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], bend: Array) -> _Local:
     """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
     n, d = z.shape
     points = z[:, None] + np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
@@ -225,21 +309,21 @@ def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], befor
     return _Local(values[:, 0], np.where(np.isfinite(gradient), gradient, 0.0), curvature)
 
 
-def _by_differences(density: Density, z: Array, rows: NDArray[np.int64], before: Array) -> _Local:
-    """Curvature and gradient from differences of values alone, as far apart as the curvature `before` suggests."""
+def _by_differences(density: Density, z: Array, rows: NDArray[np.int64], bend: Array) -> _Local:
+    """Curvature and gradient from differences of values alone, as far apart as the curvature's diagonal suggests."""
     value = density(z, rows)
     inside = np.isfinite(value)
-    gradient, hessian = np.zeros(z.shape), np.broadcast_to(np.eye(z.shape[1]), before.shape).copy()
+    gradient, hessian = np.zeros(z.shape), np.tile(np.eye(z.shape[1]), (len(z), 1, 1))
     if inside.any():
         gradient[inside], hessian[inside] = _derivatives(
-            density, z[inside], rows[inside], value[inside], _steps(before[inside]), sides=1
+            density, z[inside], rows[inside], value[inside], _steps(bend[inside]), sides=1
         )
     return _Local(value, gradient, -hessian)
 
 
-def _steps(curvature: Array) -> Array:
-    """(n, d) steps of differences: a tenth of a standard deviation, as curvatures (n, d, d) say."""
-    return np.clip(0.1 / np.sqrt(np.maximum(np.einsum("nii->ni", curvature), 1.0)), 1e-6, 0.05)
+def _steps(bend: Array) -> Array:
+    """(n, d) steps of differences: a tenth of a standard deviation, as the diagonals (n, d) of curvatures say."""
+    return np.clip(0.1 / np.sqrt(np.maximum(bend, 1.0)), 1e-6, 0.05)
 
 
 def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array, sides: int) -> tuple[Array, Array]:
@@ -315,7 +399,7 @@ def search(
     noise explain the residuals. Meanwhile
     prior draws are annealed to the posterior. Some climbs begin at places they passed, the highest one and some far
     from one another: where annealing ends, a mode of less weight may have died out. Others, later, begin at passed
-    places that belong to the hill of no mode found so far. Such a climb is given up where it comes so near to a known
+    places that belong to the hill of no mode found so far. A climb is given up where it comes so near to a known
     mode that it would count as that one. Where they find several modes, more are looked for in the same way.
 
     Parameters
@@ -329,36 +413,65 @@ def search(
     extra : (m, d) array, optional
         Further starts, in sampled coordinates.
     """
-    z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
-    value = target(z)
-    passed, height = _cooled(target, z, value, rng)
-    warm, cold, cold_height = passed[-_WARM_STEPS * draws :], passed[-draws:], height[-draws:]
-    density, residuals = target.rowwise()
+    return searches(target, rng, 1, draws=draws, starts=starts, extra=extra)[0]
 
-    def climbed(start: Array, until: Callable[[Array], NDArray[np.bool_]] = _nowhere) -> Optimum:
-        found = distinct([climb(density, start, residuals, until=until, reach=_REACH, curvature_at_end=False)])
-        return _curved(density, found, np.zeros(len(found.z), np.int64))
 
-    possible = z[np.isfinite(value)] if np.isfinite(value).any() else z
-    width = passed.std(axis=0)
-    apart = spread_rows(passed / np.where(width > 0, width, 1.0), starts, rng)
-    begin = [_with_ratios(target, _spread(target, possible, starts, rng)), passed[[int(np.argmax(height)), *apart]]]
-    found = climbed(np.vstack(begin if extra is None else [*begin, extra]))
-    looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
-    passed, height = passed[looked], height[looked]
+def searches(
+    target: LogPosterior,
+    rng: np.random.Generator,
+    n: int,
+    readings: Sequence[Array] | None = None,
+    *,
+    draws: int = 400,
+    starts: int = 9,
+    extra: Array | None = None,
+) -> list[Search]:
+    """Several searches side by side, independent of each other, whose climbs are evaluated together.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    rng : numpy Generator
+    n : int
+        How many.
+    readings : sequence of (H, R, n) arrays, optional
+        What each search sees in place of the measured readings, a sample each; NaN in a hold that it does not see.
+    draws, starts, extra
+        As for `search`, for each.
+    """
+    density, residuals = target.rowwise(readings)
+
+    def climbed(begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
+        of = np.repeat(np.arange(n), [len(b) for b in begin])
+        end = climb(
+            lambda z, rows: density(z, of[rows]), np.vstack(begin),
+            None if residuals is None else lambda z, rows: residuals(z, of[rows]),
+            of=of, known=before, reach=_REACH, curvature_at_end=False,
+        )  # fmt: skip
+        found = [distinct([end.rows(of == i)]) for i in range(n)]
+        of = np.repeat(np.arange(n), [len(f.z) for f in found])
+        every = _curved(density, _together(found), of)
+        return [every.rows(of == i) for i in range(n)]
+
+    def one(i: int) -> Callable[[Array], Array]:
+        return lambda z: density(z, np.full(len(z), i))
+
+    ways = [_Way.annealed(target, one(i), draws, starts, rng) for i in range(n)]
+    led = _with_ratios(target, density, residuals, [way.prior for way in ways])
+    begin = [np.vstack([a, way.starts, *([] if extra is None else [extra])]) for a, way in zip(led, ways, strict=True)]
+    found = climbed(begin, [])
+    looking = list(range(n))
+    most = max(starts // 2, 1)
     for _ in range(_LOOKS):
-        sag = _sag(target, passed, height, found)
-        strange = np.flatnonzero(sag > _LEAST_SAG)
-        if not len(strange):
+        pairs = enumerate(zip(ways, found, strict=True))
+        begin = [way.strange(f, most, rng) if i in looking else way.passed[:0] for i, (way, f) in pairs]
+        if not any(len(b) for b in begin):
             break
-        share = sag[strange] / sag[strange].sum()
-        chosen = rng.choice(strange, min(len(strange), max(starts // 2, 1)), replace=False, p=share)
-        before = len(found.z)
-        near = partial(_near, modes=found.z, curvature=found.curvature)
-        found = distinct([found, climbed(passed[chosen], near)])
-        if len(found.z) < before + _MANY:
-            break
-    return Search(found, warm, cold, cold_height)
+        more = climbed(begin, found)
+        joined = [distinct([old, new]) for old, new in zip(found, more, strict=True)]
+        looking = [i for i in looking if len(joined[i].z) >= len(found[i].z) + _MANY]
+        found = joined
+    return [Search(f, way.warm, way.cold, way.height) for f, way in zip(found, ways, strict=True)]
 
 
 def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) -> Array:
@@ -371,8 +484,10 @@ def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) ->
     return np.asarray(z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)])
 
 
-def _with_ratios(target: LogPosterior, start: Array) -> Array:
-    """Starts (n, d) led uphill for some steps, each with one of several ratios of the noises kept.
+def _with_ratios(
+    target: LogPosterior, density: Density, residuals: Residuals, start: Sequence[Array]
+) -> Sequence[Array]:
+    """Starts (m, d) of several searches led uphill for some steps, each with one of several ratios of the noises kept.
 
     Above all, what explains the residuals, setting errors or the sensor's noise, decides at which of several modes a
     climb ends. Whatever they were, both grow at first from a start that fits badly, and the wire's parameters follow
@@ -381,11 +496,15 @@ def _with_ratios(target: LogPosterior, start: Array) -> Array:
     Parameters
     ----------
     target : LogPosterior
-    start : (n, d) array
+    density, residuals : functions
+        Of points and the number of the search.
+    start : sequence of (m, d) arrays
     """
-    pairs, ratio = target.coordinates.noises, np.resize(_RATIOS, len(start))
+    pairs, sizes = target.coordinates.noises, [len(s) for s in start]
     if not pairs:
         return start
+    of = np.repeat(np.arange(len(start)), sizes)
+    ratio = np.concatenate([np.resize(_RATIOS, size) for size in sizes])
 
     def kept(z: Array, rows: Array) -> Array:
         z = z.copy()
@@ -393,15 +512,85 @@ def _with_ratios(target: LogPosterior, start: Array) -> Array:
             z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
         return z
 
-    density, residuals = target.rowwise()
     found = climb(
-        lambda z, rows: density(kept(z, rows), rows), start, lambda z, rows: residuals(kept(z, rows), rows),
+        lambda z, rows: density(kept(z, rows), of[rows]), np.vstack(start),
+        lambda z, rows: residuals(kept(z, rows), of[rows]),
         iterations=_LED, tolerance=_LED_TO, curvature_at_end=False,
     )  # fmt: skip
-    return kept(found.z, np.arange(len(start)))
+    return np.split(kept(found.z, np.arange(len(of))), np.cumsum(sizes)[:-1])
 
 
-def _sag(target: LogPosterior, z: Array, height: Array, found: Optimum) -> Array:
+@dataclass(frozen=True)
+class _Way:
+    """What one search passed while prior draws were annealed, and where its climbs begin.
+
+    Attributes
+    ----------
+    density : function of (m, d) points to (m,) values
+    prior, starts : (m, d) arrays
+        Prior draws, and places passed: the highest, and some far from one another.
+    warm, cold, height
+        See `Search`.
+    passed, passed_height : (m, d) and (m,) arrays
+        Some places, at which it is tested whether a mode explains them.
+    """
+
+    density: Callable[[Array], Array]
+    prior: Array
+    starts: Array
+    warm: Array
+    cold: Array
+    height: Array
+    passed: Array
+    passed_height: Array
+
+    @classmethod
+    def annealed(
+        cls, target: LogPosterior, density: Callable[[Array], Array], draws: int, starts: int, rng: np.random.Generator
+    ) -> "_Way":
+        """Anneal prior draws.
+
+        Parameters
+        ----------
+        target : LogPosterior
+        density : function of (m, d) points to (m,) values
+        draws : int
+        starts : int
+            Of climbs from prior draws.
+        rng : numpy Generator
+        """
+        z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
+        value = density(z)
+        passed, height = _cooled(density, z, value, rng)
+        possible = z[np.isfinite(value)] if np.isfinite(value).any() else z
+        width = passed.std(axis=0)
+        apart = spread_rows(passed / np.where(width > 0, width, 1.0), starts, rng)
+        prior, highest = _spread(target, possible, starts, rng), int(np.argmax(height))
+        looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
+        return cls(
+            density, prior, passed[[highest, *apart]], passed[-_WARM_STEPS * draws :], passed[-draws:],
+            height[-draws:], passed[looked], height[looked],
+        )  # fmt: skip
+
+    def strange(self, found: Optimum, most: int, rng: np.random.Generator) -> Array:
+        """(m, d) places passed that belong to the hill of no mode found so far.
+
+        Parameters
+        ----------
+        found : Optimum
+        most : int
+            How many at most.
+        rng : numpy Generator
+        """
+        sag = _sag(self.density, self.passed, self.passed_height, found)
+        strange = np.flatnonzero(sag > _LEAST_SAG)
+        if not len(strange):
+            return self.passed[:0]
+        share = sag[strange] / sag[strange].sum()
+        return np.asarray(self.passed[rng.choice(strange, min(len(strange), most), replace=False, p=share)])
+
+
+def _sag(density: Callable[[Array], Array], z: Array, height: Array, found: Optimum) -> Array:
     """(n,) how far the density between (n, d) places and a mode seen from there lies below the straight line.
 
     Within one hill it lies above. The best mode is tried first, the others where none before was visible.
@@ -411,7 +600,7 @@ def _sag(target: LogPosterior, z: Array, height: Array, found: Optimum) -> Array
         unseen = np.flatnonzero(least > _LEAST_SAG)
         between = z[unseen, None] + _ON_THE_WAY[:, None] * (mode - z[unseen])[:, None]
         line = height[unseen, None] + _ON_THE_WAY * (top - height[unseen])[:, None]
-        sag = (line - target(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1)
+        sag = (line - density(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1)
         least[unseen] = np.minimum(least[unseen], sag)
     return least
 
@@ -428,7 +617,7 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
     -------
     Optimum
     """
-    every = Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
+    every = _together(found)
     order = np.argsort(-every.log_density)
     keep: list[int] = []
     for i in order:
@@ -436,7 +625,11 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
             continue
         if not _near(every.z[[i]], every.z[keep], every.curvature[keep])[0]:
             keep.append(int(i))
-    return Optimum(every.z[keep], every.log_density[keep], every.curvature[keep], every.converged[keep])
+    return every.rows(keep)
+
+
+def _together(found: Sequence[Optimum]) -> Optimum:
+    return Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
 
 
 def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
@@ -445,7 +638,7 @@ def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
     return np.asarray((np.einsum("nki,kij,nkj->nk", apart, curvature, apart) <= _ONE_MODE).any(axis=1))
 
 
-def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _cooled(density: Callable[[Array], Array], z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Places (n, d) and their log densities (n,), from the density to powers that grow from 0 to 1, all together.
 
     Each step of the power leaves a fifth of the rows effective and moves them by differential evolution: near enough to
@@ -462,7 +655,7 @@ def _cooled(target: LogPosterior, z: Array, value: Array, rng: np.random.Generat
         z, value = z[kept], value[kept]
         one, other = rng.integers(m, size=(2, m))
         moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)
-        tried = target(moved)
+        tried = density(moved)
         taken = np.log(rng.uniform(size=m)) < power * (tried - value)
         z = np.where(taken[:, None], moved, z)
         value = np.where(taken, tried, value)

@@ -15,7 +15,7 @@ import numpy as np
 from wirebayes.inference import importance
 from wirebayes.inference.fit import Fit
 from wirebayes.inference.importance import Weighted, effective, tail
-from wirebayes.inference.modes import distinct, search
+from wirebayes.inference.modes import distinct, searches
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import LogPosterior
@@ -94,18 +94,18 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
     def density(z: Array) -> Array:
         return target(z)[:, None]
 
-    known = search(target, rng, starts=_STARTS).modes
+    known, others = (found.modes for found in searches(target, rng, 2, starts=_STARTS))
     nothing = known.z[:0]
-    for _ in range(_SEARCHES):
+    for attempt in range(_SEARCHES):
+        if attempt:
+            known, others = distinct([known, others]), searches(target, rng, 1, starts=_STARTS)[0].modes
         start = importance.widened(known)
         pool = importance.sample(density, start, nothing, target.coordinates.order, rng, ess)
         if not pool.settled[0]:
             break
-        others = search(target, rng, starts=_STARTS).modes
         share = overlooked(target, pool.proposal, pool.log_integral[0], importance.widened(others), rng)
         if share <= _NEXT_TO_NOTHING:
             return pool
-        known = distinct([known, others])
     return replace(pool, settled=np.zeros(1, bool))
 
 

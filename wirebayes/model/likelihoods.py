@@ -48,6 +48,7 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     ----------
     line : Linearised
     readings : (H, R, n) or (H, R, 1) array
+        NaN where a row does not see a hold: it is then as one without readings.
     mask : (H, R) bool array
     variance : (n,) array
         Of one reading, rounding included.
@@ -98,10 +99,11 @@ def standardised(
     for j in range(len(mask)):
         if mask[j].any():
             here = _hold(line, j, readings[j], mask[j], mean, var, noise)
+            read = noise.where_read(readings[j], mask[j])
             best = np.sqrt(var) * here.pull_c, np.sqrt(noise.setting_var) * here.pull_s
             known = var * here.cc, noise.setting_var * here.ss
-            log_sd = np.sqrt(len(here.left)) * noise.log_variance, *(np.log1p(k) for k in known)
-            out += [here.left * np.sqrt(noise.weight), *(b[None] for b in best), *(0.5 * s[None] for s in log_sd)]
+            log_sd = np.sqrt(len(here.left)) * read.log_variance, *(np.log1p(k) for k in known)
+            out += [here.left * np.sqrt(read.weight), *(b[None] for b in best), *(0.5 * s[None] for s in log_sd)]
             total, mean, var = total + here.log_density, here.mean, here.var
         else:
             mean, var = _unread(line, j, mean, var, noise)
@@ -154,6 +156,14 @@ class _Noise:
     def of(cls, variance: Array, setting_sd: Array) -> "_Noise":
         return cls(1.0 / variance, np.log(variance) + _LOG_2PI, setting_sd * setting_sd)
 
+    def where_read(self, readings: Array, mask: Array) -> "_Noise":
+        """The same, with readings (R, n) of a hold that are NaN as if their errors were without bound."""
+        unread = np.isnan(readings[int(np.argmax(mask))])
+        if not unread.any():
+            return self
+        weight, log_variance = (np.where(unread, 0.0, v) for v in (self.weight, self.log_variance))
+        return _Noise(weight, log_variance, self.setting_var)
+
 
 def _unread(line: Linearised, j: int, m: Array, p: Array, noise: _Noise) -> tuple[Array, Array]:
     """Mean and variance of the creep that a hold without readings carries on."""
@@ -180,10 +190,11 @@ class _Read(NamedTuple):
 
 def _hold(line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise) -> _Read:
     """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`."""
+    noise = noise.where_read(readings, mask)
     weight, setting_var = noise.weight, noise.setting_var
     keep = slice(None) if mask.all() else mask
     by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
-    r = readings[keep] - line.tension[j][keep] - by_c * m
+    r = np.where(weight > 0, readings[keep], 0.0) - line.tension[j][keep] - by_c * m
     cc, cs, ss, det, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, p, setting_var)
     cr = np.einsum("rn,rn->n", by_c, r) * weight
     sr = np.einsum("rn,rn->n", by_s, r) * weight

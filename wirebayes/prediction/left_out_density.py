@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference import importance
 from wirebayes.inference.fit import seed_of
-from wirebayes.inference.modes import search
+from wirebayes.inference.modes import searches
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior
 from wirebayes.model.problem import Problem
@@ -45,11 +45,13 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     z = target.coordinates.to_sampled(draws)
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
     elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
-    for m in np.flatnonzero(settled).tolist():
+    told = np.flatnonzero(settled).tolist()
+    further = searches(target, rng, len(told), without_holds(problem, [holds[m] for m in told])) if told else []
+    for m, found in zip(told, further, strict=True):
         left = copy(target)  # in the same coordinates, under the same prior
         left.problem = without_hold(problem, *holds[m])
         log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
-        others = importance.widened(search(left, rng).modes)
+        others = importance.widened(found.modes)
         settled[m] = overlooked(left, pool.proposal, log_integral, others, rng) <= _MISSED
     for m in np.flatnonzero(~settled).tolist():
         s, j = holds[m]
@@ -80,6 +82,20 @@ def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
     mask[hold] = False
     kept = replace(here, protocol=replace(here.protocol, mask=mask))
     return replace(problem, samples=(*problem.samples[:sample], kept, *problem.samples[sample + 1 :]))
+
+
+def without_holds(problem: Problem, holds: Holds) -> list[Array]:
+    """Readings (H, R, m) of each sample, those of one of m holds NaN in each column, N.
+
+    Parameters
+    ----------
+    problem : Problem
+    holds : list of (sample, row of its protocol)
+    """
+    out = [np.repeat(sample.readings, len(holds), axis=2) for sample in problem.samples]
+    for m, (s, j) in enumerate(holds):
+        out[s][j, :, m] = np.nan
+    return out
 
 
 def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:

@@ -5,7 +5,7 @@ The twin of `wirebayes.wire.staircase` and of `wirebayes.model.likelihoods`, whi
 the reference, and compute what has no formula here. `wirebayes.wire.compiled` decides who computes.
 """
 
-from libc.math cimport exp, expm1, fabs, fmax, log, log1p, pow, sqrt
+from libc.math cimport exp, expm1, fabs, fmax, isnan, log, log1p, pow, sqrt
 
 import numpy as np
 
@@ -578,6 +578,7 @@ def chain(
     cdef double[:, ::1] out = density
     cdef double[:, :, ::1] mv = carried
     cdef unsigned char[::1] read = np.asarray(mask).any(axis=1).view(np.uint8)
+    cdef int[::1] first = np.asarray(mask).argmax(axis=1).astype(np.intc)
     cdef double[::1] left = np.empty(max(mask.shape[1], 1))
     cdef double weight, log_variance, q, a, c
     cdef Read found
@@ -585,7 +586,7 @@ def chain(
         weight, log_variance, q = 1.0 / variance[i], log(variance[i]) + LOG_2PI, setting_sd[i] * setting_sd[i]
         for j in range(holds):
             a, c = carry_by_creep[j, i], carry_by_setting[j, i]
-            if read[j]:
+            if read[j] and not isnan(readings[j, first[j], i]):
                 found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, mv[0, j, i], mv[1, j, i],
                                   weight, log_variance, q, &left[0])
                 out[j, i], mv[0, j + 1, i], mv[1, j + 1, i] = found.log_density, found.mean, found.var
@@ -605,7 +606,7 @@ def standardised(
     cdef Py_ssize_t n = variance.shape[0], i
     taken = np.asarray(mask).sum(axis=1).astype(np.intc)
     total, residuals = np.zeros(n), np.empty((taken.sum() + 5 * np.count_nonzero(taken), n))
-    cdef int[::1] counts = taken
+    cdef int[::1] counts = taken, first = np.asarray(mask).argmax(axis=1).astype(np.intc)
     cdef double[::1] value = total, left = np.empty(max(mask.shape[1], 1))
     cdef double[:, ::1] out = residuals
     cdef double weight, log_variance, q, a, c, m, p, scale, setting_sd_i
@@ -615,7 +616,10 @@ def standardised(
         q, scale, m, p, row = setting_sd_i * setting_sd_i, sqrt(weight), 0.0, 0.0, 0
         for j in range(holds):
             a, c, count = carry_by_creep[j, i], carry_by_setting[j, i], counts[j]
-            if not count:
+            if not count or isnan(readings[j, first[j], i]):
+                for r in range(count + 5 if count else 0):
+                    out[row + r, i] = 0.0
+                row += count + 5 if count else 0
                 m, p = a * m, a * a * p + c * c * q
                 continue
             found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, m, p, weight, log_variance, q,

@@ -181,22 +181,6 @@ def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
     assert state.learned.proposal.shares == proposal.SHARES
 
 
-def test_a_climb_is_given_up_on_the_way_and_no_other_with_it():
-    evaluated = []
-
-    def density(z, rows):
-        evaluated.append(len(z))
-        return -0.5 * (z**2).sum(axis=1) ** 2
-
-    start = np.array([[3.0, 3.0], [-3.0, 3.0]])
-    whole = modes.climb(density, start)
-    whole_cost, evaluated = sum(evaluated), []
-    left = modes.climb(density, start, until=lambda z: z[:, 0] < 0.0)
-    assert np.isinf(left.log_density).tolist() == [False, True]
-    assert left.z[0] == pytest.approx(whole.z[0]) and left.converged.tolist() == [True, False]
-    assert sum(evaluated) < 0.7 * whole_cost
-
-
 def test_degrees_of_freedom_reach_the_density():
     x = np.array([[3.0], [0.5]])
     light = mixture.Mixture(np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1)), 40.0)
