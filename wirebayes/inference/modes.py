@@ -42,7 +42,7 @@ _RANKS = np.array(
     [[0.1, 0.1], [0.1, 0.9], [0.1, 0.5], [0.9, 0.9], [0.9, 0.5], [0.9, 0.1], [0.5, 0.5], [0.5, 0.1], [0.5, 0.9]]
 )
 _WITHIN = 0.1  # added to these, at most
-_LED, _LED_TO = 20, 0.1  # steps, at most, with a ratio kept, and the gain in nats that ends them
+_LED, _LED_TO = 12, 0.1  # steps, at most, with a ratio kept, and the gain in nats that ends them
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
 
