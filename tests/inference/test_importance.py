@@ -93,11 +93,11 @@ def test_the_first_density_is_not_given_up() -> None:
     assert not pool(counted, 0, 0.0).settled[0] and len(few) == importance._ROUNDS + 1
 
 
-@pytest.mark.parametrize(("needed", "settled"), [(15_999, True), (16_001, False)])
-def test_too_many_draws_are_more_than_those_that_can_be_afforded(
+@pytest.mark.parametrize(("needed", "settled"), [(47_999, True), (48_001, False)])
+def test_a_density_that_seems_to_need_too_many_draws_is_given_up(
     needed: float, settled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The third density is good enough only after the rounds in which none is given up."""
+    """The third density is good enough only after the rounds in which none is given up, of 16,000 draws at most."""
     drawn: list[int] = []
     true = importance.effective
 
@@ -113,7 +113,7 @@ def test_too_many_draws_are_more_than_those_that_can_be_afforded(
     monkeypatch.setattr(importance, "effective", found)
     monkeypatch.setattr(importance, "_PATIENCE", 2)
     assert pool(counted, 0, 0.0, 7.0).settled[2] == settled
-    assert importance._AFFORDABLE == 16_000 and (drawn[-1] > 6000) == settled
+    assert importance._WITHIN_REACH == 48_000 and drawn[-1] == (16_000 if settled else 4096)
 
 
 @pytest.mark.parametrize(("k", "settled"), [(0.69, True), (0.71, False), (np.nan, False)])

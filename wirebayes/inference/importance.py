@@ -170,7 +170,7 @@ def sample(
         needed = _RESERVE * n * ess / np.maximum(effective(fresh.log_weight), 1.0)
         wanted = ~settled
         if done >= _PATIENCE:
-            wanted[1:] &= needed[1:] <= _AFFORDABLE
+            wanted[1:] &= needed[1:] <= _WITHIN_REACH
         if done == _ROUNDS or not wanted.any():
             break
         wanted[0] = True  # without it, the others are ratios of nothing
@@ -305,5 +305,7 @@ _REMEMBERED = 0.25  # of what all draws are worth
 _LEARNED = 2500  # points that a proposal is learned from: it needs not be the best one
 _HOT = 0.4  # power of the densities that the wide parts of the proposal are fitted to
 _COMPONENTS = 8  # of the close part
+# draws that a density may seem to need, among others, for one more round to be worth while: rounds improve the proposal
+_WITHIN_REACH = 48_000
 _RESERVE = 1.3  # draws beyond those that seem to be enough
 _MOST_SHARE = 10.0  # of a density that is known worst, in shares of one that is known well enough
