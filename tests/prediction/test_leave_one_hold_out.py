@@ -42,8 +42,8 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     monkeypatch.setattr(module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, tail)))
     known = np.log(stats.hmean(np.exp(log_p), axis=1))  # weights 1/p: the harmonic mean
 
-    def ratios(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        assert holds == [(0, j) for j in range(4)] and len(draws) == 500
+    def ratios(problem: Problem, holds: list, draws: np.ndarray, seed: int, doubtful: np.ndarray) -> tuple:
+        assert holds == [(0, j) for j in range(4)] and len(draws) == 500 and doubtful.all()
         return np.array([1.0, 2.0, 3.0, 4.0]), np.array([True, True, False, True])
 
     def fit_without(problem: Problem, seed: int, policy: Policy, rough: np.ndarray) -> SimpleNamespace:
@@ -60,6 +60,26 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     assert list(found.refitted) == [sampled] * 4 and found.converged is (converging and shared > 10.0 or not sampled)
     assert fitted == [2] * sampled and shares == [0.0] * sampled + [1.0]
     assert found.elpd == pytest.approx([1.0, 2.0, 7.0 if shared > 10.0 else 3.0, 4.0] if sampled else known)
+
+
+def test_where_one_hold_s_tail_is_heavy_all_are_sampled_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tails look light where no draw reaches what is likely only without a hold; a search asks of the heavy ones."""
+    problem, asked = build([experiments()[1].train(4)]), []
+    monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
+    tails = iter([0.1, 0.6, 0.2, 0.3])
+    monkeypatch.setattr(
+        module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, next(tails)))
+    )
+
+    def together(problem: Problem, holds: list, draws: np.ndarray, seed: int, doubtful: np.ndarray) -> tuple:
+        asked.append(doubtful.tolist())
+        return np.arange(4.0), np.ones(4, bool)
+
+    monkeypatch.setattr(module, "log_densities", together)
+    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    assert asked == [[False, True, False, False]] and found.elpd.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert found.refitted.all() and found.converged
 
 
 def test_weights_that_are_no_numbers_ask_for_sampling(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -222,7 +242,7 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
     monkeypatch.setattr(module, "log_mean", lambda low, high: (2.0, 1e3))
     asked: list[tuple[int, object]] = []
 
-    def together(problem: Problem, holds: list, draws: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    def together(problem: Problem, holds: list, draws: np.ndarray, seed: int, doubtful: np.ndarray) -> tuple:
         asked.append((seed, None))
         return np.zeros(4), np.ones(4, bool)
 

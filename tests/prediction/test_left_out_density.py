@@ -94,6 +94,7 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 DRAWS = np.random.default_rng(5).normal(size=(4000, 2))
+ALL = np.ones(3, bool)
 
 
 def by_themselves(monkeypatch: pytest.MonkeyPatch, converged: bool = True) -> list[int]:
@@ -120,9 +121,21 @@ def test_ratios_of_integrals_are_found_also_where_a_posterior_is_apart(
 ) -> None:
     """From one proposal, even one that is thirty standard deviations away."""
     asked = by_themselves(monkeypatch)
-    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, ALL[:3])  # type: ignore[arg-type]
     assert settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
     assert pools == [4] and not asked
+
+
+def test_no_search_bears_witness_where_nothing_is_doubtful(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = by_themselves(monkeypatch)
+    seen: list[int] = []
+    monkeypatch.setattr(
+        module, "searches", lambda target, rng, n, readings: seen.append(n) or [SimpleNamespace(modes=None)] * n
+    )
+    for doubtful in ([False, True, True], [False] * 3):
+        elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, np.array(doubtful))  # type: ignore[arg-type]
+        assert settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
+    assert seen == [2] and not asked
 
 
 @pytest.mark.parametrize(("share", "apart"), [(0.49, []), (0.51, [1])])
@@ -137,7 +150,7 @@ def test_what_a_further_search_contradicts_is_sampled_by_itself(
         return share if len(seen) == 2 else 0.0
 
     monkeypatch.setattr(module, "overlooked", overlooked)
-    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, ALL[:3])  # type: ignore[arg-type]
     assert asked == apart and settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
     assert seen == pytest.approx(np.log(2.0 * np.pi) - np.array(Normals.elpd), abs=0.15)
 
@@ -151,7 +164,7 @@ def test_what_is_given_up_is_sampled_by_itself(pools: list[int], monkeypatch: py
     monkeypatch.setattr(importance, "sample", given_up)
     for converged in (True, False):
         asked = by_themselves(monkeypatch, converged)
-        elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7)  # type: ignore[arg-type]
+        elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, ALL[:3])  # type: ignore[arg-type]
         assert asked == [1, 2] and settled.tolist() == [True, converged, converged]
         assert elpd == pytest.approx(Normals.elpd, abs=0.15)
 
@@ -160,7 +173,7 @@ def test_what_never_settles_is_said(pools: list[int], monkeypatch: pytest.Monkey
     monkeypatch.setattr(importance, "tail", lambda log_weight: 0.8)
     monkeypatch.setattr(importance, "_ROUNDS", 2)
     by_themselves(monkeypatch)  # without a full posterior, they are no help
-    elpd, settled = log_densities(Normals(), [(0, 0)], DRAWS, 7)  # type: ignore[arg-type]
+    elpd, settled = log_densities(Normals(), [(0, 0)], DRAWS, 7, ALL[:1])  # type: ignore[arg-type]
     assert not settled.any() and np.isfinite(elpd).all()
 
 

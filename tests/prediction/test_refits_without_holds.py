@@ -7,7 +7,7 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
+from wirebayes.prediction.leave_one_hold_out import LARGEST_K, smoothed_leave_one_hold_out
 from wirebayes.prediction.left_out_density import without_hold
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
@@ -24,10 +24,10 @@ def fitted() -> Fit:
 def test_importance_sampling_agrees_with_refitting_without_the_hold(fitted: Fit) -> None:
     fast = smoothed_leave_one_hold_out(fitted, policy=QUICK)
     exact = smoothed_leave_one_hold_out(fitted, policy=QUICK, exact=True)
-    assert exact.refitted.all() and not fast.refitted.all()
-    assert list(fast.hold) == list(range(1, 13))
-    easy = ~fast.refitted
-    # Monte-Carlo error of 500 effective draws at Pareto k up to 0.5
+    assert exact.refitted.all() and list(fast.hold) == list(range(1, 13))
+    easy = fast.pareto_k <= LARGEST_K
+    assert easy.any() and not easy.all() and fast.refitted.all()  # with one that is not, all are sampled together
+    # Monte-Carlo error of 400 effective draws, and of a bridge from 1,000
     assert np.abs(fast.elpd - exact.elpd)[easy].max() < 0.25
     # leaving a hold out costs: the density that has seen it is higher in sum
     recorded = fitted.problem.samples[0].protocol.recorded

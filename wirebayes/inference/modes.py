@@ -396,11 +396,11 @@ def search(
     """Look for the modes of a posterior: climbs from prior draws that differ in what decides where a climb ends.
 
     That is how fast the creep is, how much more it is under more tension, and whether setting errors or the sensor's
-    noise explain the residuals. Meanwhile
-    prior draws are annealed to the posterior. Some climbs begin at places they passed, the highest one and some far
-    from one another: where annealing ends, a mode of less weight may have died out. Others, later, begin at passed
-    places that belong to the hill of no mode found so far. A climb is given up where it comes so near to a known
-    mode that it would count as that one. Where they find several modes, more are looked for in the same way.
+    noise explain the residuals. Meanwhile prior draws are annealed to the posterior. Some climbs begin at places they
+    passed, the highest one and some far from one another: where annealing ends, a mode of less weight may have died
+    out. Others, later, begin at passed places that belong to the hill of no mode found so far. A climb is given up
+    where it comes so near to a known mode that it would count as that one. Where they find several modes, more are
+    looked for in the same way.
 
     Parameters
     ----------

@@ -3,8 +3,9 @@
 Leaving a hold out drops its readings, never its displacement and duration: the wire creeps there all the same. The
 posterior without a hold is obtained from the full one by Pareto-smoothed importance sampling with the ratios ``1 /
 p(readings of the hold | all other readings, parameters)``. Where the tail of the ratios is too heavy for some holds,
-their densities are ratios of integrals, found by importance sampling from a proposal that is learned for them
-(`wirebayes.prediction.left_out_density`). What is not settled then is left to walkers.
+densities are ratios of integrals, found by importance sampling from a proposal that is learned for all of them
+(`wirebayes.prediction.left_out_density`): also those of the other holds, for the tail looks light where no draw
+reaches what is likely only without a hold. What is not settled then is left to walkers.
 """
 
 from collections.abc import Callable
@@ -44,7 +45,7 @@ class LeftOut:
     elpd : (m,) array
         log p(readings of the hold | readings of all other holds).
     pareto_k : (m,) array
-        Of the importance ratios; above `LARGEST_K` they were not used.
+        Of the importance ratios; where any is above `LARGEST_K`, none were used.
     refitted : (m,) bool array
         Where the posterior without the hold was sampled, with those of other holds or by itself.
     converged : bool
@@ -125,12 +126,12 @@ def smoothed_leave_one_hold_out(
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
     # smoothing can fail where draws repeat, with a k that looks well
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True
-    poor = alone = np.flatnonzero(refitted).tolist()
-    if poor and not exact:
-        elpd[poor], settled = log_densities(problem, [where[i] for i in poor], theta, seed_of(seed, "left out"))
-        alone = [i for i, known in zip(poor, settled, strict=True) if not known]
-    for done, i in enumerate(alone):
-        progress(done / len(alone))
+    alone = refitted.copy()
+    if refitted.any() and not exact:
+        elpd, settled = log_densities(problem, where, theta, seed_of(seed, "left out"), refitted)
+        alone, refitted = ~settled, np.full(len(where), True)
+    for done, i in enumerate(np.flatnonzero(alone).tolist()):
+        progress(done / alone.sum())
         s, j = where[i]
         without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta)
         bridge, shared = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])

@@ -1,8 +1,9 @@
 """Log densities of holds given all others, as ratios of integrals: of the full posterior and of those without a hold.
 
 All are sampled by importance from one proposal (`wirebayes.inference.importance`). A search of its own bears witness
-against each of them, for one proposal may miss a mode that only the readings of a hold exclude. Posteriors without a
-hold that are far from the others, or that this search contradicts, are sampled by themselves.
+against those that draws of the full posterior do not settle, for one proposal may miss a mode that only the readings of
+a hold exclude. Posteriors without a hold that are far from the others, or that this search contradicts, are sampled by
+themselves.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,9 @@ from wirebayes.typing import Array
 Holds = list[tuple[int, int]]
 
 
-def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tuple[Array, NDArray[np.bool_]]:
+def log_densities(
+    problem: Problem, holds: Holds, draws: Array, seed: int, doubtful: NDArray[np.bool_]
+) -> tuple[Array, NDArray[np.bool_]]:
     """Log density of the readings of some holds, each given those of all other holds.
 
     Parameters
@@ -33,6 +36,8 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     draws : (n, d) array
         Natural parameters, of the full posterior.
     seed : int
+    doubtful : (m,) bool array
+        Which of them a search bears witness against: those that draws of the full posterior do not settle.
 
     Returns
     -------
@@ -45,7 +50,7 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int) -> tu
     z = target.coordinates.to_sampled(draws)
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
     elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
-    told = np.flatnonzero(settled).tolist()
+    told = np.flatnonzero(settled & doubtful).tolist()
     further = searches(target, rng, len(told), without_holds(problem, [holds[m] for m in told])) if told else []
     for m, found in zip(told, further, strict=True):
         left = copy(target)  # in the same coordinates, under the same prior
