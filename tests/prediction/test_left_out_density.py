@@ -101,11 +101,12 @@ def by_themselves(monkeypatch: pytest.MonkeyPatch, converged: bool = True) -> li
     """The holds whose posteriors without them are sampled by themselves, of `Normals`."""
     asked: list[int] = []
 
-    def alone(hold: int, seed: int, ess: float) -> SimpleNamespace:
-        asked.append(hold)
+    def alone(hold: int | Normals, seed: int, ess: float) -> SimpleNamespace:
+        asked.append(-1 if isinstance(hold, Normals) else hold)
         assert ess == 1000.0
+        left_out = 0.0 if isinstance(hold, Normals) else Normals.elpd[hold]
         # the full one's integral is 2 pi, as it is there
-        return SimpleNamespace(log_evidence=np.log(2.0 * np.pi) - Normals.elpd[hold], converged=converged)
+        return SimpleNamespace(log_evidence=np.log(2.0 * np.pi) - left_out, converged=converged)
 
     monkeypatch.setattr(module, "searches", lambda target, rng, n, readings: [SimpleNamespace(modes=None)] * n)
     monkeypatch.setattr(module, "without_holds", lambda problem, holds: None)
@@ -169,12 +170,18 @@ def test_what_is_given_up_is_sampled_by_itself(pools: list[int], monkeypatch: py
         assert elpd == pytest.approx(Normals.elpd, abs=0.15)
 
 
-def test_what_never_settles_is_said(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("converged", [True, False])
+def test_where_the_full_posterior_does_not_settle_it_is_sampled_by_itself(
+    converged: bool, pools: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the doubtful holds, and no others; if it does not converge, nothing is settled."""
     monkeypatch.setattr(importance, "tail", lambda log_weight: 0.8)
     monkeypatch.setattr(importance, "_ROUNDS", 2)
-    by_themselves(monkeypatch)  # without a full posterior, they are no help
-    elpd, settled = log_densities(Normals(), [(0, 0)], DRAWS, 7, ALL[:1])  # type: ignore[arg-type]
-    assert not settled.any() and np.isfinite(elpd).all()
+    asked = by_themselves(monkeypatch, converged)
+    doubtful = np.array([True, False, True])
+    elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, doubtful)  # type: ignore[arg-type]
+    assert asked == [-1, 0, 2] and settled.tolist() == [converged, False, converged]
+    assert elpd[doubtful] == pytest.approx(np.array(Normals.elpd)[doubtful])
 
 
 @dataclass(frozen=True)

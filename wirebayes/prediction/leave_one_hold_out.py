@@ -128,8 +128,9 @@ def smoothed_leave_one_hold_out(
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True
     alone = refitted.copy()
     if refitted.any() and not exact:
-        elpd, settled = log_densities(problem, where, theta, seed_of(seed, "left out"), refitted)
-        alone, refitted = ~settled, np.full(len(where), True)
+        found, settled = log_densities(problem, where, theta, seed_of(seed, "left out"), refitted)
+        elpd = np.where(settled | refitted, found, elpd)
+        alone, refitted = refitted & ~settled, refitted | settled
     for done, i in enumerate(np.flatnonzero(alone).tolist()):
         progress(done / alone.sum())
         s, j = where[i]

@@ -37,7 +37,8 @@ def log_densities(
         Natural parameters, of the full posterior.
     seed : int
     doubtful : (m,) bool array
-        Which of them a search bears witness against: those that draws of the full posterior do not settle.
+        Those that draws of the full posterior do not settle: a search bears witness against each of them. Where the
+        common proposal does not even settle the full posterior, they alone are looked at.
 
     Returns
     -------
@@ -58,11 +59,15 @@ def log_densities(
         log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
         others = importance.widened(found.modes)
         settled[m] = overlooked(left, pool.proposal, log_integral, others, rng) <= _MISSED
-    for m in np.flatnonzero(~settled).tolist():
+    log_whole, known = float(pool.log_integral[0]), bool(pool.settled[0])
+    missing = np.flatnonzero(~settled & (known | doubtful)).tolist()
+    if missing and not known:
+        whole = weighted_posterior(problem, seed_of(seed, "whole"), _ALONE)
+        log_whole, known = whole.log_evidence, whole.converged
+    for m in missing:
         s, j = holds[m]
         alone = weighted_posterior(without_hold(problem, s, j), seed_of(seed, str(s), str(j)), _ALONE)
-        elpd[m] = pool.log_integral[0] - alone.log_evidence
-        settled[m] = pool.settled[0] and alone.converged
+        elpd[m], settled[m] = log_whole - alone.log_evidence, known and alone.converged
     return elpd, settled
 
 
