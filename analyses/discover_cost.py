@@ -9,7 +9,7 @@ are made here, so both search the same files, however the benchmark has changed 
 import argparse
 import json
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -48,24 +48,12 @@ def main() -> None:
     if options.only:
         print(json.dumps(cost_of(options.only[0], int(options.only[1]), options.simulations)))
         return
+    from analyses.checkouts import benchmark_files  # another checkout need not have it
+
     with TemporaryDirectory() as folder:
         wires = {} if options.no_wires else {f"paper:{i}": (str(i), 0) for i in range(4)}
         numbers = range(options.first, options.first + options.benchmark)
         compared(wires | benchmark_files(numbers, Path(folder)), options.against, options.simulations)
-
-
-def benchmark_files(numbers: Iterable[int], folder: Path) -> dict[str, tuple[str, int]]:
-    """Cases of the benchmark of hidden effects in random order: file and seed of each that a rig was found for."""
-    from analyses.hidden_effects.cases import SIZES, seal, specs
-
-    plan = specs(SIZES["small"], 0)
-    order, found = np.random.default_rng(0).permutation(len(plan)), {}
-    for number in numbers:
-        spec = plan[int(order[number])]
-        if seal(spec, folder / "cases", folder / "sealed"):
-            name = f"{number} {'+'.join(spec.names) or spec.kind}"
-            found[name] = str(folder / "cases" / spec.key / "experiment.toml"), int(spec.key, 16) % 2**31
-    return found
 
 
 def compared(cases: Mapping[str, tuple[str, int]], against: Path, simulations: int) -> None:

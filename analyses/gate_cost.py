@@ -2,7 +2,8 @@
 
 The paper's four wires, the first cases of the benchmark of hidden effects, and cases of `analyses.model_check`. With
 ``--against`` a checkout of another commit, each case runs in both, one after the other, and ratios of processor times
-are printed beside what differs in p and in the most surprising name.
+are printed beside what differs in p and in the most surprising name. The benchmark's cases are made here, so both look
+at the same files.
 
     python -m analyses.gate_cost --against ../before --output out/gate-cost.jsonl
 """
@@ -10,6 +11,7 @@ are printed beside what differs in p and in the most surprising name.
 import argparse
 import json
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,21 +21,12 @@ import numpy as np
 PAPER = tuple(f"paper:{i}" for i in range(4))
 
 
-def experiments_of(name: str) -> tuple[Any, int]:
-    """The experiments of a case, and its seed."""
-    from analyses.hidden_effects.cases import SIZES, seal, specs
+def experiments_of(case: str) -> Any:
+    """The experiments of a case: a wire of the paper, or a file."""
     from wirebayes.io import paper
     from wirebayes.io.experiment import read_experiments
 
-    kind, number = name.split(":")
-    if kind == "paper":
-        return [paper.experiments()[int(number)]], 0
-    plan = specs(SIZES["small"], 0)
-    spec = plan[int(np.random.default_rng(0).permutation(len(plan))[int(number)])]
-    with TemporaryDirectory() as folder:
-        if not seal(spec, Path(folder) / "cases", Path(folder) / "sealed"):
-            return None, 0
-        return read_experiments(Path(folder) / "cases" / spec.key / "experiment.toml"), int(spec.key, 16) % 2**31
+    return [paper.experiments()[int(case[-1])]] if case in PAPER else read_experiments(Path(case))
 
 
 def plain_fits(experiments: Any, seed: int) -> tuple[list[Any], np.random.Generator]:
@@ -49,27 +42,24 @@ def plain_fits(experiments: Any, seed: int) -> tuple[list[Any], np.random.Genera
     return [fitted(g, (), "hooke", "saturating", r) for g, r in zip(groups.values(), streams, strict=True)], rng
 
 
-def cost_of(name: str, simulations: int) -> dict[str, Any]:
+def cost_of(case: str, seed: int, simulations: int) -> dict[str, Any]:
     """One case in this process: processor time, p and the surprise of every name."""
-    from analyses.model_check import case
+    from analyses import model_check
     from wirebayes.discovery.global_test import examine
     from wirebayes.effects import CATALOGUE
 
-    if name.startswith("check"):
-        _, kind, number = name.split(":")
+    if case.startswith("check:"):
+        _, kind, number = case.split(":")
         begin = time.process_time()
-        p = case(kind, int(number), simulations)["p"]
-        return {"case": name, "cpu_s": time.process_time() - begin, "p": p, "first": ""}
-    experiments, seed = experiments_of(name)
-    if experiments is None:
-        return {"case": name, "cpu_s": 0.0, "p": None, "first": ""}
-    blocks, rng = plain_fits(experiments, seed)
+        p = model_check.case(kind, int(number), simulations)["p"]
+        return {"cpu_s": time.process_time() - begin, "p": p, "first": ""}
+    blocks, rng = plain_fits(experiments_of(case), seed)
     begin = time.process_time()
     gate = examine(blocks, CATALOGUE, simulations, rng)
     cpu = time.process_time() - begin
     surprises = gate.test.surprises
     further = {f"{c.name} {c.probe} {c.blocks} {c.shared}": v for c, v in gate.further.items()}
-    return {"case": name, "cpu_s": cpu, "p": gate.test.p, "first": max(surprises, key=lambda n: surprises[n]),
+    return {"cpu_s": cpu, "p": gate.test.p, "first": max(surprises, key=lambda n: surprises[n]),
             "simulations": len(gate.test.null), "surprises": surprises, "further": further}  # fmt: skip
 
 
@@ -81,23 +71,30 @@ def main() -> None:
     parser.add_argument("--checks", type=int, default=0, help="cases of each kind of analyses.model_check")
     parser.add_argument("--simulations", type=int, default=999)
     parser.add_argument("--output", type=Path)
-    parser.add_argument("--only", help="one case, in this process")
+    parser.add_argument("--only", nargs=2, metavar=("CASE", "SEED"), help="one case, in this process")
     options = parser.parse_args()
     if options.only:
-        print(json.dumps(cost_of(options.only, options.simulations)))
+        print(json.dumps(cost_of(options.only[0], int(options.only[1]), options.simulations)))
         return
-    from analyses.checkouts import answered  # another checkout need not have it
+    from analyses.checkouts import benchmark_files  # another checkout need not have it
 
     kinds = ("chain", "additive", "together", "effect")
-    names = [*PAPER, *(f"benchmark:{i}" for i in range(options.benchmark))]
-    names += [f"check:{kind}:{i}" for i in range(options.checks) for kind in kinds]
+    with TemporaryDirectory() as folder:
+        cases = {name: (name, 0) for name in PAPER} | benchmark_files(range(options.benchmark), Path(folder))
+        checks = [f"check:{kind}:{i}" for i in range(options.checks) for kind in kinds]
+        cases |= {name: (name, 0) for name in checks}
+        compared(cases, options)
+
+
+def compared(cases: Mapping[str, tuple[str, int]], options: argparse.Namespace) -> None:
+    """Run each case in one or both trees, the same file in both, and print what it takes."""
+    from analyses.checkouts import answered
+
     trees = [Path(__file__).parents[1], *([options.against] if options.against else [])]
     records = []
-    for name in names:
-        given = ["--only", name, "--simulations", str(options.simulations)]
-        found = [answered(__file__, given, tree) for tree in trees]
-        if found[0]["p"] is None:
-            continue
+    for name, (case, seed) in cases.items():
+        given = ["--only", case, str(seed), "--simulations", str(options.simulations)]
+        found = [{"case": name, **answered(__file__, given, tree)} for tree in trees]
         records.append(found)
         print(name, *(f"{r['cpu_s']:8.2f} s  p = {r['p']:.4g} {r['first']}" for r in found), sep="  ", flush=True)
         if options.output:

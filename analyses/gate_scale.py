@@ -4,15 +4,18 @@ A few files are simulated 8,000 times at their fits. From these, lots of 499 and
 the test is made with each: its p in the mean, the standard deviation of the logarithm of p, and how often other
 simulations, taken for readings, have p <= 0.04. Each for several ways to read off how surprising a value is.
 
-    python -m analyses.gate_scale --cases benchmark:0 benchmark:3 benchmark:11
+    python -m analyses.gate_scale --cases 0 3 11
 """
 
 import argparse
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
 from scipy import stats
 
+from analyses.checkouts import benchmark_files
 from analyses.gate_cost import experiments_of, plain_fits
 from wirebayes.discovery import screening
 from wirebayes.discovery.linear_scan import expand, scan
@@ -30,10 +33,9 @@ WAYS = {
 }
 
 
-def values(name: str) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Each name's log Bayes factor in the readings (1,), and in the simulations (n,)."""
-    experiments, seed = experiments_of(name)
-    blocks, rng = plain_fits(experiments, seed)
+def values(case: str, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Each name's log Bayes factor in the readings (1,) of a file, and in the simulations (n,)."""
+    blocks, rng = plain_fits(experiments_of(case), seed)
     trials, candidates = screening.candidate_probes(blocks, CATALOGUE)
     data = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
     null = [screening.replicated(b, trials, ALL, rng).scan for b in blocks]
@@ -67,10 +69,11 @@ def spread(data: dict[str, Array], chance: dict[str, Array], lot: int, way: str)
 def main() -> None:
     """Print a line for each file, lot and way."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", nargs="+", default=["benchmark:0", "benchmark:3", "benchmark:11"])
+    parser.add_argument("--cases", nargs="+", type=int, default=[0, 3, 11], help="of the benchmark of hidden effects")
     options = parser.parse_args()
-    for name in options.cases:
-        data, chance = values(name)
+    with TemporaryDirectory() as folder:
+        found = {name: values(*case) for name, case in benchmark_files(options.cases, Path(folder)).items()}
+    for name, (data, chance) in found.items():
         for lot in (499, 999):
             for way in ("counted", *WAYS):
                 upper, one_nat, above = WAYS.get(way, WAYS["as it is"])

@@ -263,7 +263,7 @@ def test_of_climbs_on_one_density_those_that_come_to_the_same_place_are_given_up
 )
 def test_a_place_is_near_an_end_within_two_standard_deviations_and_below_it(apart, higher, which, near):
     end = modes.Optimum(np.array([[1.0, 2.0]]), np.array([5.0]), np.diag([4.0, 1.0])[None], np.ones(1, bool))
-    ends = modes._Ends.of([end], 2)
+    ends = modes._Ends.of([end])
     for place in ([1.0 + 0.5 * apart, 2.0], [1.0, 2.0 - apart]):
         assert ends.near(np.array([which]), np.array([place]), np.array([5.0 + higher]))[0] == near
 

@@ -100,44 +100,31 @@ class _Local:
 
 @dataclass(frozen=True)
 class _Ends:
-    """Where climbs of several densities have ended: which density (k,), place (k, d), value (k,), and curvature there.
-
-    The curvature is the square of `root` (k, d, d), from the left.
-    """
+    """Where climbs of several densities have ended, and which density (k,) each place is of."""
 
     which: NDArray[np.int64]
-    z: Array
-    value: Array
-    root: Array
+    places: Optimum
 
     @classmethod
-    def of(cls, known: Sequence[Optimum], d: int) -> "_Ends":
-        out = cls(np.zeros(0, np.int64), np.zeros((0, d)), np.zeros(0), np.zeros((0, d, d)))
-        for which, found in enumerate(known):
-            eigen, vectors = _positive(found.curvature)
-            for i in range(len(found.z)):
-                out = out.joined(which, found.z[i], found.log_density[i], eigen[i], vectors[i])
-        return out
+    def of(cls, known: Sequence[Optimum]) -> "_Ends":
+        """Modes of each density that are known."""
+        return cls(np.repeat(np.arange(len(known)), [len(found.z) for found in known]), _together(known))
 
-    def joined(self, which: int, z: Array, value: float, eigen: Array, vectors: Array) -> "_Ends":
-        """With one more, if it is not near any.
+    def joined(self, which: NDArray[np.int64], ended: Optimum) -> "_Ends":
+        """With further places, highest first, but for those that are near one.
 
         Parameters
         ----------
-        which : int
-            Its density.
-        z : (d,) array
-        value : float
-        eigen, vectors : (d,) and (d, d) arrays
-            Of the curvature.
+        which : (n,) int array
+            Their densities.
+        ended : Optimum
         """
-        if self.near(np.array([which]), z[None], np.array([value]))[0]:
-            return self
-        root = (vectors * np.sqrt(eigen)).T
-        return _Ends(
-            np.append(self.which, which), np.vstack([self.z, z]), np.append(self.value, value),
-            np.concatenate([self.root, root[None]]),
-        )  # fmt: skip
+        out = self
+        for i in np.argsort(-ended.log_density):
+            here = ended.rows([i])
+            if not out.near(which[[i]], here.z, here.log_density)[0]:
+                out = _Ends(np.append(out.which, which[i]), _together([out.places, here]))
+        return out
 
     def near(self, which: NDArray[np.int64], z: Array, value: Array) -> NDArray[np.bool_]:
         """(n,) whether places would count as one of these modes of their density; never where they are higher.
@@ -149,9 +136,9 @@ class _Ends:
         z : (n, d) array
         value : (n,) array
         """
-        apart = np.einsum("kij,nkj->nki", self.root, z[:, None] - self.z)
-        near = (apart**2).sum(axis=2) <= _ONE_MODE
-        return np.asarray((near & (self.which == which[:, None]) & (value[:, None] <= self.value)).any(axis=1))
+        near = _apart(z, self.places.z, self.places.curvature) <= _ONE_MODE
+        lower = value[:, None] <= self.places.log_density
+        return np.asarray((near & lower & (self.which == which[:, None])).any(axis=1))
 
 
 def climb(
@@ -201,7 +188,7 @@ def climb(
     n, d = start.shape
     look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
     group = np.zeros(n, np.int64) if of is None else of
-    ends = _Ends.of(known, d)
+    ends = _Ends.of(known or [Optimum(start[:0], np.empty(0), np.empty((0, d, d)), np.empty(0, bool))])
     z, value = start.copy(), np.full(n, -np.inf)
     slope, eigen, vectors = np.zeros((n, d)), np.full((n, d), _NARROW**-2), np.tile(np.eye(d), (n, 1, 1))
     # Where to look next: at the end of a step, in the hope that it is taken, or, after another one, at `z`.
@@ -236,8 +223,9 @@ def climb(
         left = rows[~done[rows]]
         hopeless = value[left] + _PATIENCE * promised[left] < _best(value, group)[left] - reach
         if of is not None:
-            for i in sorted(here[converged[here]], key=lambda i: -value[i]):
-                ends = ends.joined(of[i], z[i], value[i], eigen[i], vectors[i])
+            here = here[converged[here]]
+            curvature = _composed(eigen[here], vectors[here])
+            ends = ends.joined(of[here], Optimum(z[here], value[here], curvature, converged[here]))
             hopeless |= ends.near(of[left], z[left], value[left])
         left = left[hopeless]
         done[left], value[left] = True, -np.inf
@@ -456,7 +444,7 @@ def searches(
     def one(i: int) -> Callable[[Array], Array]:
         return lambda z: density(z, np.full(len(z), i))
 
-    ways = [_Way.annealed(target, one(i), draws, starts, rng) for i in range(n)]
+    ways = [_Annealed.from_prior(target, one(i), draws, starts, rng) for i in range(n)]
     led = _with_ratios(target, density, residuals, [way.prior for way in ways])
     begin = [np.vstack([a, way.starts, *([] if extra is None else [extra])]) for a, way in zip(led, ways, strict=True)]
     found = climbed(begin, [])
@@ -464,7 +452,7 @@ def searches(
     most = max(starts // 2, 1)
     for _ in range(_LOOKS):
         pairs = enumerate(zip(ways, found, strict=True))
-        begin = [way.strange(f, most, rng) if i in looking else way.passed[:0] for i, (way, f) in pairs]
+        begin = [way.unexplained(f, most, rng) if i in looking else way.passed[:0] for i, (way, f) in pairs]
         if not any(len(b) for b in begin):
             break
         more = climbed(begin, found)
@@ -521,7 +509,7 @@ def _with_ratios(
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Annealed:
     """What one search passed while prior draws were annealed, and where its climbs begin.
 
     Attributes
@@ -545,9 +533,9 @@ class _Way:
     passed_height: Array
 
     @classmethod
-    def annealed(
+    def from_prior(
         cls, target: LogPosterior, density: Callable[[Array], Array], draws: int, starts: int, rng: np.random.Generator
-    ) -> "_Way":
+    ) -> "_Annealed":
         """Anneal prior draws.
 
         Parameters
@@ -572,7 +560,7 @@ class _Way:
             height[-draws:], passed[looked], height[looked],
         )  # fmt: skip
 
-    def strange(self, found: Optimum, most: int, rng: np.random.Generator) -> Array:
+    def unexplained(self, found: Optimum, most: int, rng: np.random.Generator) -> Array:
         """(m, d) places passed that belong to the hill of no mode found so far.
 
         Parameters
@@ -623,7 +611,7 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
     for i in order:
         if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - _REACH:
             continue
-        if not _near(every.z[[i]], every.z[keep], every.curvature[keep])[0]:
+        if not (_apart(every.z[[i]], every.z[keep], every.curvature[keep]) <= _ONE_MODE).any():
             keep.append(int(i))
     return every.rows(keep)
 
@@ -632,10 +620,10 @@ def _together(found: Sequence[Optimum]) -> Optimum:
     return Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
 
 
-def _near(z: Array, modes: Array, curvature: Array) -> NDArray[np.bool_]:
-    """(n,) whether places (n, d) count as one with any of the modes (k, d)."""
+def _apart(z: Array, modes: Array, curvature: Array) -> Array:
+    """(n, k) squared distances of places (n, d) from modes (k, d), in standard deviations."""
     apart = z[:, None] - modes
-    return np.asarray((np.einsum("nki,kij,nkj->nk", apart, curvature, apart) <= _ONE_MODE).any(axis=1))
+    return np.asarray(np.einsum("nki,kij,nkj->nk", apart, curvature, apart))
 
 
 def _cooled(density: Callable[[Array], Array], z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:

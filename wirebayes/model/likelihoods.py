@@ -66,7 +66,7 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     noise = _Noise.of(variance, setting_sd)
     for j in range(holds):
         if mask[j].any():
-            found = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise)
+            found = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise.where_read(readings[j], mask[j]))
             out[j], mean[j + 1], var[j + 1] = found.log_density, found.mean, found.var
         else:
             mean[j + 1], var[j + 1] = _unread(line, j, mean[j], var[j], noise)
@@ -98,8 +98,8 @@ def standardised(
     mean, var = np.zeros(n), np.zeros(n)
     for j in range(len(mask)):
         if mask[j].any():
-            here = _hold(line, j, readings[j], mask[j], mean, var, noise)
             read = noise.where_read(readings[j], mask[j])
+            here = _hold(line, j, readings[j], mask[j], mean, var, read)
             best = np.sqrt(var) * here.pull_c, np.sqrt(noise.setting_var) * here.pull_s
             known = var * here.cc, noise.setting_var * here.ss
             log_sd = np.sqrt(len(here.left)) * read.log_variance, *(np.log1p(k) for k in known)
@@ -189,8 +189,10 @@ class _Read(NamedTuple):
 
 
 def _hold(line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise) -> _Read:
-    """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`."""
-    noise = noise.where_read(readings, mask)
+    """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`.
+
+    Readings whose weight is zero do not count, whatever they are.
+    """
     weight, setting_var = noise.weight, noise.setting_var
     keep = slice(None) if mask.all() else mask
     by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]

@@ -617,10 +617,10 @@ def standardised(
         for j in range(holds):
             a, c, count = carry_by_creep[j, i], carry_by_setting[j, i], counts[j]
             if not count or isnan(readings[j, first[j], i]):
-                for r in range(count + 5 if count else 0):
-                    out[row + r, i] = 0.0
-                row += count + 5 if count else 0
                 m, p = a * m, a * a * p + c * c * q
+                if count:  # other columns have residuals there
+                    out[row : row + count + 5, i] = 0.0
+                    row += count + 5
                 continue
             found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, m, p, weight, log_variance, q,
                               &left[0])
