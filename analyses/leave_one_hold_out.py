@@ -24,7 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--experiment", default="roc-line-1.71m")
     experiment = select(experiments(), parser.parse_args().experiment)[0]
-    print(f"{experiment.name}: model, elpd as in a comparison (sampling where Pareto k > {LARGEST_K}), "
+    print(f"{experiment.name}: model, elpd as in a comparison (sampling where any Pareto k > {LARGEST_K}), "
           "by fits without every hold, difference, largest difference of a hold, holds sampled")  # fmt: skip
     fast, exact = {}, {}
     known = catalogue()
