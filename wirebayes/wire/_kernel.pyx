@@ -68,6 +68,7 @@ cdef struct Wire:
     double number[_MOST_EFFECTS]  # the hold of an event, the parameter that depends on the length
     double own[_MOST_EFFECTS][2]  # amplitudes
     double beside[_MOST_EFFECTS]  # elongation beside the creep, as it is carried into the hold
+    double solved, elastic, slope  # a strain, its elastic part, and the slope of this
 
 
 cdef struct Hold:
@@ -117,8 +118,11 @@ cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warmi
 
 cdef inline Dual elastic_part(Wire* wire, Dual whole) noexcept nogil:
     """What is elastic of a strain of which the creep of eq (2) is a part."""
-    cdef double log_creep = log(wire.B / wire.length_mm) + wire.U * log(wire.k1), log_s, elastic, crept, move
+    cdef double log_creep, log_s, elastic, crept, move
     cdef int step
+    if whole.v == wire.solved:  # so it is at all readings of a hold in which nothing changes
+        return through(whole, wire.elastic, wire.slope)
+    log_creep = log(wire.B / wire.length_mm) + wire.U * log(wire.k1)
     log_s = log(whole.v)
     if (log_s - log_creep) / wire.U < log_s:
         log_s = (log_s - log_creep) / wire.U
@@ -129,7 +133,8 @@ cdef inline Dual elastic_part(Wire* wire, Dual whole) noexcept nogil:
         if fabs(move) < 1e-9:  # the next one would be lost in rounding
             break
     elastic, crept = exp(log_s), exp(log_creep + wire.U * log_s)
-    return through(whole, elastic, elastic / (elastic + wire.U * crept))
+    wire.solved, wire.elastic, wire.slope = whole.v, elastic, elastic / (elastic + wire.U * crept)
+    return through(whole, wire.elastic, wire.slope)
 
 
 cdef inline Dual tension_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
@@ -288,7 +293,7 @@ cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ss
     wire.k1, wire.B, wire.U, wire.k2, wire.N = theta[0, i], theta[1, i], theta[2, i], theta[3, i], theta[4, i]
     wire.length_mm, wire.base = test.length_mm, test.length_mm + theta[5, i]
     wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
-    wire.effects, wire.own_time, wire.timed = law.effects, False, False
+    wire.effects, wire.own_time, wire.timed, wire.solved = law.effects, False, False, 0.0
     for e in range(law.effects):
         wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], 0.0
         for a in range(law.amplitudes[e]):
