@@ -139,7 +139,7 @@ def test_other_draws_tell_of_a_hill_that_a_proposal_misses() -> None:
     witness = exact(1000, rng)
     good, blind = start(0.0, 7.0), start(0.0)
     for current, misses in ((good, False), (blind, True)):
-        fresh = importance._weighted(two_hills, current, 4000, 500.0, rng)
+        fresh = importance._weighted(two_hills, current, 4000, 500.0, rng, np.zeros(1, bool))
         promised = expected(fresh, witness, two_hills(witness)[:, 0])
         own = effective(fresh.log_weight)[0]
         assert own > 1000 and fresh.settled[0]
@@ -265,7 +265,7 @@ def test_the_draws_of_one_more_proposal_are_known_to_all_of_them() -> None:
     """Every point is weighed by every proposal, old points by the new one too."""
     one, other = start(0.0), start(3.0)
     rng = np.random.default_rng(0)
-    first, second = (importance._weighted(three, q, n, 1e9, rng) for q, n in ((one, 4), (other, 3)))
+    first, second = (importance._weighted(three, q, n, 1e9, rng, np.zeros(1, bool)) for q, n in ((one, 4), (other, 3)))
     known = importance._Past.first(first).joined(second)
     z = np.vstack([first.z, second.z])
     assert np.array_equal(known.z, z) and known.counts == (4, 3) and known.proposals == (one, other)

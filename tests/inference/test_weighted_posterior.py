@@ -96,7 +96,7 @@ def test_the_share_overlooked_is_the_mass_of_places_that_are_hardly_drawn() -> N
 
     def share(drawn: tuple[int, ...], others: tuple[int, ...]) -> float:
         pool = importance._weighted(
-            lambda z: two_hills(z)[:, None], importance.widened(modes(*drawn)), 20_000, 1000.0, rng
+            lambda z: two_hills(z)[:, None], importance.widened(modes(*drawn)), 20_000, 1000.0, rng, np.zeros(1, bool)
         )
         known = importance.widened(modes(*others))
         return overlooked(target(), pool.proposal, pool.log_integral[0], known, rng)  # type: ignore[arg-type]

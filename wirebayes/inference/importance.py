@@ -161,9 +161,9 @@ def sample(
         rough = Points.equal(draws)
         current = _learned(rough, rough, start, order, rng, start)
     n, past = _LEAST, None
-    log_ratio, settled = np.zeros(1), np.zeros(1, bool)
+    log_ratio, settled = np.zeros(1), np.zeros(1, bool)  # broadcast to all densities by the first round
     for done in range(1, _ROUNDS + 1):
-        fresh = _weighted(densities, current, n, ess, rng)
+        fresh = _weighted(densities, current, n, ess, rng, settled)
         fresh.settled[0] &= expected(fresh, witness, height) >= _LEAST_EXPECTED * ess
         log_ratio = np.where(settled, log_ratio, fresh.log_ratio)
         settled = settled | fresh.settled & fresh.settled[0]
@@ -220,12 +220,19 @@ def widened(modes: Optimum) -> Mixture:
 
 
 def _weighted(
-    densities: Callable[[Array], Array], current: Mixture | Proposal, n: int, ess: float, rng: np.random.Generator
+    densities: Callable[[Array], Array],
+    current: Mixture | Proposal,
+    n: int,
+    ess: float,
+    rng: np.random.Generator,
+    settled: NDArray[np.bool_],
 ) -> Weighted:
+    """Draws of a proposal, weighted; of densities that are settled before, but the first, no tail is looked at."""
     z = current.rvs(n, rng)
     log_density, log_proposal = densities(z), current.log_density(z)
     log_weight = log_density - log_proposal[:, None]
-    enough = effective(log_weight) >= ess
+    asked = ~settled | (np.arange(log_weight.shape[1]) == 0)
+    enough = asked & (effective(log_weight) >= ess)
     trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
     integral = logsumexp(log_weight, axis=0)
     return Weighted(z, log_density, log_proposal, np.array(trusted), integral - integral[0], current)

@@ -71,30 +71,33 @@ class Straight:
 
     def forward(self, x: Array) -> tuple[Array, Array]:
         """(n, d) straightened points and the (n,) logarithm of the map's Jacobian, of points (n, d)."""
-        v = (x[:, self.order] - self.centre) / self.scale
-        n, d = v.shape
-        held = np.clip(v, self.low, self.high)
-        slope = (held @ self.quadratic.transpose(1, 0, 2).reshape(d, d * d)).reshape(n, d, d)
-        mean = self.constant + v @ self.linear.T + np.einsum("njk,nk->nj", slope, v - 0.5 * held)
-        log_scale = np.clip(self.log_scale[:, 0] + v @ self.log_scale[:, 1:].T, self.least, self.most)
-        u, slopes = _normal((v - mean) * np.exp(-log_scale), self.shape)
-        return u, np.log(slopes.prod(axis=1)) - log_scale.sum(axis=1) - np.log(self.scale).sum()
+        # points last: sums over coordinates are several times as fast
+        v = np.ascontiguousarray(((x[:, self.order] - self.centre) / self.scale).T)
+        held = np.clip(v, self.low[:, None], self.high[:, None])
+        mean, bend = self.linear @ v + self.constant[:, None], v - 0.5 * held
+        for j in range(1, len(v)):
+            mean[j] += ((self.quadratic[j, :j, :j] @ held[:j]) * bend[:j]).sum(axis=0)
+        log_scale = self.log_scale[:, 1:] @ v + self.log_scale[:, :1]
+        log_scale = np.clip(log_scale, self.least[:, None], self.most[:, None])
+        u, slopes = _normal((v - mean) * np.exp(-log_scale), self.shape[:, :, None])
+        return u.T, np.log(slopes.prod(axis=0)) - log_scale.sum(axis=0) - np.log(self.scale).sum()
 
     def inverse(self, u: Array) -> Array:
         """(n, d) points of straightened ones."""
-        location, width, skewness = self.shape
+        location, width, skewness = self.shape[:, :, None]
+        u = np.ascontiguousarray(u.T)
         # the hyperbolic sine of a sum, arcsinh(u) + skewness, written out
         u = location + width * (u * np.cosh(skewness) + np.sqrt(1.0 + u * u) * np.sinh(skewness))
         v, held = np.zeros_like(u), np.zeros_like(u)
-        for j in range(u.shape[1]):
-            before, inside = v[:, :j], held[:, :j]
-            mean = self.constant[j] + before @ self.linear[j, :j]
-            mean += np.einsum("nk,nk->n", inside @ self.quadratic[j, :j, :j], before - 0.5 * inside)
-            log_scale = self.log_scale[j, 0] + before @ self.log_scale[j, 1 : j + 1]
-            v[:, j] = mean + u[:, j] * np.exp(np.clip(log_scale, self.least[j], self.most[j]))
-            held[:, j] = np.clip(v[:, j], self.low[j], self.high[j])
-        x = np.empty_like(v)
-        x[:, self.order] = v * self.scale + self.centre
+        for j in range(len(u)):
+            before, inside = v[:j], held[:j]
+            mean = self.constant[j] + self.linear[j, :j] @ before
+            mean += ((self.quadratic[j, :j, :j] @ inside) * (before - 0.5 * inside)).sum(axis=0)
+            log_scale = self.log_scale[j, 0] + self.log_scale[j, 1 : j + 1] @ before
+            v[j] = mean + u[j] * np.exp(np.clip(log_scale, self.least[j], self.most[j]))
+            held[j] = np.clip(v[j], self.low[j], self.high[j])
+        x = np.empty(v.T.shape)
+        x[:, self.order] = v.T * self.scale + self.centre
         return x
 
 
