@@ -123,6 +123,19 @@ def test_weights_with_a_heavy_tail_do_not_settle(k: float, settled: bool, monkey
     assert pool(three, 0, 0.0, 7.0).settled.tolist() == [settled] * 3
 
 
+def test_tails_are_fitted_of_the_first_density_and_of_those_not_settled_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitted = []
+
+    def light(log_weight: np.ndarray) -> float:
+        fitted.append(log_weight)
+        return 0.0
+
+    monkeypatch.setattr(importance, "tail", light)
+    before = np.array([True, True, False])
+    fresh = importance._weighted(three, start(0.0, 7.0), 4000, 1.0, np.random.default_rng(0), before)
+    assert len(fitted) == 2 and fresh.settled.tolist() == [True, False, True]
+
+
 def two_hills(z: np.ndarray) -> np.ndarray:
     return three(z)[:, 1:2] - 5.0
 

@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,9 @@ from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
 from wirebayes.results import store
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=12)
+# With effects the tails of a hasty proposal are so heavy that two versions of Pareto smoothing differ by up to 0.14 in
+# eight seeds; after one learned from three times the draws, by 0.04.
+LESS_HASTY = replace(HASTY, round_draws=6144)
 # Ragged in every way: times, numbers of readings, hold numbers that skip, holds without a record, a slack end.
 TESTS = {
     "short": """hold,displacement_mm,time_s,tension_N,temperature_C
@@ -89,7 +93,7 @@ def stored(experiments: list[Experiment], tmp_path_factory: pytest.TempPathFacto
         "hold": fit(build(short, likelihood="hold"), 1, policy=HASTY),
         "together": joint,
         "apart": joint,
-        "effects": fit(build(short, [named("thermal_expansion"), named("grip_slip@4")]), 1, policy=HASTY),
+        "effects": fit(build(short, [named("thermal_expansion"), named("grip_slip@4")]), 1, policy=LESS_HASTY),
         "unknown": fit(build(short, [named("discrepancy@8:0.3:70.0")]), 1, policy=HASTY),
     }
     out = {}
@@ -217,9 +221,7 @@ def test_loo_is_leaving_one_hold_out(
         before = az.loo(data, pointwise=True, reff=1.0)
     # two versions of Pareto smoothing fit the tail a little differently, and a heavy one more so
     between = np.abs(pointwise_of(theirs) - ours.elpd)
-    # above one the ratios have no mean that the two could agree on
-    most = np.select([ours.pareto_k < 0.7, ours.pareto_k < 1.0], [0.02, 0.1], np.inf)
-    assert np.isfinite(most).any() and (between < most).all()
+    assert (between < np.where(ours.pareto_k < 0.7, 0.02, 0.1)).all()
     assert (pointwise_of(before) == pytest.approx(pointwise_of(theirs), abs=1e-3)) == (kind == "hold")
 
 

@@ -153,6 +153,16 @@ def test_each_law_of_creep_moves_the_compiled_readings(law, beside):
     same(found, by_numpy(lambda: simulate(p, theta, model)), 1.0)
 
 
+def test_two_wires_of_the_same_strain_share_no_elastic_part():
+    """The compiled twin keeps the elastic part of the last strain, which all readings of a hold have."""
+    p = protocol([5.0], [TIMES])
+    theta = {name: np.array([value, value]) for name, value in PLAIN.items()} | {"B": np.array([0.1, 0.4])}
+    model = Model(effects=(RIVALS["at_once"](), RIVALS["not_in_time"]()))
+    found = simulate(p, theta, model)
+    assert found[0, 0, 0] - found[0, 0, 1] > 0.1
+    same(found, by_numpy(lambda: simulate(p, theta, model)), 1.0)
+
+
 class Own(StrainStiffening):
     """A user's effect that is derived from one of the catalogue and computes something else."""
 

@@ -227,7 +227,11 @@ def _weighted(
     rng: np.random.Generator,
     settled: NDArray[np.bool_],
 ) -> Weighted:
-    """Draws of a proposal, weighted; of densities that are settled before, but the first, no tail is looked at."""
+    """Weighted draws of a proposal.
+
+    A tail takes as long as hundreds of draws: it is fitted for the first density, without which no other is known, and
+    for those that are not `settled` (m,) before.
+    """
     z = current.rvs(n, rng)
     log_density, log_proposal = densities(z), current.log_density(z)
     log_weight = log_density - log_proposal[:, None]

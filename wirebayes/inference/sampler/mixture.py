@@ -69,7 +69,7 @@ class Mixture:
     def _distances(self, x: Array) -> Array:
         """(k, n) squared Mahalanobis distances, in the precision of the points."""
         (k, d), (product, middle) = self.centres.shape, self._whitening
-        y = product.astype(x.dtype) @ x.T  # points last, for sums along them are several times as fast
+        y = product.astype(x.dtype) @ x.T  # points last: sums over coordinates are several times as fast
         y -= middle.astype(x.dtype)
         y *= y
         return np.asarray(y.reshape(k, d, len(x)).sum(axis=1))
