@@ -1,5 +1,6 @@
 """Integrals of several densities from one pool, against normals whose integrals are known."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -212,9 +213,12 @@ def test_a_tail_that_is_nowhere_is_no_number_and_the_lighter_estimate_counts(mon
     assert asked[:2] == [([-1.0, -3.0], 1.0), ([-1.0, -3.0], 9.0)]
 
 
-def weighted(log_density: np.ndarray, log_proposal: np.ndarray, current: object = None) -> Weighted:
-    n, m = log_density.shape
-    return Weighted(np.zeros((n, 1)), log_density, log_proposal, np.ones(m, bool), np.zeros(m), current)  # type: ignore[arg-type]
+def weighted(log_density: np.ndarray, log_proposal: np.ndarray) -> Weighted:
+    """What a proposal gives that draws the places 0, 1, 2 and so on."""
+    places = np.arange(float(len(log_proposal)))[:, None]
+    current = SimpleNamespace(rvs=lambda n, rng: places, log_density=lambda z: log_proposal)
+    rng, settled = np.random.default_rng(0), np.zeros(log_density.shape[1], bool)
+    return importance._weighted(lambda z: log_density, current, len(places), 1e9, rng, settled)  # type: ignore[arg-type]
 
 
 def test_the_integral_is_the_mean_weight() -> None:
@@ -224,13 +228,32 @@ def test_the_integral_is_the_mean_weight() -> None:
     with np.errstate(divide="ignore"):
         one = weighted(np.log(weight) + log_proposal[:, None], log_proposal)
     assert np.exp(one.log_integral) == pytest.approx([3.0, 2.0])
+    assert np.exp(one.log_ratio) == pytest.approx([1.0, 2.0 / 3.0])
     assert np.exp(one.log_weight[[0, 2]]) == pytest.approx(weight[[0, 2]])
+
+
+def test_an_integral_is_that_of_the_round_which_settled_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Later rounds are for the other densities: of the first one, a single draw of theirs may weigh more than all."""
+    rounds = [([True, False], [1.0, 9.0]), ([False, False], [7.0, 8.0]), ([True, True], [3.0, 5.0])]
+
+    def given(densities: object, current: object, n: int, *more: object) -> Weighted:
+        settled, log_integral = (np.array(of) for of in rounds[len(made)])
+        made.append(n)
+        true = drawn(densities, current, n, *more)
+        return replace(true, settled=settled, log_integral=log_integral, log_ratio=log_integral - log_integral[0])
+
+    made: list[int] = []
+    drawn = importance._weighted
+    monkeypatch.setattr(importance, "_weighted", given)
+    found = pool(lambda z: three(z)[:, :2], 0, 0.0, 7.0)
+    assert len(made) == 3 and found.settled.all()
+    assert found.log_integral.tolist() == [1.0, 5.0] and found.log_ratio.tolist() == [0.0, 2.0]
 
 
 def test_what_other_draws_promise_is_the_effective_number_of_draws_of_the_proposal() -> None:
     """All draws over the mean of the normalised weight at draws of the density; never more than all."""
-    current = SimpleNamespace(log_density=lambda z: z[:, 0])
-    fresh = weighted(np.full((1000, 1), 2.0), np.zeros(1000), current)
+    fresh = weighted(np.full((1000, 1), 2.0), np.zeros(1000))
+    fresh = replace(fresh, proposal=SimpleNamespace(log_density=lambda z: z[:, 0]))  # type: ignore[arg-type]
     over = np.array([[0.0], [1.0], [-2.0]])  # of the witnesses, in nats above the integral, which is e²
     height = over[:, 0] + 2.0 + np.array([3.0, 4.0, 5.0])
     witness = np.array([[3.0], [4.0], [5.0]])

@@ -42,6 +42,8 @@ class Weighted:
     settled : (m,) bool array
         Densities of which there are, or were in an earlier round, as many effective draws as were wanted, with weights
         that can be trusted.
+    log_integral : (m,) array
+        Logarithms of the integrals, in the round that settled each, or else in the last.
     log_ratio : (m,) array
         Logarithms of each integral over the first one, in the round that settled both, or else in the last.
     proposal : Mixture or Proposal
@@ -52,6 +54,7 @@ class Weighted:
     log_density: Array
     log_proposal: Array
     settled: NDArray[np.bool_]
+    log_integral: Array
     log_ratio: Array
     proposal: Mixture | Proposal
 
@@ -59,11 +62,6 @@ class Weighted:
     def log_weight(self) -> Array:
         """(n, m) logarithms of density over proposal."""
         return self.log_density - self.log_proposal[:, None]
-
-    @property
-    def log_integral(self) -> Array:
-        """(m,) logarithms of the integrals."""
-        return np.asarray(logsumexp(self.log_weight, axis=0) - np.log(len(self.z)))
 
     def drawn(self, density: int, n: int, rng: np.random.Generator) -> Array:
         """(n, d) draws that follow one density, as far as the weights allow.
@@ -161,10 +159,12 @@ def sample(
         rough = Points.equal(draws)
         current = _learned(rough, rough, start, order, rng, start)
     n, past = _LEAST, None
-    log_ratio, settled = np.zeros(1), np.zeros(1, bool)  # broadcast to all densities by the first round
+    # broadcast to all densities by the first round
+    log_integral, log_ratio, settled = np.zeros(1), np.zeros(1), np.zeros(1, bool)
     for done in range(1, _ROUNDS + 1):
         fresh = _weighted(densities, current, n, ess, rng, settled)
         fresh.settled[0] &= expected(fresh, witness, height) >= _LEAST_EXPECTED * ess
+        log_integral = np.where(settled, log_integral, fresh.log_integral)
         log_ratio = np.where(settled, log_ratio, fresh.log_ratio)
         settled = settled | fresh.settled & fresh.settled[0]
         needed = _RESERVE * n * ess / np.maximum(effective(fresh.log_weight), 1.0)
@@ -180,7 +180,7 @@ def sample(
         if len(witness):
             hot, cold = (p.joined(Points.equal(witness).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold))
         current = _learned(hot, cold, start, order, rng, current)
-    return replace(fresh, settled=settled, log_ratio=log_ratio)
+    return replace(fresh, settled=settled, log_integral=log_integral, log_ratio=log_ratio)
 
 
 def from_draws(
@@ -238,8 +238,9 @@ def _weighted(
     asked = ~settled | (np.arange(log_weight.shape[1]) == 0)
     enough = asked & (effective(log_weight) >= ess)
     trusted = [bool(e) and tail(w) <= LARGEST_K for e, w in zip(enough, log_weight.T, strict=True)]
-    integral = logsumexp(log_weight, axis=0)
-    return Weighted(z, log_density, log_proposal, np.array(trusted), integral - integral[0], current)
+    log_integral = np.asarray(logsumexp(log_weight, axis=0) - np.log(n))
+    log_ratio = log_integral - log_integral[0]
+    return Weighted(z, log_density, log_proposal, np.array(trusted), log_integral, log_ratio, current)
 
 
 def effective(log_weight: Array) -> Array:
