@@ -1,6 +1,7 @@
 """Posteriors by importance sampling: a hill that nothing led to has to be found, or the posterior refused."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,11 +45,11 @@ def searching(monkeypatch: pytest.MonkeyPatch, *found: tuple[int, ...]) -> Calla
     """Searches find these hills, one after the other, the last of them from then on; how many were made."""
     made: list[tuple[int, ...]] = []
 
-    def searches(target: object, rng: np.random.Generator, n: int, starts: int) -> list[SimpleNamespace]:
-        assert starts == 18
+    def searches(target: object, rng: np.random.Generator, n: int, starts: int) -> list[Optimum]:
+        assert starts == 72
         first = len(made)
         made.extend(found[min(first + i, len(found) - 1)] for i in range(n))
-        return [SimpleNamespace(modes=modes(*which)) for which in made[first:]]
+        return [modes(*which) for which in made[first:]]
 
     monkeypatch.setattr(module, "searches", searches)
     return lambda: len(made)
@@ -77,17 +78,28 @@ def test_what_searches_contradict_again_and_again_is_refused(monkeypatch: pytest
     """The proposal never learns of the hill, whatever it starts from."""
     made = searching(monkeypatch, (0,), (0, 1))
     monkeypatch.setattr(importance, "widened", lambda found, widened=importance.widened: widened(modes(0)))
-    looked = [1.0, 0.2, 0.051]
+    looked = [1.0, -0.051, 0.051]
     monkeypatch.setattr(module, "overlooked", lambda *given: looked.pop(0))
     assert not witnessed(target(), np.random.default_rng(0), 1000.0).settled[0]  # type: ignore[arg-type]
     assert made() == 4 and not looked
 
 
-def test_what_weights_do_not_settle_is_refused_whatever_the_witness_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = searching(monkeypatch, (0,))
-    monkeypatch.setattr(importance, "tail", lambda log_weight: 0.8)
-    assert not witnessed(target(), np.random.default_rng(0), 1000.0).settled[0]  # type: ignore[arg-type]
-    assert made() == 2
+@pytest.mark.parametrize(("heavy", "settled", "searches"), [(1, True, 3), (2, True, 4), (3, False, 4)])
+def test_what_weights_do_not_settle_is_learned_twice_more_then_refused_whatever_the_witness_says(
+    heavy: int, settled: bool, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = searching(monkeypatch, (0, 1))
+    learned = importance.sample
+    tries: list[int] = []
+
+    def sample(*given: object) -> importance.Weighted:
+        tries.append(len(given[2]))  # type: ignore[arg-type]
+        pool = learned(*given)  # type: ignore[arg-type]
+        return replace(pool, settled=np.array([len(tries) > heavy]))
+
+    monkeypatch.setattr(importance, "sample", sample)
+    assert witnessed(target(), np.random.default_rng(0), 1000.0).settled[0] == settled  # type: ignore[arg-type]
+    assert made() == searches and tries == [0, 4000, 4000][: len(tries)]
 
 
 def test_the_share_overlooked_is_the_mass_of_places_that_are_hardly_drawn() -> None:
@@ -99,10 +111,25 @@ def test_the_share_overlooked_is_the_mass_of_places_that_are_hardly_drawn() -> N
             lambda z: two_hills(z)[:, None], importance.widened(modes(*drawn)), 20_000, 1000.0, rng, np.zeros(1, bool)
         )
         known = importance.widened(modes(*others))
-        return overlooked(target(), pool.proposal, pool.log_integral[0], known, rng)  # type: ignore[arg-type]
+        return overlooked(target(), pool, 0, float(pool.log_integral[0]), known, rng)  # type: ignore[arg-type]
 
     assert share((0,), (0, 1)) == pytest.approx(1.0 / 9.0, rel=0.3)
     assert share((0, 1), (0, 1)) < 0.01 and share((0,), (0,)) < 0.01
+
+
+def test_what_few_draws_of_great_weight_made_of_a_hill_is_not_overlooked() -> None:
+    """A tenth of the mass in one of 600 draws: the integral has it, if roughly; draws of both proposals know better."""
+    rng = np.random.default_rng(4)
+    seldom = replace(importance.widened(modes(0, 1)), weights=np.array([599.0, 1.0]) / 600.0)
+    of_hill, missing = [], []
+    for _ in range(12):
+        pool = importance._weighted(lambda z: two_hills(z)[:, None], seldom, 20_000, 1.0, rng, np.zeros(1, bool))
+        share = np.exp(pool.log_weight[:, 0])[pool.z[:, 0] > 5.0].sum() / 20_000
+        of_hill.append(share)
+        integral = float(pool.log_integral[0])
+        missing.append(overlooked(target(), pool, 0, integral, importance.widened(modes(1)), rng))  # type: ignore[arg-type]
+    assert np.std(of_hill) > 0.01
+    assert np.array(of_hill) + missing * (0.9 + np.array(of_hill)) == pytest.approx(np.full(12, 0.1), abs=0.01)
 
 
 def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,10 +137,10 @@ def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyP
     problem = build([experiments()[0]])
     true, made = module.searches, []
 
-    def searches(target: object, rng: np.random.Generator, n: int, starts: int) -> list[object]:
+    def searches(target: object, rng: np.random.Generator, n: int, starts: int) -> list[Optimum]:
         first, *others = true(target, rng, n, starts=starts)  # type: ignore[arg-type]
-        made.extend(len(found.modes.z) for found in (first, *others))
-        return [first if len(made) > n else SimpleNamespace(modes=first.modes.rows([0])), *others]
+        made.extend(len(found.z) for found in (first, *others))
+        return [first if len(made) > n else first.rows([0]), *others]
 
     whole = weighted_posterior(problem, 0, 1000.0)
     monkeypatch.setattr(module, "searches", searches)

@@ -139,14 +139,15 @@ def test_no_search_bears_witness_where_nothing_is_doubtful(pools: list[int], mon
     assert seen == [2] and not asked
 
 
-@pytest.mark.parametrize(("share", "apart"), [(0.49, []), (0.51, [1])])
+@pytest.mark.parametrize(("share", "apart"), [(0.09, []), (0.11, [1]), (-0.09, []), (-0.11, [1])])
 def test_what_a_further_search_contradicts_is_sampled_by_itself(
     share: float, apart: list[int], pools: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each density that weights settle is asked for what lies elsewhere, with the integral that was found for it."""
     asked, seen = by_themselves(monkeypatch), []
 
-    def overlooked(left: object, drawn_from: object, log_integral: float, others: object, rng: object) -> float:
+    def overlooked(left: object, pool: object, column: int, log_integral: float, others: object, rng: object) -> float:
+        assert column == 1 + len(seen)
         seen.append(log_integral)
         return share if len(seen) == 2 else 0.0
 

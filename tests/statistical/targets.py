@@ -22,6 +22,8 @@ class Analytic:
         d = len(mean)
         self.coordinates = SimpleNamespace(
             noises=(),
+            sensor_columns=[],
+            setting_columns=[],
             kinds_of_creep=[],
             to_sampled=same,
             to_natural=same,

@@ -17,14 +17,9 @@ from wirebayes.resampling import next_power, systematic_rows
 from wirebayes.typing import Array
 
 LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
-_LOOKED = 400  # places at which it is tested whether a mode explains them
-# where on the line to a mode the density is evaluated: a valley between two hills seldom avoids all three
-_ON_THE_WAY = np.array([0.25, 0.5, 0.75])
+_ANNEALED = 400  # prior draws
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
 _WARM_STEPS = 4  # the last ones of the cooling
-_LEAST_SAG = 1.0  # nats
-_LOOKS = 12  # at most, for modes that explain places left over
-_MANY = 2  # new modes in one look: there may be more
 _ONE_MODE = 4.0  # squared standard deviations
 _ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tried
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
@@ -34,6 +29,11 @@ _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
 _REACH = 30.0  # nats below the best mode that no mode counts
+_FIRST = 9  # starts that differ in what decides where a climb ends: every pair of three ranks below
+_STARTS = 36  # further ones; narrow modes take 2 to 10 % of them
+_DRAWS_FOR_A_START = 2  # prior draws, some of which the model forbids
+# nats up for the setting error held, down for the sensor's noise; other pairs up to 4 reach narrow modes less often
+_SETTING_UP, _SENSOR_DOWN = 3.0, 1.0
 # of setting errors over sensor noise, for each start in turn: standard deviations of its logarithm under the prior
 _RATIOS = np.array([1.3, -1.3, 0.0])
 # ranks among prior draws of the creep's rate and of its power of tension, for nine starts in turn: each pair of rate,
@@ -341,7 +341,7 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
 
 
 def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
-    """The distinct modes of a posterior, best first (see `search`).
+    """The distinct modes of a posterior, best first (see `searches`).
 
     Parameters
     ----------
@@ -355,12 +355,56 @@ def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = 
     -------
     Optimum
     """
-    return search(target, rng, extra=extra).modes
+    return searches(target, rng, 1, extra=extra)[0]
+
+
+def searches(
+    target: LogPosterior,
+    rng: np.random.Generator,
+    n: int,
+    readings: Sequence[Array] | None = None,
+    *,
+    starts: int = _STARTS,
+    extra: Array | None = None,
+) -> list[Optimum]:
+    """Look for the modes of a posterior, several times side by side: climbs from prior draws.
+
+    What decides where a climb ends is how fast the creep is, how much more it is under more tension, and whether
+    setting errors or the sensor's noise explain the residuals. The first climbs differ in these. Narrow modes, which
+    hardly any climb comes to that frees the noises on its way, are reached from many further prior draws with both
+    noises held for some steps: setting errors much larger than those of the best mode so far and the sensor's noise
+    smaller, so that the wire's parameters follow how readings change within a hold.
+
+    Searches are independent of each other; their climbs are evaluated together.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    rng : numpy Generator
+    n : int
+        How many searches.
+    readings : sequence of (H, R, n) arrays, optional
+        What each search sees in place of the measured readings, a sample each; NaN in a hold that it does not see.
+    starts : int
+        Further prior draws of each.
+    extra : (m, d) array, optional
+        Further starts, in sampled coordinates.
+
+    Returns
+    -------
+    list of Optimum
+        The distinct modes that each search found, best first.
+    """
+    side_by_side = _SideBySide(target, n, readings)
+    prior = [side_by_side.possible(i, _prior(target, _DRAWS_FOR_A_START * starts, rng)) for i in range(n)]
+    spread = side_by_side.with_ratios([_spread(target, z, _FIRST, rng) for z in prior])
+    found = side_by_side.climbed([b if extra is None else np.vstack([b, extra]) for b in spread], [])
+    return side_by_side.further(found, [z[rng.choice(len(z), starts, replace=len(z) < starts)] for z in prior])
 
 
 @dataclass(frozen=True)
 class Search:
-    """What a search found.
+    """What a search found that began with annealing.
 
     Attributes
     ----------
@@ -378,88 +422,125 @@ class Search:
     height: Array
 
 
-def search(
-    target: LogPosterior, rng: np.random.Generator, *, draws: int = 400, starts: int = 9, extra: Array | None = None
-) -> Search:
-    """Look for the modes of a posterior: climbs from prior draws that differ in what decides where a climb ends.
+def search(target: LogPosterior, rng: np.random.Generator, *, extra: Array | None = None) -> Search:
+    """Look for the modes, and for places that roughly follow the posterior: prior draws are annealed to it, too.
 
-    That is how fast the creep is, how much more it is under more tension, and whether setting errors or the sensor's
-    noise explain the residuals. Meanwhile prior draws are annealed to the posterior. Some climbs begin at places they
-    passed, the highest one and some far from one another: where annealing ends, a mode of less weight may have died
-    out. Others, later, begin at passed places that belong to the hill of no mode found so far. A climb is given up
-    where it comes so near to a known mode that it would count as that one. Where they find several modes, more are
-    looked for in the same way.
+    Climbs begin as in `searches`, and at places that the annealing passed, the highest one and some far from one
+    another: where it ends, a mode of less weight may have died out.
 
     Parameters
     ----------
     target : LogPosterior
     rng : numpy Generator
-    draws : int
-        Of the prior.
-    starts : int
-        Climbs from prior draws; half as many at every further look.
     extra : (m, d) array, optional
         Further starts, in sampled coordinates.
+
+    Returns
+    -------
+    Search
     """
-    return searches(target, rng, 1, draws=draws, starts=starts, extra=extra)[0]
+    alone = _SideBySide(target, 1, None)
+    z = _prior(target, _ANNEALED, rng)
+    value = alone.density(z, np.zeros(len(z), int))
+    passed, height = _cooled(lambda z: alone.density(z, np.zeros(len(z), int)), z, value, rng)
+    width = passed.std(axis=0)
+    apart = spread_rows(passed / np.where(width > 0, width, 1.0), _FIRST, rng)
+    possible = z[np.isfinite(value)] if np.isfinite(value).any() else z
+    [spread] = alone.with_ratios([_spread(target, possible, _FIRST, rng)])
+    begin = [spread, passed[[int(np.argmax(height)), *apart]], *([] if extra is None else [extra])]
+    found = alone.climbed([np.vstack(begin)], [])
+    further = possible[rng.choice(len(possible), _STARTS, replace=len(possible) < _STARTS)]
+    [every] = alone.further(found, [further])
+    return Search(every, passed[-_WARM_STEPS * _ANNEALED :], passed[-_ANNEALED:], height[-_ANNEALED:])
 
 
-def searches(
-    target: LogPosterior,
-    rng: np.random.Generator,
-    n: int,
-    readings: Sequence[Array] | None = None,
-    *,
-    draws: int = 400,
-    starts: int = 9,
-    extra: Array | None = None,
-) -> list[Search]:
-    """Several searches side by side, independent of each other, whose climbs are evaluated together.
+class _SideBySide:
+    """Climbs on n densities of the same parameters, evaluated together.
 
     Parameters
     ----------
     target : LogPosterior
-    rng : numpy Generator
     n : int
-        How many.
-    readings : sequence of (H, R, n) arrays, optional
-        What each search sees in place of the measured readings, a sample each; NaN in a hold that it does not see.
-    draws, starts, extra
-        As for `search`, for each.
+    readings : sequence of (H, R, n) arrays or None
+        See `searches`.
     """
-    density, residuals = target.rowwise(readings)
 
-    def climbed(begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
-        of = np.repeat(np.arange(n), [len(b) for b in begin])
+    def __init__(self, target: LogPosterior, n: int, readings: Sequence[Array] | None) -> None:
+        self.n, self.noises = n, target.coordinates.noises
+        self.sensors, self.settings = target.coordinates.sensor_columns, target.coordinates.setting_columns
+        self.density, self.residuals = target.rowwise(readings)
+
+    def possible(self, i: int, z: Array) -> Array:
+        """Those of (m, d) places where the density of search i is above zero; all, if it is nowhere."""
+        inside = np.isfinite(self.density(z, np.full(len(z), i)))
+        return z[inside] if inside.any() else z
+
+    def climbed(self, begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
+        """The modes to which climbs lead from (m, d) places of each density, but for those known before."""
+        of = np.repeat(np.arange(self.n), [len(b) for b in begin])
+        residuals = self.residuals
         end = climb(
-            lambda z, rows: density(z, of[rows]), np.vstack(begin),
+            lambda z, rows: self.density(z, of[rows]), np.vstack(begin),
             None if residuals is None else lambda z, rows: residuals(z, of[rows]),
             of=of, known=before, reach=_REACH, curvature_at_end=False,
         )  # fmt: skip
-        found = [distinct([end.rows(of == i)]) for i in range(n)]
-        of = np.repeat(np.arange(n), [len(f.z) for f in found])
-        every = _curved(density, _together(found), of)
-        return [every.rows(of == i) for i in range(n)]
+        found = [distinct([end.rows(of == i)]) for i in range(self.n)]
+        of = np.repeat(np.arange(self.n), [len(f.z) for f in found])
+        every = _curved(self.density, _together(found), of)
+        return [every.rows(of == i) for i in range(self.n)]
 
-    def one(i: int) -> Callable[[Array], Array]:
-        return lambda z: density(z, np.full(len(z), i))
+    def with_ratios(self, begin: Sequence[Array]) -> Sequence[Array]:
+        """Places (m, d) of each density led uphill for some steps, each with one of several ratios of the noises kept.
 
-    ways = [_Annealed.from_prior(target, one(i), draws, starts, rng) for i in range(n)]
-    led = _with_ratios(target, density, residuals, [way.prior for way in ways])
-    begin = [np.vstack([a, way.starts, *([] if extra is None else [extra])]) for a, way in zip(led, ways, strict=True)]
-    found = climbed(begin, [])
-    looking = list(range(n))
-    most = max(starts // 2, 1)
-    for _ in range(_LOOKS):
-        pairs = enumerate(zip(ways, found, strict=True))
-        begin = [way.unexplained(f, most, rng) if i in looking else way.passed[:0] for i, (way, f) in pairs]
-        if not any(len(b) for b in begin):
-            break
-        more = climbed(begin, found)
-        joined = [distinct([old, new]) for old, new in zip(found, more, strict=True)]
-        looking = [i for i in looking if len(joined[i].z) >= len(found[i].z) + _MANY]
-        found = joined
-    return [Search(f, way.warm, way.cold, way.height) for f, way in zip(found, ways, strict=True)]
+        Above all, what explains the residuals, setting errors or the sensor's noise, decides at which of several modes
+        a climb ends. Whatever they were, both grow at first from a start that fits badly, and the wire's parameters
+        follow them. With the ratio kept, the wire is fitted as if it were known; the climb that comes after frees it.
+        """
+        ratio = np.concatenate([np.resize(_RATIOS, len(b)) for b in begin])
+
+        def kept(z: Array, rows: Array) -> Array:
+            z = z.copy()
+            for pair in self.noises:
+                z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
+            return z
+
+        return [led.z for led in self._led(begin, kept)] if self.noises else begin
+
+    def further(self, found: Sequence[Optimum], begin: Sequence[Array]) -> list[Optimum]:
+        """The modes of each density, with those found from further (m, d) places with the noises held for some steps.
+
+        Climbs that come to the same place meanwhile go on as one.
+        """
+        if not self.sensors and not self.settings:
+            return [distinct([old, new]) for old, new in zip(found, self.climbed(begin, found), strict=True)]
+        best = np.repeat([f.z[np.argmax(f.log_evidence)] for f in found], [len(b) for b in begin], axis=0)
+
+        def held(z: Array, rows: Array) -> Array:
+            z = z.copy()
+            z[:, self.settings] = best[rows][:, self.settings] + _SETTING_UP
+            z[:, self.sensors] = best[rows][:, self.sensors] - _SENSOR_DOWN
+            return z
+
+        led = [distinct([f]).z for f in self._led(begin, held, together=True)]
+        return [distinct([old, new]) for old, new in zip(found, self.climbed(led, found), strict=True)]
+
+    def _led(
+        self, begin: Sequence[Array], kept: Callable[[Array, Array], Array], together: bool = False
+    ) -> list[Optimum]:
+        """Where some steps uphill lead from (m, d) places of each density, with something kept."""
+        of = np.repeat(np.arange(self.n), [len(b) for b in begin])
+        found = climb(
+            lambda z, rows: self.density(kept(z, rows), of[rows]), np.vstack(begin),
+            lambda z, rows: self.residuals(kept(z, rows), of[rows]),
+            iterations=_LED, tolerance=_LED_TO, of=of if together else None, curvature_at_end=False,
+        )  # fmt: skip
+        found = replace(found, z=kept(found.z, np.arange(len(of))))
+        return [found.rows(of == i) for i in range(self.n)]
+
+
+def _prior(target: LogPosterior, n: int, rng: np.random.Generator) -> Array:
+    """(n, d) prior draws in sampled coordinates."""
+    return target.coordinates.to_sampled(target.problem.prior.rvs(n, rng))
 
 
 def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) -> Array:
@@ -470,127 +551,6 @@ def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) ->
     found = np.stack([np.argsort(np.argsort(z[:, columns].mean(axis=1))) / len(z) for columns in kinds], axis=1)
     wanted = np.resize(_RANKS, (n, 2))[:, : len(kinds)] + _WITHIN * rng.uniform(-1.0, 1.0, (n, len(kinds)))
     return np.asarray(z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)])
-
-
-def _with_ratios(
-    target: LogPosterior, density: Density, residuals: Residuals, start: Sequence[Array]
-) -> Sequence[Array]:
-    """Starts (m, d) of several searches led uphill for some steps, each with one of several ratios of the noises kept.
-
-    Above all, what explains the residuals, setting errors or the sensor's noise, decides at which of several modes a
-    climb ends. Whatever they were, both grow at first from a start that fits badly, and the wire's parameters follow
-    them. With the ratio kept, the wire is fitted as if it were known; the climb that comes after frees it.
-
-    Parameters
-    ----------
-    target : LogPosterior
-    density, residuals : functions
-        Of points and the number of the search.
-    start : sequence of (m, d) arrays
-    """
-    pairs, sizes = target.coordinates.noises, [len(s) for s in start]
-    if not pairs:
-        return start
-    of = np.repeat(np.arange(len(start)), sizes)
-    ratio = np.concatenate([np.resize(_RATIOS, size) for size in sizes])
-
-    def kept(z: Array, rows: Array) -> Array:
-        z = z.copy()
-        for pair in pairs:
-            z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
-        return z
-
-    found = climb(
-        lambda z, rows: density(kept(z, rows), of[rows]), np.vstack(start),
-        lambda z, rows: residuals(kept(z, rows), of[rows]),
-        iterations=_LED, tolerance=_LED_TO, curvature_at_end=False,
-    )  # fmt: skip
-    return np.split(kept(found.z, np.arange(len(of))), np.cumsum(sizes)[:-1])
-
-
-@dataclass(frozen=True)
-class _Annealed:
-    """What one search passed while prior draws were annealed, and where its climbs begin.
-
-    Attributes
-    ----------
-    density : function of (m, d) points to (m,) values
-    prior, starts : (m, d) arrays
-        Prior draws, and places passed: the highest, and some far from one another.
-    warm, cold, height
-        See `Search`.
-    passed, passed_height : (m, d) and (m,) arrays
-        Some places, at which it is tested whether a mode explains them.
-    """
-
-    density: Callable[[Array], Array]
-    prior: Array
-    starts: Array
-    warm: Array
-    cold: Array
-    height: Array
-    passed: Array
-    passed_height: Array
-
-    @classmethod
-    def from_prior(
-        cls, target: LogPosterior, density: Callable[[Array], Array], draws: int, starts: int, rng: np.random.Generator
-    ) -> "_Annealed":
-        """Anneal prior draws.
-
-        Parameters
-        ----------
-        target : LogPosterior
-        density : function of (m, d) points to (m,) values
-        draws : int
-        starts : int
-            Of climbs from prior draws.
-        rng : numpy Generator
-        """
-        z = target.coordinates.to_sampled(target.problem.prior.rvs(draws, rng))
-        value = density(z)
-        passed, height = _cooled(density, z, value, rng)
-        possible = z[np.isfinite(value)] if np.isfinite(value).any() else z
-        width = passed.std(axis=0)
-        apart = spread_rows(passed / np.where(width > 0, width, 1.0), starts, rng)
-        prior, highest = _spread(target, possible, starts, rng), int(np.argmax(height))
-        looked = rng.choice(len(passed), min(_LOOKED, len(passed)), replace=False)
-        return cls(
-            density, prior, passed[[highest, *apart]], passed[-_WARM_STEPS * draws :], passed[-draws:],
-            height[-draws:], passed[looked], height[looked],
-        )  # fmt: skip
-
-    def unexplained(self, found: Optimum, most: int, rng: np.random.Generator) -> Array:
-        """(m, d) places passed that belong to the hill of no mode found so far.
-
-        Parameters
-        ----------
-        found : Optimum
-        most : int
-            How many at most.
-        rng : numpy Generator
-        """
-        sag = _sag(self.density, self.passed, self.passed_height, found)
-        strange = np.flatnonzero(sag > _LEAST_SAG)
-        if not len(strange):
-            return self.passed[:0]
-        share = sag[strange] / sag[strange].sum()
-        return np.asarray(self.passed[rng.choice(strange, min(len(strange), most), replace=False, p=share)])
-
-
-def _sag(density: Callable[[Array], Array], z: Array, height: Array, found: Optimum) -> Array:
-    """(n,) how far the density between (n, d) places and a mode seen from there lies below the straight line.
-
-    Within one hill it lies above. The best mode is tried first, the others where none before was visible.
-    """
-    least = np.full(len(z), 1e3)
-    for mode, top in zip(found.z, found.log_density, strict=True):
-        unseen = np.flatnonzero(least > _LEAST_SAG)
-        between = z[unseen, None] + _ON_THE_WAY[:, None] * (mode - z[unseen])[:, None]
-        line = height[unseen, None] + _ON_THE_WAY * (top - height[unseen])[:, None]
-        sag = (line - density(between.reshape(-1, z.shape[1])).reshape(line.shape)).max(axis=1)
-        least[unseen] = np.minimum(least[unseen], sag)
-    return least
 
 
 def distinct(found: Sequence[Optimum]) -> Optimum:

@@ -157,6 +157,8 @@ class Transformation:
     ----------
     noises : tuple of Noises
         Of every sample of which neither noise is fixed.
+    sensor_columns, setting_columns : lists of int
+        Of the standard deviations that are not fixed.
     """
 
     def __init__(self, problem: Problem, for_draws: bool = True) -> None:
@@ -176,6 +178,10 @@ class Transformation:
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
             self.log_spread[i] = 0.5 * np.log(high / low)
         self.noises = _noises(problem, self.log_columns, self.log_spread)
+        self.sensor_columns, self.setting_columns = (
+            [i for i, name in enumerate(names) if name.split("[")[0] == of and self.log_columns[i]]
+            for of in ("sensor_sd", "setting_sd")
+        )
         self.specimens = specimens(problem)
         first = () if self.specimens is None else self.specimens.spreads
         steepest = np.inf if self.specimens is None else _STEEPEST

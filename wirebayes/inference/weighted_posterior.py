@@ -3,11 +3,12 @@
 The modes that a search finds give the first proposal, and a proposal is learned from its draws
 (`wirebayes.inference.importance`). Its weights say nothing of a hill that it never drew. So a search from other prior
 draws bears witness: draws about its modes, of which the proposal knows nothing, tell how much of the posterior's mass
-lies where it draws far too seldom. If that is more than next to nothing, the proposal is learned anew from the modes of
-both searches. Where that does not help, or the weights cannot be trusted, the posterior is said not to be settled, and
-the caller has to sample it (`wirebayes.inference.fit`).
+lies where it draws far too seldom. If that is more than next to nothing, or the weights cannot be trusted, the proposal
+is learned again, from the modes of both searches and from all these draws. Where that does not help either, the
+posterior is said not to be settled, and the caller has to sample it (`wirebayes.inference.fit`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +16,12 @@ import numpy as np
 from wirebayes.inference import importance
 from wirebayes.inference.fit import Fit
 from wirebayes.inference.importance import Weighted, effective, tail
-from wirebayes.inference.modes import distinct, searches
+from wirebayes.inference.modes import Optimum, distinct, searches
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
+from wirebayes.resampling import truncated_rows
 from wirebayes.typing import Array
 
 
@@ -88,51 +89,81 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
     Returns
     -------
     Weighted
-        Not settled where the last search still contradicts.
+        Not settled where the weights cannot be trusted in the end, or the last search still contradicts.
     """
 
     def density(z: Array) -> Array:
         return target(z)[:, None]
 
-    known, others = (found.modes for found in searches(target, rng, 2, starts=_STARTS))
-    nothing = known.z[:0]
-    for attempt in range(_SEARCHES):
-        if attempt:
-            known, others = distinct([known, others]), searches(target, rng, 1, starts=_STARTS)[0].modes
-        start = importance.widened(known)
-        pool = importance.sample(density, start, nothing, target.coordinates.order, rng, ess)
+    def learned(modes: Optimum, draws: Array) -> Weighted:
+        return importance.sample(density, importance.widened(modes), draws, target.coordinates.order, rng, ess)
+
+    def agreed(pool: Weighted, modes: Optimum) -> bool:
         if not pool.settled[0]:
-            break
-        share = overlooked(target, pool.proposal, pool.log_integral[0], importance.widened(others), rng)
-        if share <= _NEXT_TO_NOTHING:
+            return False
+        missing = overlooked(target, pool, 0, float(pool.log_integral[0]), importance.widened(modes), rng)
+        return abs(missing) <= _NEXT_TO_NOTHING
+
+    known, others = searches(target, rng, 2, starts=_STARTS)
+    pool = learned(known, known.z[:0])
+    for _ in range(_AGAIN):
+        if agreed(pool, others):
             return pool
-    return replace(pool, settled=np.zeros(1, bool))
+        draws = _of_both(density, pool, importance.widened(others), rng)
+        known, others = distinct([known, others]), searches(target, rng, 1, starts=_STARTS)[0]
+        pool = learned(known, draws)
+    return pool if agreed(pool, others) else replace(pool, settled=np.zeros(1, bool))
+
+
+def _of_both(density: Callable[[Array], Array], pool: Weighted, others: Mixture, rng: np.random.Generator) -> Array:
+    """(n, d) rough draws of a posterior, from those of a proposal and of where another search would draw."""
+    z = others.rvs(_WITNESSES, rng)
+    height = np.append(pool.log_density[:, 0], density(z)[:, 0])
+    of_pool = np.append(pool.log_proposal, pool.proposal.log_density(z)) + np.log(len(pool.z))
+    z = np.vstack([pool.z, z])
+    log_weight = height - np.logaddexp(of_pool, others.log_density(z) + np.log(_WITNESSES))
+    return z[truncated_rows(log_weight, _DRAWS, rng)]
 
 
 def overlooked(
-    target: LogPosterior, drawn_from: Mixture | Proposal, log_integral: float, others: Mixture, rng: np.random.Generator
+    target: LogPosterior, pool: Weighted, column: int, log_integral: float, others: Mixture, rng: np.random.Generator
 ) -> float:
-    """Share of the posterior, by draws of another proposal, that lies where a proposal hardly draws.
+    """Share of a posterior that its integral by draws of a proposal lacks, as draws of another proposal tell.
+
+    Negative where a few draws of great weight made too much of a place.
+
+    It is looked for where the proposal hardly draws. There, all draws are weighed against both proposals together: one
+    draw of the other proposal in its own far tail, where either draws little, says next to nothing then. What draws of
+    the proposal alone made of these places is taken off: that much the integral has.
 
     Parameters
     ----------
     target : LogPosterior
-    drawn_from : Mixture or Proposal
+    pool : Weighted
+    column : int
+        Which of the pool's densities the target is.
     log_integral : float
         Of the posterior density, by draws of the proposal; what it misses comes on top, and the share may exceed one.
     others : Mixture
         Where else to draw.
     rng : numpy Generator
+
+    References
+    ----------
+    E. Veach and L. J. Guibas, Optimally combining sampling techniques, SIGGRAPH 1995: the balance heuristic.
     """
-    z = others.rvs(_WITNESSES, rng)
-    height = target(z) - log_integral
-    share = np.exp(height - others.log_density(z)) / len(z)
-    return float(share[height - drawn_from.log_density(z) > _HARDLY].sum())
+    n, z = len(pool.z), others.rvs(_WITNESSES, rng)
+    height = np.append(pool.log_density[:, column], target(z)) - log_integral
+    of_pool = np.append(pool.log_proposal, pool.proposal.log_density(z)) + np.log(n)
+    of_both = np.logaddexp(of_pool, others.log_density(np.vstack([pool.z, z])) + np.log(len(z)))
+    hardly = height - of_pool + np.log(n) > _HARDLY
+    found, had = np.exp(height - of_both)[hardly].sum(), np.exp(height - of_pool)[:n][hardly[:n]].sum()
+    return float(found - had)
 
 
 _DRAWS = 4000  # as many as predictions take
-_STARTS = 18  # of climbs, twice as many as before a walk: walkers still find what a search misses, weights do not
-_SEARCHES = 3  # that may contradict, before it is left to walkers
+_STARTS = 72  # of a search, twice as many as before a walk: walkers still find what it misses, weights do not
+_AGAIN = 2  # times that the proposal is learned again, before it is left to walkers
 _WITNESSES = 2000  # a hill with a hundredth of the mass has some twenty of them, where a search found it
 _HARDLY = 3.0  # nats of posterior over proposal: a place drawn twenty times too seldom
 _NEXT_TO_NOTHING = 0.05  # share of the mass: without it, log densities change by that at most

@@ -166,7 +166,7 @@ def test_the_density_of_a_proposal_is_that_of_its_draws(points):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_mode_that_died_out_on_the_way_is_still_found(seed):
-    found = modes.modes(two_modes(), np.random.default_rng(seed))
+    found = modes.search(two_modes(), np.random.default_rng(seed)).modes
     assert sorted(found.z[:, 0].round(3)) == [0.0, 10.0]
 
 
