@@ -396,10 +396,11 @@ def searches(
         The distinct modes that each search found, best first.
     """
     side_by_side = _SideBySide(target, n, readings)
-    prior = [side_by_side.possible(i, _prior(target, _DRAWS_FOR_A_START * starts, rng)) for i in range(n)]
+    drawn = [_prior(target, _DRAWS_FOR_A_START * starts, rng) for _ in range(n)]
+    prior = [_possible(z, side_by_side.density(z, np.full(len(z), i))) for i, z in enumerate(drawn)]
     spread = side_by_side.with_ratios([_spread(target, z, _FIRST, rng) for z in prior])
     found = side_by_side.climbed([b if extra is None else np.vstack([b, extra]) for b in spread], [])
-    return side_by_side.further(found, [z[rng.choice(len(z), starts, replace=len(z) < starts)] for z in prior])
+    return side_by_side.further(found, [_some(z, starts, rng) for z in prior])
 
 
 @dataclass(frozen=True)
@@ -445,12 +446,11 @@ def search(target: LogPosterior, rng: np.random.Generator, *, extra: Array | Non
     passed, height = _cooled(lambda z: alone.density(z, np.zeros(len(z), int)), z, value, rng)
     width = passed.std(axis=0)
     apart = spread_rows(passed / np.where(width > 0, width, 1.0), _FIRST, rng)
-    possible = z[np.isfinite(value)] if np.isfinite(value).any() else z
+    possible = _possible(z, value)
     [spread] = alone.with_ratios([_spread(target, possible, _FIRST, rng)])
     begin = [spread, passed[[int(np.argmax(height)), *apart]], *([] if extra is None else [extra])]
     found = alone.climbed([np.vstack(begin)], [])
-    further = possible[rng.choice(len(possible), _STARTS, replace=len(possible) < _STARTS)]
-    [every] = alone.further(found, [further])
+    [every] = alone.further(found, [_some(possible, _STARTS, rng)])
     return Search(every, passed[-_WARM_STEPS * _ANNEALED :], passed[-_ANNEALED:], height[-_ANNEALED:])
 
 
@@ -469,11 +469,6 @@ class _SideBySide:
         self.n, self.noises = n, target.coordinates.noises
         self.sensors, self.settings = target.coordinates.sensor_columns, target.coordinates.setting_columns
         self.density, self.residuals = target.rowwise(readings)
-
-    def possible(self, i: int, z: Array) -> Array:
-        """Those of (m, d) places where the density of search i is above zero; all, if it is nowhere."""
-        inside = np.isfinite(self.density(z, np.full(len(z), i)))
-        return z[inside] if inside.any() else z
 
     def climbed(self, begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
         """The modes to which climbs lead from (m, d) places of each density, but for those known before."""
@@ -511,8 +506,6 @@ class _SideBySide:
 
         Climbs that come to the same place meanwhile go on as one.
         """
-        if not self.sensors and not self.settings:
-            return [distinct([old, new]) for old, new in zip(found, self.climbed(begin, found), strict=True)]
         best = np.repeat([f.z[np.argmax(f.log_evidence)] for f in found], [len(b) for b in begin], axis=0)
 
         def held(z: Array, rows: Array) -> Array:
@@ -521,8 +514,9 @@ class _SideBySide:
             z[:, self.sensors] = best[rows][:, self.sensors] - _SENSOR_DOWN
             return z
 
-        led = [distinct([f]).z for f in self._led(begin, held, together=True)]
-        return [distinct([old, new]) for old, new in zip(found, self.climbed(led, found), strict=True)]
+        if self.settings or self.sensors:
+            begin = [distinct([led]).z for led in self._led(begin, held, together=True)]
+        return [distinct([old, new]) for old, new in zip(found, self.climbed(begin, found), strict=True)]
 
     def _led(
         self, begin: Sequence[Array], kept: Callable[[Array, Array], Array], together: bool = False
@@ -543,11 +537,22 @@ def _prior(target: LogPosterior, n: int, rng: np.random.Generator) -> Array:
     return target.coordinates.to_sampled(target.problem.prior.rvs(n, rng))
 
 
+def _some(z: Array, n: int, rng: np.random.Generator) -> Array:
+    """(n, d) of the places (m, d), none twice where there are enough."""
+    return np.asarray(z[rng.choice(len(z), n, replace=n > len(z))])
+
+
+def _possible(z: Array, value: Array) -> Array:
+    """Those of (m, d) places where the density is above zero; all, if it is nowhere."""
+    inside = np.isfinite(value)
+    return z[inside] if inside.any() else z
+
+
 def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) -> Array:
     """(n, d) of the places (m, d): where the creep is slow, fast and between, each with a small and a large power."""
     kinds = target.coordinates.kinds_of_creep
     if not kinds:
-        return z[rng.choice(len(z), n, replace=n > len(z))]
+        return _some(z, n, rng)
     found = np.stack([np.argsort(np.argsort(z[:, columns].mean(axis=1))) / len(z) for columns in kinds], axis=1)
     wanted = np.resize(_RANKS, (n, 2))[:, : len(kinds)] + _WITHIN * rng.uniform(-1.0, 1.0, (n, len(kinds)))
     return np.asarray(z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)])

@@ -8,7 +8,6 @@ is learned again, from the modes of both searches and from all these draws. Wher
 posterior is said not to be settled, and the caller has to sample it (`wirebayes.inference.fit`).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,20 +108,30 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
     for _ in range(_AGAIN):
         if agreed(pool, others):
             return pool
-        draws = _of_both(density, pool, importance.widened(others), rng)
+        draws = _of_both(target, pool, importance.widened(others), rng)
         known, others = distinct([known, others]), searches(target, rng, 1, starts=_STARTS)[0]
         pool = learned(known, draws)
     return pool if agreed(pool, others) else replace(pool, settled=np.zeros(1, bool))
 
 
-def _of_both(density: Callable[[Array], Array], pool: Weighted, others: Mixture, rng: np.random.Generator) -> Array:
+def _of_both(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.random.Generator) -> Array:
     """(n, d) rough draws of a posterior, from those of a proposal and of where another search would draw."""
+    z, height, _, of_both = _balanced(target, pool, 0, others, rng)
+    return z[truncated_rows(height - of_both, _DRAWS, rng)]
+
+
+def _balanced(
+    target: LogPosterior, pool: Weighted, column: int, others: Mixture, rng: np.random.Generator
+) -> tuple[Array, Array, Array, Array]:
+    """Draws of a proposal and then of another one, and what they are weighed against (the balance heuristic).
+
+    Places (n, d), their log densities (n,), and how densely draws of the pool's proposal, and of both, lie there (n,).
+    """
     z = others.rvs(_WITNESSES, rng)
-    height = np.append(pool.log_density[:, 0], density(z)[:, 0])
+    height = np.append(pool.log_density[:, column], target(z))
     of_pool = np.append(pool.log_proposal, pool.proposal.log_density(z)) + np.log(len(pool.z))
     z = np.vstack([pool.z, z])
-    log_weight = height - np.logaddexp(of_pool, others.log_density(z) + np.log(_WITNESSES))
-    return z[truncated_rows(log_weight, _DRAWS, rng)]
+    return z, height, of_pool, np.logaddexp(of_pool, others.log_density(z) + np.log(_WITNESSES))
 
 
 def overlooked(
@@ -152,10 +161,9 @@ def overlooked(
     ----------
     E. Veach and L. J. Guibas, Optimally combining sampling techniques, SIGGRAPH 1995: the balance heuristic.
     """
-    n, z = len(pool.z), others.rvs(_WITNESSES, rng)
-    height = np.append(pool.log_density[:, column], target(z)) - log_integral
-    of_pool = np.append(pool.log_proposal, pool.proposal.log_density(z)) + np.log(n)
-    of_both = np.logaddexp(of_pool, others.log_density(np.vstack([pool.z, z])) + np.log(len(z)))
+    n = len(pool.z)
+    _, height, of_pool, of_both = _balanced(target, pool, column, others, rng)
+    height -= log_integral
     hardly = height - of_pool + np.log(n) > _HARDLY
     found, had = np.exp(height - of_both)[hardly].sum(), np.exp(height - of_pool)[:n][hardly[:n]].sum()
     return float(found - had)
