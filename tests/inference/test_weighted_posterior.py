@@ -84,8 +84,15 @@ def test_what_searches_contradict_again_and_again_is_refused(monkeypatch: pytest
     assert made() == 4 and not looked
 
 
+def test_what_weights_do_not_settle_is_refused_whatever_the_witness_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = searching(monkeypatch, (0,))
+    monkeypatch.setattr(importance, "tail", lambda log_weight: 0.8)
+    assert not witnessed(target(), np.random.default_rng(0), 1000.0).settled[0]  # type: ignore[arg-type]
+    assert made() == 4
+
+
 @pytest.mark.parametrize(("heavy", "settled", "searches"), [(1, True, 3), (2, True, 4), (3, False, 4)])
-def test_what_weights_do_not_settle_is_learned_twice_more_then_refused_whatever_the_witness_says(
+def test_what_weights_do_not_settle_is_learned_twice_more(
     heavy: int, settled: bool, searches: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = searching(monkeypatch, (0, 1))
