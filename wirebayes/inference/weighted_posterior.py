@@ -116,22 +116,22 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
 
 def _of_both(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.random.Generator) -> Array:
     """(n, d) rough draws of a posterior, from those of a proposal and of where another search would draw."""
-    z, height, _, of_both = _balanced(target, pool, 0, others, rng)
-    return z[truncated_rows(height - of_both, _DRAWS, rng)]
+    z = others.rvs(_WITNESSES, rng)
+    height, _, of_both = _balanced(target, pool, 0, others, z)
+    return np.vstack([pool.z, z])[truncated_rows(height - of_both, _DRAWS, rng)]
 
 
 def _balanced(
-    target: LogPosterior, pool: Weighted, column: int, others: Mixture, rng: np.random.Generator
-) -> tuple[Array, Array, Array, Array]:
-    """Draws of a proposal and then of another one, and what they are weighed against (the balance heuristic).
+    target: LogPosterior, pool: Weighted, column: int, others: Mixture, z: Array
+) -> tuple[Array, Array, Array]:
+    """What draws of a proposal, and then draws z of another one, are weighed against (the balance heuristic).
 
-    Places (n, d), their log densities (n,), and how densely draws of the pool's proposal, and of both, lie there (n,).
+    Their log densities (n,), and how densely draws of the pool's proposal, and of both, lie there (n,).
     """
-    z = others.rvs(_WITNESSES, rng)
     height = np.append(pool.log_density[:, column], target(z))
     of_pool = np.append(pool.log_proposal, pool.proposal.log_density(z)) + np.log(len(pool.z))
-    z = np.vstack([pool.z, z])
-    return z, height, of_pool, np.logaddexp(of_pool, others.log_density(z) + np.log(_WITNESSES))
+    of_others = others.log_density(np.vstack([pool.z, z])) + np.log(len(z))
+    return height, of_pool, np.logaddexp(of_pool, of_others)
 
 
 def overlooked(
@@ -162,7 +162,7 @@ def overlooked(
     E. Veach and L. J. Guibas, Optimally combining sampling techniques, SIGGRAPH 1995: the balance heuristic.
     """
     n = len(pool.z)
-    _, height, of_pool, of_both = _balanced(target, pool, column, others, rng)
+    height, of_pool, of_both = _balanced(target, pool, column, others, others.rvs(_WITNESSES, rng))
     height -= log_integral
     hardly = height - of_pool + np.log(n) > _HARDLY
     found, had = np.exp(height - of_both)[hardly].sum(), np.exp(height - of_pool)[:n][hardly[:n]].sum()
