@@ -93,7 +93,8 @@ def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(
     t, ratio = worst(gaussian, HASTY)
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
-    monkeypatch.setattr(stop_rule, "promises_more", lambda state, policy: False)
+    monkeypatch.setattr(stop_rule, "worth_a_new_start", lambda state: False)
+    monkeypatch.setattr(stop_rule, "worth_refining", lambda state, policy: False)
     stubborn = sample(TARGETS["two_modes"](), 3, HASTY)
     assert again.converged and stubborn.converged
     assert again.kept_evaluations == again.log_density.size  # none of those kept before

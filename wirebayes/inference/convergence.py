@@ -31,8 +31,32 @@ def slowest_autocorrelation_steps(values: Array) -> Array:
     ----------
     values : (ensembles, steps, walkers, d) array
     """
+    return np.maximum.reduce([autocorrelation_steps(each) for each in _with_tails(values)])
+
+
+def farthest_apart(first: Array, second: Array) -> float:
+    """Largest distance between means of two sets of draws, or between shares in a 5 % tail, in standard errors.
+
+    Errors are known from the spread of the walkers' means, as in `autocorrelation_steps`.
+
+    Parameters
+    ----------
+    first, second : (ensembles, steps, walkers, d) arrays
+        Of any numbers of steps.
+    """
+    steps, worst = first.shape[1], 0.0
+    for each in _with_tails(np.concatenate([first, second], axis=1)):
+        means = [part.mean(axis=1).reshape(-1, part.shape[-1]) for part in (each[:, :steps], each[:, steps:])]
+        error = np.sqrt(sum(m.var(axis=0, ddof=1) / len(m) for m in means))
+        apart = np.abs(means[1].mean(axis=0) - means[0].mean(axis=0))
+        worst = max(worst, float(np.max(apart / np.where(error > 0, error, 1.0))))
+    return worst
+
+
+def _with_tails(values: Array) -> tuple[Array, Array, Array]:
+    """(ensembles, steps, walkers, d) draws, and which of them are in the lower and in the upper 5 % tail."""
     low, high = np.quantile(values.reshape(-1, values.shape[-1]), _TAILS, axis=0)
-    return np.maximum.reduce([autocorrelation_steps(each) for each in (values, values < low, values > high)])
+    return values, values < low, values > high
 
 
 def nested_r_hat(values: Array) -> Array:

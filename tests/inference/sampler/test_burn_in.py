@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from tests.statistical.targets import gaussian
+from tests.statistical.targets import banana, gaussian
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
@@ -236,6 +236,31 @@ def test_kept_draws_are_learned_from_as_burn_in(
     assert (policy.most_rounds if overlooked else policy.rounds) - found.round == rounds_left
     assert seen["cold"].weight.sum() == pytest.approx(1000) and mean(seen["cold"]) == pytest.approx(0.75)
     assert mean(seen["hot"]) == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4))
+
+
+def test_kept_draws_teach_the_next_proposal_and_count_on() -> None:
+    """Nothing is evaluated and no walker moves; the proposal has twice as many components, and frozen shares."""
+    target, rng, policy = banana(), np.random.default_rng(0), Policy(ensembles=2, walkers=8, components=3)
+    d = len(target.mean)
+    start = Mixture(np.ones(1), np.zeros((1, d)), np.eye(d)[None])
+    z = rng.normal(size=(250, 16, d))
+    z[..., 1] = 0.5 * z[..., 1] + z[..., 0] ** 2 - 1.0
+    before, kept = (
+        Kept((part,), (target(part.reshape(-1, d)).reshape(-1, 16),), len(part), 3, 5) for part in (z[:150], z[150:])
+    )
+    walkers = Walkers(kept.z[0][-1], kept.log_density[0][-1], np.random.RandomState(0).get_state())
+    state = Sampling(walkers, Learned(start, start, 1, again=1), rng, 700, kept, earlier=before)
+    spent = target.evaluations
+    found = burn_in.refined(target, state, policy)  # type: ignore[arg-type]
+    assert found.walkers is walkers and (found.evaluations, target.evaluations) == (700, spent)
+    assert found.kept == Kept() and found.diagnostics is None and found.learned.again == 2
+    assert (found.earlier.steps, found.earlier.evaluations, found.earlier.accepted) == (250, 250, 6)
+    learned = found.learned.proposal
+    assert isinstance(learned, proposal.Proposal)
+    assert learned.shares == proposal.SHARES and len(learned.close.weights) == 6
+    places = z.reshape(-1, d)
+    spread = [np.std(target(places) - by.log_density(places)) for by in (learned, start)]
+    assert spread[0] < 0.1 * spread[1]  # nats: a tenth of what was left by the start
 
 
 def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:

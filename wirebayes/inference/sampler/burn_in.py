@@ -23,7 +23,7 @@ from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.inference.sampler.state import BurnIn, Learned, Sampling, Walkers, advance, move_of
+from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.resampling import effective_number, next_power, truncated_rows
 from wirebayes.typing import Array
@@ -114,9 +114,7 @@ def _frozen(
     target: LogPosterior, state: BurnIn, policy: Policy, drawn: tuple[Array, Array, Array], steps: int
 ) -> Sampling:
     """The run with its proposal as it will stay, every ensemble placed by weight and settled for some steps."""
-    learned = replace(state.learned, trusted=state.learned.acceptance > policy.acceptance)
-    if isinstance(learned.proposal, Proposal):
-        learned = replace(learned, proposal=replace(learned.proposal, shares=proposal.SHARES))
+    learned = _as_frozen(replace(state.learned, trusted=state.learned.acceptance > policy.acceptance))
     z, value, base = drawn if learned.trusted or state.walk is None else state.walk
     rows = _placed(policy, value - base, state.generator)
     walkers = Walkers(z[rows], value[rows], state.walkers.random)
@@ -148,15 +146,41 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     state : Sampling
     policy : Policy
     """
-    z = np.concatenate(state.kept.z).reshape(-1, state.walkers.positions.shape[1])
-    value = np.concatenate(state.kept.log_density).ravel()
-    learned = replace(state.learned, again=state.learned.again + 1)
-    done = policy.rounds - 1
+    learned, done = replace(state.learned, again=state.learned.again + 1), policy.rounds - 1
     if _hard_to_find(learned):  # few rounds of many draws: what is overlooked is rare
         done = max(done, policy.most_rounds - _FEW_ROUNDS)
+    return _of_kept(target, replace(state, learned=learned), policy, done)
+
+
+def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
+    """The run with its proposal learned again from the kept draws, which stay; walkers go on from where they are.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    state : Sampling
+    policy : Policy
+    """
+    state = replace(state, learned=replace(state.learned, again=state.learned.again + 1))
+    learned = _as_frozen(_of_kept(target, state, policy, policy.rounds).learned)
+    return replace(state, learned=learned, kept=Kept(), earlier=state.all_kept, diagnostics=None)
+
+
+def _of_kept(target: LogPosterior, state: Sampling, policy: Policy, done: int) -> BurnIn:
+    """Burn-in after so many rounds, with a proposal that was learned from all kept draws."""
+    kept = state.all_kept
+    z = np.concatenate(kept.z).reshape(-1, state.walkers.positions.shape[1])
+    value = np.concatenate(kept.log_density).ravel()
     seen = _weighted_twice(z, value, value)
-    burning = BurnIn(state.walkers, learned, state.generator, state.evaluations, done)
+    burning = BurnIn(state.walkers, state.learned, state.generator, state.evaluations, done)
     return _with_excess(_fitted(target, burning, policy, *seen), z, value, np.zeros(len(z)))
+
+
+def _as_frozen(learned: Learned) -> Learned:
+    """With the shares of the proposal's parts as they are once it no longer learns."""
+    if not isinstance(learned.proposal, Proposal):
+        return learned
+    return replace(learned, proposal=replace(learned.proposal, shares=proposal.SHARES))
 
 
 def overlooked(learned: Learned, z: Array, value: Array) -> float:
@@ -235,10 +259,11 @@ def _fitted(
     learned, before, state = state.learned, state.seen, replace(state, seen=(hot, cold))
     if before is not None:
         hot, cold = before[0].joined(hot), before[1].joined(cold)
+    components = policy.components * (_MORE_COMPONENTS if learned.again else 1)
     try:
         new = proposal.fit(
             hot, cold, learned.start, target.coordinates.order, state.generator, shares,
-            most=max(policy.components, min(learned.modes, _MOST_COMPONENTS)), points=points,
+            most=max(components, min(learned.modes, _MOST_COMPONENTS)), points=points,
             before=learned.proposal if isinstance(learned.proposal, Proposal) else None,
         )  # fmt: skip
     except np.linalg.LinAlgError:
@@ -305,3 +330,4 @@ _TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where plac
 # steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
 _LONGEST_SETTLING = 8
 _MOST_COMPONENTS = 24  # however many modes there are
+_MORE_COMPONENTS = 2  # times as many for a proposal that has proved too poor: arms that hold a hundredth of the mass

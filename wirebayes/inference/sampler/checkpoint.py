@@ -17,7 +17,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import differences, plain, stored_results, write_bytes
 
-FORMAT = 4  # raise it whenever what is stored changes its meaning
+FORMAT = 5  # raise it whenever what is stored changes its meaning
 _VALUES = "state.json"
 INSTEAD = "remove this file to restart the fit"
 

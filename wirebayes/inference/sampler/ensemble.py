@@ -10,8 +10,12 @@ block, until for every parameter
 - no region of the posterior is underrated by the frozen proposal so much that one place there outweighs a pool of draws
   (`burn_in.overlooked`),
 
-or until `Policy.most_steps`: then the result says *not converged*, and why. If the first kept draws show that a better
-proposal would need fewer evaluations in total, they count as burn-in, and the proposal is learned again from them.
+or until `Policy.most_steps`: then the result says *not converged*, and why.
+
+If kept draws show that a better proposal would need fewer evaluations in total, or that it overlooks something, the
+proposal is learned again from them, and walkers go on with it. The draws so far stay: they are of a chain whose
+proposal was frozen, too. They are given up, and count as burn-in, where later ones disagree with them, and where the
+proposal was so poor, or overlooks something so often, that a mode may be about to be found.
 """
 
 from collections.abc import Callable
@@ -111,8 +115,9 @@ def sample(
         progress(_share(state, policy))
         resume.save(state, checkpoint, of_fit)
     assert state.diagnostics is not None
-    z, log_density = (by_ensemble(blocks, policy) for blocks in (state.kept.z, state.kept.log_density))
-    found_, counted = state.diagnostics, state.kept
+    counted = state.all_kept
+    z, log_density = (by_ensemble(blocks, policy) for blocks in (counted.z, counted.log_density))
+    found_ = state.diagnostics
     return Chains(
         z, log_density, found_.autocorrelation, found_.ess, found_.r_hat, state.converged, state.why,
         state.evaluations, counted.evaluations, counted.accepted / max(counted.proposed, 1), state.learned.trusted,

@@ -23,12 +23,14 @@ def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | Bu
     Returns
     -------
     Sampling or BurnIn
-        Burn-in where the proposal is to be learned once more.
+        Burn-in where the draws so far are given up.
     """
     state = stop_rule.apply(target, more(target, state, policy), policy)
     if state.finished:
         return state
-    return burn_in.again(target, state, policy) if stop_rule.worth_learning_again(state, policy) else state
+    if stop_rule.worth_a_new_start(state):
+        return burn_in.again(target, state, policy)
+    return burn_in.refined(target, state, policy) if stop_rule.worth_refining(state, policy) else state
 
 
 def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
@@ -40,15 +42,12 @@ def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     state : Sampling
     policy : Policy
     """
-    steps, kept = block_steps(state, policy), state.kept
+    steps = block_steps(state, policy)
     done = advance(target, state.walkers, move_of(state.learned, policy.ensembles, steps, frozen=True), steps)
     log_density = done.sampler.get_log_prob()
-    kept = Kept(
-        (*kept.z, done.sampler.get_chain()),
-        (*kept.log_density, log_density),
-        kept.evaluations + done.evaluations,
-        kept.accepted + int(done.sampler.backend.accepted.sum()),
-        kept.proposed + log_density.size,
+    accepted = int(done.sampler.backend.accepted.sum())
+    kept = state.kept.joined(
+        Kept((done.sampler.get_chain(),), (log_density,), done.evaluations, accepted, log_density.size)
     )
     return replace(state, walkers=done.walkers, evaluations=state.evaluations + done.evaluations, kept=kept)
 
@@ -56,11 +55,11 @@ def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
 def block_steps(state: Sampling, policy: Policy) -> int:
     """As many steps as the last look promises to be enough, in whole blocks, but no more than were kept so far.
 
-    Before the first look one block: it shows whether the proposal is to be learned once more.
+    One block of a new proposal before the first look: it shows whether it is to be learned once more.
     """
-    kept, last = state.kept.steps, state.diagnostics
+    kept, last = state.all_kept.steps, state.diagnostics
     if last is None:
-        return min(policy.block, policy.most_steps)
+        return min(policy.block, policy.most_steps - kept)
     short = max(policy.ess / last.ess.min() - 1.0, ENOUGH * last.autocorrelation.max() / kept - 1.0)
     blocks = np.ceil(np.clip(kept * short, 1, kept) / policy.block)
     return min(policy.block * int(blocks), policy.most_steps - kept)

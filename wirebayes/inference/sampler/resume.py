@@ -13,9 +13,11 @@ from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, State, Walkers
 from wirebayes.io.run_folder import stored_results
+from wirebayes.typing import Array
 
 _PLAIN_LEARNED = ("modes", "trusted", "acceptance", "walks", "again", "overlooked")
 _PLAIN_KEPT = ("evaluations", "accepted", "proposed")
+_KEPT, _BLOCKS = ("kept", "earlier"), ("z", "log_density")
 _PLAIN_SAMPLING = ("finished", "converged", "why")
 
 
@@ -54,8 +56,8 @@ def to_values(state: State) -> dict[str, Any]:
     }
     if isinstance(state, BurnIn):
         return out | {"round": state.round}
-    kept = {name: getattr(state.kept, name) for name in _PLAIN_KEPT}
-    return out | {"kept": kept} | {name: getattr(state, name) for name in _PLAIN_SAMPLING}
+    kept = {which: {name: getattr(getattr(state, which), name) for name in _PLAIN_KEPT} for which in _KEPT}
+    return out | kept | {name: getattr(state, name) for name in _PLAIN_SAMPLING}
 
 
 def to_arrays(state: State) -> dict[str, Any]:
@@ -74,9 +76,8 @@ def to_arrays(state: State) -> dict[str, Any]:
         seen = {} if state.seen is None else {"hot": asdict(state.seen[0]), "cold": asdict(state.seen[1])}
         drawn = {} if state.drawn is None else {"drawn": asdict(state.drawn)}
         return out | {"walk": _numbered(state.walk), "seen": seen} | drawn
-    kept = state.kept
-    blocks = {name: np.concatenate(v) for name, v in (("z", kept.z), ("log_density", kept.log_density)) if v}
-    return out | {"kept": blocks} | (asdict(state.diagnostics) if state.diagnostics else {})
+    kept = {which: _blocks(getattr(state, which)) for which in _KEPT}
+    return out | kept | (asdict(state.diagnostics) if state.diagnostics else {})
 
 
 def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
@@ -98,11 +99,18 @@ def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
         seen = (Points(**arrays["seen"]["hot"]), Points(**arrays["seen"]["cold"])) if "seen" in arrays else None
         drawn = Points(**arrays["drawn"]) if "drawn" in arrays else None
         return BurnIn(*run, values["round"], _tuple(arrays, "walk"), seen, drawn)
-    blocks = arrays.get("kept", {})
-    z, log_density = ((blocks[name],) if name in blocks else () for name in ("z", "log_density"))
-    kept = Kept(z, log_density, **values["kept"])
+    kept, earlier = (_kept(values[which], arrays.get(which, {})) for which in _KEPT)
     looked = Diagnostics(*(arrays[name] for name in ("autocorrelation", "ess", "r_hat"))) if "ess" in arrays else None
-    return Sampling(*run, kept, looked, *(values[name] for name in _PLAIN_SAMPLING))
+    return Sampling(*run, kept, looked, earlier=earlier, **{name: values[name] for name in _PLAIN_SAMPLING})
+
+
+def _blocks(kept: Kept) -> dict[str, Array]:
+    return {name: np.concatenate(blocks) for name in _BLOCKS if (blocks := getattr(kept, name))}
+
+
+def _kept(counted: Mapping[str, int], blocks: Mapping[str, Array]) -> Kept:
+    z, log_density = ((blocks[name],) if name in blocks else () for name in _BLOCKS)
+    return Kept(z, log_density, **counted)
 
 
 def _numbered(arrays: tuple[Any, ...] | None) -> dict[str, Any] | None:

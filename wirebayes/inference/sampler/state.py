@@ -60,7 +60,7 @@ class Learned:
     walks : int
         So often walkers had to look further.
     again : int
-        So often the proposal was learned again, from draws that were to be kept.
+        So often the proposal was learned again, from kept draws.
     overlooked : float
         What `wirebayes.inference.sampler.burn_in.overlooked` said at the last look, where all else was enough.
     """
@@ -132,6 +132,13 @@ class Kept:
     def steps(self) -> int:
         return sum(len(block) for block in self.z)
 
+    def joined(self, later: "Kept") -> "Kept":
+        """These draws and later ones of the same walkers."""
+        return Kept(
+            self.z + later.z, self.log_density + later.log_density, self.evaluations + later.evaluations,
+            self.accepted + later.accepted, self.proposed + later.proposed,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Diagnostics:
@@ -154,11 +161,14 @@ class Sampling:
     walkers, learned, generator, evaluations
         See `BurnIn`.
     kept : Kept
+        Draws of the proposal as it is.
     diagnostics : Diagnostics or None
         Of the last look; None before the first.
     finished, converged : bool
     why : str
         The stop rule's words.
+    earlier : Kept
+        Draws of the proposals before, which count no less.
     """
 
     walkers: Walkers
@@ -170,6 +180,12 @@ class Sampling:
     finished: bool = False
     converged: bool = False
     why: str = ""
+    earlier: Kept = field(default_factory=Kept)
+
+    @property
+    def all_kept(self) -> Kept:
+        """The draws of all proposals."""
+        return self.earlier.joined(self.kept)
 
 
 State = BurnIn | Sampling

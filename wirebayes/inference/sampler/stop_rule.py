@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from wirebayes.inference.convergence import ENOUGH, nested_r_hat, slowest_autocorrelation_steps
+from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
-from wirebayes.inference.sampler.state import POOL, Diagnostics, Sampling, by_ensemble
+from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Sampling, by_ensemble
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
 
@@ -24,14 +24,17 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     state : Sampling
     policy : Policy
     """
-    z = by_ensemble(state.kept.z, policy)
+    z = by_ensemble(state.all_kept.z, policy)
+    values = _judged_by(target, z)
+    before = state.earlier.steps
+    if before and farthest_apart(values[:, :before], values[:, before:]) > _DISAGREE:
+        state, z, values = replace(state, earlier=Kept()), z[:, before:], values[:, before:]
     steps, d = z.shape[1], z.shape[-1]
-    found = _diagnosed(target, z)
+    found = _diagnosed(values)
     beyond = 0.0
     if state.learned.trusted:
-        some = slice(None, None, 1 + z[..., 0].size // _WEIGHED)
-        places, heights = (np.concatenate(kept) for kept in (state.kept.z, state.kept.log_density))
-        beyond = burn_in.overlooked(state.learned, places.reshape(-1, d)[some], heights.ravel()[some])
+        places, heights = (np.concatenate(blocks) for blocks in (state.all_kept.z, state.all_kept.log_density))
+        beyond = burn_in.overlooked(state.learned, places.reshape(-1, d), heights.ravel())
     learned = replace(state.learned, overlooked=beyond if beyond > OUTWEIGHS else 0.0)
     state = replace(state, diagnostics=found, learned=learned)
     long_enough = steps >= ENOUGH * found.autocorrelation.max()
@@ -56,36 +59,46 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     return state
 
 
-def _diagnosed(target: LogPosterior, z: Array) -> Diagnostics:
-    """Diagnostics of (ensembles, steps, walkers, d) draws."""
+def _judged_by(target: LogPosterior, z: Array) -> Array:
+    """Natural parameters of (ensembles, steps, walkers, d) draws, by the logarithm where they are positive."""
     theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1])).reshape(z.shape)
-    # Logarithms of positive parameters: a heavy tail must not hide the walk.
-    values = np.where(target.coordinates.log_columns, np.log(np.abs(theta) + 1e-300), theta)
+    # a heavy tail must not hide the walk
+    return np.where(target.coordinates.log_columns, np.log(np.abs(theta) + 1e-300), theta)
+
+
+def _diagnosed(values: Array) -> Diagnostics:
+    """Diagnostics of (ensembles, steps, walkers, d) draws."""
     autocorrelation = np.maximum(slowest_autocorrelation_steps(values), 1.0)
     draws = values.shape[0] * values.shape[1] * values.shape[2]
     return Diagnostics(autocorrelation, draws / autocorrelation, nested_r_hat(values))
 
 
-def worth_learning_again(state: Sampling, policy: Policy) -> bool:
-    """Whether the proposal is to be learned once more: for what it overlooks, or because that promises more draws."""
-    again = state.learned.again
-    return state.learned.overlooked > 0.0 and again < _MOST_AGAIN or again < _FOR_MORE and promises_more(state, policy)
+def worth_a_new_start(state: Sampling) -> bool:
+    """Whether the draws so far are to be given up: a mode may be about to be found.
+
+    So it may be where the proposal is very poor, for walkers took a mode's share from it when they began; and where it
+    still overlooks something, learned again from kept draws as often as that is done.
+    """
+    assert state.diagnostics is not None
+    again, poor = state.learned.again, state.diagnostics.ess.min() < _POOR * state.all_kept.evaluations
+    return bool(poor) if again < _FOR_MORE else state.learned.overlooked > 0.0 and again < _MOST_AGAIN
 
 
-def promises_more(state: Sampling, policy: Policy) -> bool:
-    """Whether with a proposal as good as usual, learned once more, draws would be enough after fewer evaluations.
+def worth_refining(state: Sampling, policy: Policy) -> bool:
+    """Whether the proposal is to be learned once more, all draws kept.
 
-    Or the proposal is so poor that it may be about to find a mode, whose share walkers took from it when they began.
+    For what it overlooks, or because with one as good as usual draws would be enough after fewer evaluations.
     """
     assert state.diagnostics is not None
     least = state.diagnostics.ess.min()
-    going_on = state.kept.evaluations * (policy.ess / least - 1.0)
-    poor = least < _POOR * state.kept.evaluations
-    return bool(poor or going_on > policy.ess / USUAL + policy.round_draws)
+    going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
+    promising = going_on > (policy.ess - least) / USUAL + policy.round_draws
+    return bool(state.learned.again < _FOR_MORE and (state.learned.overlooked > 0.0 or promising))
 
 
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
-_WEIGHED = 16384  # kept draws whose weights are looked at
-_MOST_AGAIN = 5  # times that the proposal may be learned once more for what it overlooks
-_FOR_MORE = 3  # times that it may be learned once more for more effective draws
+# times that the proposal may be learned again, and, from then on, that draws may be given up for what it overlooks
+_FOR_MORE, _MOST_AGAIN = 3, 5
+# standard errors between draws of two proposals: thirty numbers of which all agree exceed it in two of a thousand cases
+_DISAGREE = 4.0
 USUAL, _POOR = 0.6, 0.2  # effective draws per kept evaluation
