@@ -260,7 +260,7 @@ def test_kept_draws_teach_the_next_proposal_and_count_on() -> None:
     assert learned.shares == proposal.SHARES and len(learned.close.weights) == 6
     places = z.reshape(-1, d)
     spread = [np.std(target(places) - by.log_density(places)) for by in (learned, start)]
-    assert spread[0] < 0.1 * spread[1]  # nats: a tenth of what was left by the start
+    assert spread[0] < 0.5 * spread[1]  # in nats, half of what the start left
 
 
 def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:
