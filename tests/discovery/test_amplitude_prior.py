@@ -70,7 +70,7 @@ def test_information_on_amplitudes_is_that_of_a_regression_beside_everything_els
 
     def prior(z: np.ndarray) -> float:
         theta = target.coordinates.to_natural(z)
-        return float((target.log_prior(theta) + target.coordinates.log_jacobian(theta))[0])
+        return float((target.log_prior(theta) + target.coordinates.log_jacobian(theta, z))[0])
 
     moving = [i for i, name in enumerate(names) if name not in ("sensor_sd", "setting_sd")]
     h = 1e-5

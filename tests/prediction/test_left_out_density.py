@@ -29,7 +29,7 @@ def test_the_densities_are_those_of_problems_without_a_hold(likelihood: str) -> 
     theta = problem.prior.rvs(200, np.random.default_rng(0))
     holds = [(0, 0), (0, 5), (1, 3)]
     likelihoods = [p.log_likelihood(theta) for p in (problem, *(without_hold(problem, s, j) for s, j in holds))]
-    prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta)
+    prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta, target.coordinates.to_sampled(theta))
     found, expected = joined(target, holds)(target.coordinates.to_sampled(theta)), prior + likelihoods
     good = np.isfinite(expected).all(axis=0)
     assert good.sum() > 100
@@ -41,7 +41,7 @@ def test_where_a_density_cannot_be_computed_it_is_zero() -> None:
     n = 2500
     whole, without = np.arange(float(n)), np.stack([np.arange(n) + 0.5, np.zeros(n)])
     whole[7], without[0, 9], without[0, 2100] = np.nan, np.inf, -np.inf
-    coordinates = SimpleNamespace(to_natural=lambda z: z, log_jacobian=lambda theta: 3.0 + 0.0 * theta[:, 0])
+    coordinates = SimpleNamespace(to_natural=lambda z: z, log_jacobian=lambda theta, z: 3.0 + 0.0 * theta[:, 0])
 
     def parts(theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         rows = theta[:, 0].astype(int)
@@ -72,7 +72,7 @@ class Normals:
 def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The number of densities in each pool that was sampled, of `Normals`."""
     identity = SimpleNamespace(
-        to_sampled=lambda x: x, to_natural=lambda x: x, log_jacobian=lambda x: np.zeros(len(x)), order=np.arange(2)
+        to_sampled=lambda x: x, to_natural=lambda x: x, log_jacobian=lambda x, z: np.zeros(len(x)), order=np.arange(2)
     )
     monkeypatch.setattr(
         module,

@@ -614,7 +614,7 @@ def prior_density(target: LogPosterior, z: Array) -> Array:
     """(n,) log density of the prior in the sampled coordinates."""
     theta = target.coordinates.to_natural(z)
     with np.errstate(all="ignore"):  # a parameter that underflows to zero has no density
-        return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta))
+        return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta, z))
 
 
 def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Array, Array]:

@@ -59,6 +59,7 @@ class FixtureCompliance(Effect):
     place = "strain"
     formula = "series"
     scope = "instrument"
+    in_series = True
     amplitudes = (Amplitude("c", "mm/N", 0.0, stats.halfnorm(0.0, 0.2)),)
     sentence = "The test bench itself deforms under the tension."
     shows = "k1 differs by length; needs two lengths of one line"

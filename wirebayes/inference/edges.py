@@ -22,11 +22,14 @@ class Edge:
     Attributes
     ----------
     score, value, log_prior : function of an array
+    ends : bool
+        Whether the values have an upper end.
     """
 
     score: Callable[[Array], Array]
     value: Callable[[Array], Array]
     log_prior: Callable[[Array], Array]
+    ends: bool
 
     def log_slope(self, value: Array) -> Array:
         """(n,) log |d value / d score|."""
@@ -54,7 +57,7 @@ def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
         low, high = erfinv(ndtr(np.minimum(score, 0.0))), erfcinv(ndtr(-np.maximum(score, 0.0)))
         return np.asarray(unit * np.where(score < 0.0, low, high))
 
-    return Edge(score, value, log_prior)
+    return Edge(score, value, log_prior, False)
 
 
 def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> Edge:
@@ -64,4 +67,4 @@ def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> E
     def value(score: Array) -> Array:
         return np.asarray(low + width * ndtr(score))
 
-    return Edge(score, value, log_prior)
+    return Edge(score, value, log_prior, True)

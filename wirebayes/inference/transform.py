@@ -14,11 +14,14 @@ deviations of their prior. Then, one after the other,
 - the preload becomes what is wide where the first hold hardly creeps (`wirebayes.inference.slack_edge`);
 - log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost / step)``, with the tension lost
   in a hold over the root mean square of the steps between first readings. Where all creep is over before a first
-  reading, the readings see this stiffness alone; where there is little, it is k1.
+  reading, the readings see this stiffness alone; where there is little, it is k1;
+- where a fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its fixture, and what creeps
+  beside the creep in proportion to a sampled amplitude belongs to the tension lost in a hold; these compliances and
+  amplitudes become their shares (`wirebayes.inference.shares`).
 
-The map is triangular, and its steps but that of the preload have unit Jacobian. Those of U and the preload are for
-proposals to draw from: Laplace approximations, as the search for effects compares them, do without. Values of partially
-pooled specimens come last (`wirebayes.inference.specimens`).
+The map is triangular, and its steps but those of the preload and of shares have unit Jacobian. Those of U, the preload
+and shares are for proposals to draw from: Laplace approximations, as the search for effects compares them, do without.
+Values of partially pooled specimens come last (`wirebayes.inference.specimens`).
 
 The proposal learns the remaining curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the
 columns are ordered: errors before what they widen, the shape of the creep before its amount and the stiffness.
@@ -31,8 +34,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.inference import shares
 from wirebayes.inference.edges import edge
 from wirebayes.inference.power_of_tension import suiting_powers
+from wirebayes.inference.shares import Elongation
 from wirebayes.inference.slack_edge import slack_edge
 from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
@@ -56,7 +61,8 @@ class _Ridge:
     """Columns of one material's parameters (or fixed values), which of them are shifted, and the map's constants.
 
     `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured. `powers`
-    are log hazards and the log U that suits the losses best at each of them.
+    are log hazards and the log U that suits the losses best at each of them. `fixture` is the column of a compliance in
+    series with the wire, and `beside` what creeps beside the creep.
     """
 
     where: dict[str, int]
@@ -73,6 +79,13 @@ class _Ridge:
     effects: tuple[Effect, ...]
     holds: tuple[HoldContext, ...]
     powers: tuple[Array, Array]
+    fixture: int | None = None
+    beside: tuple[Elongation, ...] = ()
+
+    @property
+    def shares(self) -> list[int]:
+        """Columns of what is sampled by its share."""
+        return [*([] if self.fixture is None else [self.fixture]), *(each.column for each in self.beside)]
 
     def get(self, theta: Array, name: str) -> Any:
         """(n,) a parameter of the material, or the number that it is fixed at."""
@@ -81,6 +94,13 @@ class _Ridge:
     def log_power(self, z: Array) -> Array:
         """(n,) log U that suits the measured losses best at the hazards of sampled coordinates (n, d)."""
         return np.interp(z[:, self.where["k2"]], *self.powers)
+
+    def log_stiffness(self, theta: Array) -> Array:
+        """(n,) log tension per elongation, N/mm, of the wire with its fixture."""
+        stiffness = np.log(self.get(theta, "k1")) - self.log_length
+        if self.fixture is None:
+            return np.asarray(stiffness)
+        return np.asarray(stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness))
 
     def softened(self, z: Array) -> Array:
         """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
@@ -155,6 +175,8 @@ class Transformation:
 
     Attributes
     ----------
+    shares : list of int
+        Columns of amounts that are sampled by their shares in a sum.
     noises : tuple of Noises
         Of every sample of which neither noise is fixed.
     sensor_columns, setting_columns : lists of int
@@ -187,7 +209,8 @@ class Transformation:
         steepest = np.inf if self.specimens is None else _STEEPEST
         unpooled = set(names) if self.specimens is None else set()
         self.order = np.array(sorted(range(len(names)), key=lambda i: (i not in first, _rank(names[i]))))
-        self.ridges = []
+        self.ridges: list[_Ridge] = []
+        self.shares: list[int] = []
         shifted: set[str] = set()  # a column that several samples share follows the first of them
         for sample in problem.samples:
             mark = _mark(problem, sample.material)
@@ -218,7 +241,9 @@ class Transformation:
                         where[column] = names.index(name)
                     else:
                         fixed[column] = problem.prior.fixed[name]
-                self.ridges.append(_ridge(where, fixed, moved, steepest, problem, sample, effects))
+                ridge = _ridge(where, fixed, moved, steepest, problem, sample, effects)
+                self.ridges.append(self._with_shares(ridge, sample) if for_draws else ridge)
+                self.shares += self.ridges[-1].shares
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -236,15 +261,24 @@ class Transformation:
         for slack in self.slack_edges:
             z[:, slack.preload] = slack.score(theta) / self.scale[slack.preload]
         for ridge in self.ridges:
-            creep, hazard = self._shifts(theta, ridge)
             if "k2" in ridge.shifted:
-                z[:, ridge.where["k2"]] += hazard
+                z[:, ridge.where["k2"]] += self._hazard(theta, ridge)
             if "U" in ridge.shifted:
                 z[:, ridge.where["U"]] -= ridge.log_power(z)
-            if "B" in ridge.shifted:
-                z[:, ridge.where["B"]] += creep
-            if "k1" in ridge.shifted:
-                z[:, ridge.where["k1"]] -= ridge.softened(z)
+            with np.errstate(all="ignore"):
+                if "B" in ridge.shifted:
+                    lost = z[:, ridge.where["B"]] + self._log_loss(theta, ridge)
+                    for part in ridge.beside:
+                        own = np.log(theta[:, part.column]) + part.log_gained(theta) + ridge.log_stiffness(theta)
+                        z[:, part.column] = shares.score(own, lost)
+                        lost = np.logaddexp(lost, own)
+                    z[:, ridge.where["B"]] = lost
+                if ridge.fixture is not None:
+                    own = np.log(theta[:, ridge.fixture]) + np.log(ridge.get(theta, "k1")) - ridge.log_length
+                    z[:, ridge.fixture] = shares.score(own, np.zeros_like(own))
+                    z[:, ridge.where["k1"]] -= np.logaddexp(0.0, own)
+                if "k1" in ridge.shifted:
+                    z[:, ridge.where["k1"]] -= ridge.softened(z)
         if self.specimens is not None:
             z[:, self.specimens.own] = self.specimens.to_sampled(theta)
         return z
@@ -254,7 +288,7 @@ class Transformation:
         theta = z * self.scale
         for i, at in self.edges.items():
             theta[:, i] = at.value(z[:, i])
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
             theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
             for ridge in self.ridges:
                 if "k2" in ridge.shifted:
@@ -262,20 +296,36 @@ class Transformation:
                 if "U" in ridge.shifted:
                     theta[:, ridge.where["U"]] = np.exp(z[:, ridge.where["U"]] + ridge.log_power(z))
                 if "k1" in ridge.shifted:
-                    theta[:, ridge.where["k1"]] = np.exp(z[:, ridge.where["k1"]] + ridge.softened(z))
+                    log_k1 = z[:, ridge.where["k1"]] + ridge.softened(z)
+                    if ridge.fixture is not None:
+                        share, rest = shares.log_shares(z[:, ridge.fixture])
+                        theta[:, ridge.fixture] = np.exp(share - log_k1 + ridge.log_length)
+                        log_k1 = log_k1 - rest
+                    theta[:, ridge.where["k1"]] = np.exp(log_k1)
                 if "B" in ridge.shifted:
-                    theta[:, ridge.where["B"]] = np.exp(z[:, ridge.where["B"]] - self._shifts(theta, ridge)[0])
+                    lost = z[:, ridge.where["B"]]
+                    for part in reversed(ridge.beside):
+                        share, rest = shares.log_shares(z[:, part.column])
+                        gained = part.log_gained(theta) + ridge.log_stiffness(theta)
+                        theta[:, part.column], lost = np.exp(lost + share - gained), lost + rest
+                    theta[:, ridge.where["B"]] = np.exp(lost - self._log_loss(theta, ridge))
             if self.specimens is not None:
                 theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
             for slack in self.slack_edges:
                 theta[:, slack.preload] = slack.value(theta[:, slack.preload], theta)
         return theta
 
-    def log_jacobian(self, theta: Array) -> Array:
-        """(n,) log |d natural / d sampled|."""
+    def log_jacobian(self, theta: Array, z: Array) -> Array:
+        """(n,) log |d natural / d sampled|.
+
+        Parameters
+        ----------
+        theta, z : (n, d) arrays
+            Natural parameters and their coordinates.
+        """
         total = np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum()
         for i, at in self.edges.items():
-            total = total + at.log_slope(theta[:, i])
+            total = total + (shares.log_slope(theta[:, i], z[:, i]) if i in self.shares else at.log_slope(theta[:, i]))
         for slack in self.slack_edges:
             total = total + slack.log_slope(theta)
         if self.specimens is not None:
@@ -292,6 +342,8 @@ class Transformation:
         """
         # other coordinates than logarithms have a standard deviation of one already
         out = np.where(self.log_columns, np.log(np.where(self.log_columns, theta, 1.0)), z) / self.log_spread
+        for i in self.shares:
+            out[:, i] = self.edges[i].score(theta[:, i])
         for slack in self.slack_edges:
             out[:, slack.preload] = theta[:, slack.preload] / self.scale[slack.preload]
         if self.specimens is not None:
@@ -304,11 +356,36 @@ class Transformation:
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
         return np.asarray(ridge.get(theta, "N") * np.log(0.5 * ridge.hold_s))
 
-    def _shifts(self, theta: Array, ridge: _Ridge) -> tuple[Array, Array]:
-        k1, U, k2, N = (ridge.get(theta, name) for name in ("k1", "U", "k2", "N"))
-        with np.errstate(all="ignore"):
-            creep = ridge.log_creep(U, k2, N, theta) + np.log(k1) - ridge.log_length
-        return creep, self._hazard(theta, ridge)
+    def _log_loss(self, theta: Array, ridge: _Ridge) -> Array:
+        U, k2, N = (ridge.get(theta, name) for name in ("U", "k2", "N"))
+        return ridge.log_creep(U, k2, N, theta) + ridge.log_stiffness(theta)
+
+    def _with_shares(self, ridge: _Ridge, sample: Sample) -> _Ridge:
+        """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.
+
+        Of these any sum and any share is possible. What belongs to a ridge before stays there.
+        """
+        names, fixed = self.problem.names, self.problem.prior.fixed
+        ends = tuple(
+            replace(hold, time_s=ridge.times_s[time].reshape(1, 1))
+            for hold, time in zip(ridge.holds, ridge.which_time, strict=True)
+        )
+        for effect in sample.model.effects:
+            columns = [self.problem.column(column, sample) for column in effect.columns()]
+            if not columns or columns[0] not in names or (amount := names.index(columns[0])) in self.shares:
+                continue
+            if amount not in self.edges or self.edges[amount].ends:
+                continue
+            if effect.in_series and "k1" in ridge.shifted:
+                ridge = replace(ridge, fixture=amount)
+            elif effect.amplitudes[0].is_elongation and "B" in ridge.shifted:
+                others = {
+                    a.name: names.index(c) if c in names else fixed[c]
+                    for a, c in zip(effect.amplitudes[1:], columns[1:], strict=True)
+                }
+                part = Elongation(amount, effect, others, ends, ridge.kept)
+                ridge = replace(ridge, beside=(*ridge.beside, part))
+        return ridge
 
 
 def _noises(problem: Problem, log_columns: NDArray[np.bool_], spread: Array) -> tuple[Noises, ...]:
@@ -412,7 +489,7 @@ class LogPosterior:
         for p in pieces:
             theta = self.coordinates.to_natural(z[p])
             with np.errstate(all="ignore"):
-                prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta)
+                prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z[p])
                 residuals = self.coordinates.prior_residuals(theta, z[p])
             picked = None if readings is None else [y[..., p] for y in readings]
             value, left = self.problem.standardised(theta, picked)
@@ -441,7 +518,7 @@ class LogPosterior:
     def _values(self, z: Array, readings: Any) -> Array:
         theta = self.coordinates.to_natural(z)
         with np.errstate(all="ignore"):
-            value = self.log_prior(theta) + self.coordinates.log_jacobian(theta)
+            value = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
         inside = np.isfinite(value)
         if not inside.any():
             return np.full(len(z), -np.inf)

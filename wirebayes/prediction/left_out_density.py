@@ -121,7 +121,7 @@ def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
         theta = target.coordinates.to_natural(z)
         whole, without = target.problem.without_each_hold(theta)
         with np.errstate(all="ignore"):
-            prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta)
+            prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta, z)
             value = prior[:, None] + np.column_stack([whole, *(without[s][j] for s, j in holds)])
         return np.where(np.isfinite(value), value, -np.inf)
 

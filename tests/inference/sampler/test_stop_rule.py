@@ -36,14 +36,16 @@ def draws(steps: int, memory: float = 0.0, seed: int = 0) -> np.ndarray:
     return out
 
 
-def looked(z: np.ndarray, overlooked: float = 0.0, again: int = 0, **policy: float) -> tuple[Sampling, Diagnostics]:
+def looked(
+    z: np.ndarray, overlooked: float = 0.0, again: int = 0, lost: float = 0.0, **policy: float
+) -> tuple[Sampling, Diagnostics]:
     """What the rule says of draws."""
     blocks = z[: len(z) // 2], z[len(z) // 2 :]
-    learned = Learned(None, None, 1, trusted=overlooked > 0, again=again)  # type: ignore[arg-type]
+    learned = Learned(None, None, 1, trusted=overlooked + lost > 0, again=again)  # type: ignore[arg-type]
     state = Sampling(Walkers(z[-1], np.zeros(len(z[-1])), None), learned, None, 0)  # type: ignore[arg-type]
     state = replace(state, kept=Kept(blocks, tuple(np.zeros(block.shape[:2]) for block in blocks)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(burn_in, "overlooked", lambda *given: overlooked)
+        patch.setattr(burn_in, "overlooked", lambda *given: (overlooked, lost))
         found = stop_rule.apply(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
     assert found.diagnostics is not None
     return found, found.diagnostics
@@ -136,8 +138,8 @@ def test_the_last_step_ends_it_and_names_what_is_missing() -> None:
     [
         (OUTWEIGHS - 0.1, 0, True, True),
         (OUTWEIGHS + 0.1, 0, False, False),
-        (OUTWEIGHS + 0.1, 4, False, False),
-        (OUTWEIGHS + 0.1, 5, True, False),
+        (OUTWEIGHS + 0.1, 7, False, False),
+        (OUTWEIGHS + 0.1, 8, True, False),
     ],
 )
 def test_places_that_the_proposal_overlooks(nats: float, again: int, finished: bool, converged: bool) -> None:
@@ -203,21 +205,23 @@ def test_what_is_left_to_do_is_weighed_against_a_better_proposal(wanted: float, 
 @pytest.mark.parametrize(
     ("ess", "finished", "again", "overlooked", "expected"),
     [(10.0, False, 0, 0.0, "anew"), (10.0, False, 2, 9.0, "anew"), (10.0, False, 3, 0.0, "on"),
-     (10.0, False, 3, 9.0, "anew"), (10.0, False, 4, 9.0, "anew"), (10.0, False, 5, 9.0, "on"),
+     (10.0, False, 3, 9.0, "refined"), (10.0, False, 7, 9.0, "refined"), (10.0, False, 8, 9.0, "on"),
      (10.0, True, 0, 9.0, "on"), (2100.0, False, 0, 0.0, "refined"), (2100.0, False, 2, 9.0, "refined"),
-     (2100.0, False, 3, 0.0, "on"), (2100.0, False, 3, 9.0, "anew"), (3990.0, False, 0, 0.0, "on"),
-     (3990.0, False, 0, 9.0, "refined"), (3990.0, True, 0, 9.0, "on")],
+     (2100.0, False, 3, 0.0, "on"), (2100.0, False, 3, 9.0, "refined"), (2100.0, False, 8, 9.0, "on"),
+     (3990.0, False, 0, 0.0, "on"), (3990.0, False, 0, 9.0, "refined"), (3990.0, True, 0, 9.0, "on")],
 )  # fmt: skip
-def test_a_proposal_is_learned_again_three_times_and_twice_more_for_what_it_overlooks(
+def test_a_proposal_is_learned_again_three_times_and_five_more_for_what_it_overlooks(
     ess: float, finished: bool, again: int, overlooked: float, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Draws are kept the first three times, unless the proposal is poor."""
+    """Draws are given up where the proposal is poor, the first three times, or walkers have lost a mode."""
     state = replace(after(100, ess, evaluations=10_000, again=again, overlooked=overlooked), finished=finished)
     monkeypatch.setattr(kept, "more", lambda target, state, policy: state)
     monkeypatch.setattr(stop_rule, "apply", lambda target, state, policy: state)
     monkeypatch.setattr(burn_in, "again", lambda target, state, policy: "anew")
     monkeypatch.setattr(burn_in, "refined", lambda target, state, policy: "refined")
     found = kept.step(None, state, Policy())  # type: ignore[arg-type]
+    lost = kept.step(None, replace(state, learned=replace(state.learned, lost=True)), Policy())  # type: ignore[arg-type]
+    assert (lost == "anew") is (again < 8 and not finished)
     assert (found if isinstance(found, str) else "on") == expected
 
 
@@ -314,9 +318,9 @@ def test_the_last_look_decides_which_draws_are_weighed(monkeypatch: pytest.Monke
     """All of them, those of earlier proposals too; the places and densities that were kept, and no others."""
     given: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def overlooked(learned: Learned, z: np.ndarray, value: np.ndarray) -> float:
+    def overlooked(learned: Learned, z: np.ndarray, value: np.ndarray) -> tuple[float, float]:
         given.append((z, value))
-        return 0.0
+        return 0.0, 0.0
 
     monkeypatch.setattr(burn_in, "overlooked", overlooked)
     learned = Learned(None, None, 1, trusted=True)  # type: ignore[arg-type]
@@ -361,7 +365,10 @@ def test_autocorrelation_and_r_hat_are_ratios_of_variances_with_their_divisors()
 def test_what_a_proposal_overlooks_is_known_at_every_look(enough: dict[str, float]) -> None:
     """Whether or not the draws are enough; from the bound on it counts."""
     for beyond, counts in ((OUTWEIGHS - 0.01, 0.0), (OUTWEIGHS + 0.01, OUTWEIGHS + 0.01)):
-        assert looked(draws(64), overlooked=beyond, **enough)[0].learned.overlooked == counts
+        known = looked(draws(64), overlooked=beyond, lost=1.0, **enough)[0].learned
+        assert known.overlooked == counts and not known.lost
+        known = looked(draws(64), overlooked=1.0, lost=beyond, **enough)[0].learned
+        assert known.overlooked == counts and known.lost is (counts > 0.0)
     # a proposal that was given up overlooks nothing
     given_up, _ = looked(draws(64))
     assert given_up.converged and not given_up.learned.trusted and given_up.learned.overlooked == 0.0

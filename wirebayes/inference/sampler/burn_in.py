@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.modes import LEAST_CURVATURE, Optimum, search
+from wirebayes.inference.modes import LEAST_CURVATURE, Optimum, climb, distinct, search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture
@@ -62,7 +62,7 @@ def init(
         searched = search(target, rng, extra=near)
         found, seen = searched.modes, seen or (Points.equal(searched.warm), Points.equal(searched.cold))
         witness = searched.cold, searched.height
-    known = mixture.from_modes(found.z, found.covariance * _OVERDISPERSED, found.log_evidence)
+    known = _overdispersed(found)
     random = np.random.RandomState(np.random.MT19937(spawned[1]))
     places = _finite_draws(target, known, _walking(target, policy), random)
     learned = Learned(known, known, len(found.z), witness)
@@ -146,14 +146,17 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     state : Sampling
     policy : Policy
     """
-    learned, done = replace(state.learned, again=state.learned.again + 1), policy.rounds - 1
+    learned, done = replace(state.learned, again=state.learned.again + 1, previous=None), policy.rounds - 1
     if _hard_to_find(learned):  # few rounds of many draws: what is overlooked is rare
         done = max(done, policy.most_rounds - _FEW_ROUNDS)
     return _of_kept(target, replace(state, learned=learned), policy, done)
 
 
-def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
+def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
     """The run with its proposal learned again from the kept draws, which stay; walkers go on from where they are.
+
+    Unless the places of which the proposal makes least lead to a mode that was unknown: then kept draws, most of which
+    do not know of it either, count as burn-in.
 
     Parameters
     ----------
@@ -161,9 +164,40 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     state : Sampling
     policy : Policy
     """
-    state = replace(state, learned=replace(state.learned, again=state.learned.again + 1))
+    before = target.evaluations
+    known = _modes_of(target, state.learned.start)
+    found = distinct([known, _climbed(target, state, known)])
+    state = replace(state, evaluations=state.evaluations + target.evaluations - before)
+    if len(found.z) > len(known.z):
+        start = _overdispersed(found)
+        return again(target, replace(state, learned=replace(state.learned, start=start, modes=len(found.z))), policy)
+    learned = replace(state.learned, again=state.learned.again + 1, previous=state.learned.proposal)
+    state = replace(state, learned=learned)
     learned = _as_frozen(_of_kept(target, state, policy, policy.rounds).learned)
     return replace(state, learned=learned, kept=Kept(), earlier=state.all_kept, diagnostics=None)
+
+
+def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:
+    """Where climbs end that begin at kept draws of which the proposal makes least, but for those near known modes."""
+    kept = state.all_kept
+    z = np.concatenate(kept.z).reshape(-1, known.z.shape[1])
+    over = np.concatenate(kept.log_density).ravel() - state.learned.proposal.log_density(z)
+    least = np.unique(z[over >= np.quantile(over, 1.0 - _LEAST_OF)], axis=0)
+    begin = least[mixture.spread_rows(least / z.std(axis=0), _CLIMBS, state.generator)]
+    density, residuals = target.rowwise()
+    found = climb(density, begin, residuals, of=np.zeros(len(begin), np.int64), known=[known])
+    return found.rows(found.converged & np.isfinite(found.log_density))
+
+
+def _overdispersed(modes: Optimum) -> Mixture:
+    return mixture.from_modes(modes.z, modes.covariance * _OVERDISPERSED, modes.log_evidence)
+
+
+def _modes_of(target: LogPosterior, start: Mixture) -> Optimum:
+    """The modes that `_overdispersed` gave this mixture of."""
+    inverse = np.linalg.inv(start.factors)
+    curvature = _OVERDISPERSED * np.swapaxes(inverse, 1, 2) @ inverse
+    return Optimum(start.centres, target(start.centres), curvature, np.ones(len(start.centres), bool))
 
 
 def _of_kept(target: LogPosterior, state: Sampling, policy: Policy, done: int) -> BurnIn:
@@ -183,11 +217,11 @@ def _as_frozen(learned: Learned) -> Learned:
     return replace(learned, proposal=replace(learned.proposal, shares=proposal.SHARES))
 
 
-def overlooked(learned: Learned, z: Array, value: Array) -> float:
+def overlooked(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
     """How far places that matter lie above what the frozen proposal makes of them, in nats.
 
     The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
-    draws, and at its 99 % quantile over the rough draws that the search left; the larger counts. A neck into which few
+    draws, and at its 99 % quantile over the rough draws that the search left. A neck into which few
     walkers found their way, and stayed, shows in the first, a mode that they lost in the second. Of the search's
     draws, those do not count where even a hill as wide as the prior would hold next to nothing: where annealing lost
     most of its rows, copies of such places are what it ended with.
@@ -203,16 +237,16 @@ def overlooked(learned: Learned, z: Array, value: Array) -> float:
 
     Returns
     -------
-    float
+    of_kept, of_search : float
     """
     over = value - learned.proposal.log_density(z)
     middle, high = np.quantile(over, [0.5, 0.999])
     if learned.witness is None:
-        return float(high - middle)
+        return float(high - middle), 0.0
     z, value = learned.witness
     matters = value + z.shape[1] * _WIDEST > middle + _NEXT_TO_NOTHING
     left = np.where(matters, value - learned.proposal.log_density(z), middle)
-    return float(max(high, np.quantile(left, 0.99)) - middle)
+    return float(high - middle), float(np.quantile(left, 0.99) - middle)
 
 
 def _hard_to_find(learned: Learned) -> bool:
@@ -330,4 +364,5 @@ _TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where plac
 # steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
 _LONGEST_SETTLING = 8
 _MOST_COMPONENTS = 24  # however many modes there are
+_LEAST_OF, _CLIMBS = 0.002, 6  # share of the kept draws that climbs begin from, and how many begin there
 _MORE_COMPONENTS = 2  # times as many for a proposal that has proved too poor: arms that hold a hundredth of the mass

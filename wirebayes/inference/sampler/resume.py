@@ -15,7 +15,7 @@ from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned
 from wirebayes.io.run_folder import stored_results
 from wirebayes.typing import Array
 
-_PLAIN_LEARNED = ("modes", "trusted", "acceptance", "walks", "again", "overlooked")
+_PLAIN_LEARNED = ("modes", "trusted", "acceptance", "walks", "again", "overlooked", "lost")
 _PLAIN_KEPT = ("evaluations", "accepted", "proposed")
 _KEPT, _BLOCKS = ("kept", "earlier"), ("z", "log_density")
 _PLAIN_SAMPLING = ("finished", "converged", "why")
@@ -63,12 +63,12 @@ def to_values(state: State) -> dict[str, Any]:
 def to_arrays(state: State) -> dict[str, Any]:
     """Arrays by name, those of parts under the part's name; absent ones are None."""
     walkers, learned = state.walkers, state.learned
-    kind = "proposal" if isinstance(learned.proposal, Proposal) else "mixture"
     out: dict[str, Any] = {
         "positions": walkers.positions,
         "values": walkers.values,
         "random": walkers.random[1],
-        kind: learned.proposal.to_arrays(),
+        "proposal": learned.proposal.to_arrays(),
+        "previous": None if learned.previous is None else learned.previous.to_arrays(),
         "start": learned.start.to_arrays(),
         "witness": _numbered(learned.witness),
     }
@@ -83,9 +83,8 @@ def to_arrays(state: State) -> dict[str, Any]:
 def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
     """The state that gave these values and arrays."""
     learned = Learned(
-        proposal=Proposal.from_arrays(arrays["proposal"])
-        if "proposal" in arrays
-        else Mixture.from_arrays(arrays["mixture"]),
+        proposal=_drawn_from(arrays["proposal"]),
+        previous=_drawn_from(arrays["previous"]) if "previous" in arrays else None,
         start=Mixture.from_arrays(arrays["start"]),
         witness=_tuple(arrays, "witness"),
         **values["learned"],
@@ -102,6 +101,10 @@ def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
     kept, earlier = (_kept(values[which], arrays.get(which, {})) for which in _KEPT)
     looked = Diagnostics(*(arrays[name] for name in ("autocorrelation", "ess", "r_hat"))) if "ess" in arrays else None
     return Sampling(*run, kept, looked, earlier=earlier, **{name: values[name] for name in _PLAIN_SAMPLING})
+
+
+def _drawn_from(arrays: Mapping[str, Any]) -> Proposal | Mixture:
+    return Proposal.from_arrays(arrays) if "straight" in arrays else Mixture.from_arrays(arrays)
 
 
 def _blocks(kept: Kept) -> dict[str, Array]:

@@ -62,7 +62,12 @@ class Learned:
     again : int
         So often the proposal was learned again, from kept draws.
     overlooked : float
-        What `wirebayes.inference.sampler.burn_in.overlooked` said at the last look, where all else was enough.
+        The larger of what `wirebayes.inference.sampler.burn_in.overlooked` said at the last look, where that was too
+        much.
+    lost : bool
+        Whether it was too much of what the search left: a mode that walkers have lost.
+    previous : Proposal or Mixture, optional
+        What the learned move drew from before, where draws of that time still count.
     """
 
     proposal: Mixture | Proposal
@@ -74,6 +79,8 @@ class Learned:
     walks: int = 0
     again: int = 0
     overlooked: float = 0.0
+    lost: bool = False
+    previous: Mixture | Proposal | None = None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ import numpy as np
 from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
+from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Sampling, by_ensemble
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
@@ -27,15 +29,17 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     z = by_ensemble(state.all_kept.z, policy)
     values = _judged_by(target, z)
     before = state.earlier.steps
-    if before and farthest_apart(values[:, :before], values[:, before:]) > _DISAGREE:
+    if before and _contradicted(state, policy, z, values):
         state, z, values = replace(state, earlier=Kept()), z[:, before:], values[:, before:]
     steps, d = z.shape[1], z.shape[-1]
     found = _diagnosed(values)
-    beyond = 0.0
+    beyond = of_search = 0.0
     if state.learned.trusted:
         places, heights = (np.concatenate(blocks) for blocks in (state.all_kept.z, state.all_kept.log_density))
-        beyond = burn_in.overlooked(state.learned, places.reshape(-1, d), heights.ravel())
-    learned = replace(state.learned, overlooked=beyond if beyond > OUTWEIGHS else 0.0)
+        of_kept, of_search = burn_in.overlooked(state.learned, places.reshape(-1, d), heights.ravel())
+        beyond = max(of_kept, of_search)
+    counts = beyond if beyond > OUTWEIGHS else 0.0
+    learned = replace(state.learned, overlooked=counts, lost=of_search > OUTWEIGHS)
     state = replace(state, diagnostics=found, learned=learned)
     long_enough = steps >= ENOUGH * found.autocorrelation.max()
     if long_enough and (found.ess >= policy.ess).all() and (found.r_hat <= policy.r_hat).all():
@@ -66,6 +70,26 @@ def _judged_by(target: LogPosterior, z: Array) -> Array:
     return np.where(target.coordinates.log_columns, np.log(np.abs(theta) + 1e-300), theta)
 
 
+def _contradicted(state: Sampling, policy: Policy, z: Array, values: Array) -> bool:
+    """Whether draws of earlier proposals and those kept now, (ensembles, steps, walkers, d), are of two densities.
+
+    A mode that had too few draws hardly shows in a mean: the share of places of which the proposal of that time made
+    too little is looked at itself.
+    """
+    before, previous = state.earlier.steps, state.learned.previous
+    if farthest_apart(values[:, :before], values[:, before:]) > _DISAGREE:
+        return True
+    if previous is None:
+        return False
+    over = by_ensemble(state.all_kept.log_density, policy) - _log_proposal(previous, z)
+    little = over > np.median(over) + _LITTLE
+    return bool(little[:, before:].mean() - little[:, :before].mean() > _MISSED)
+
+
+def _log_proposal(of: Mixture | Proposal, z: Array) -> Array:
+    return of.log_density(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
+
+
 def _diagnosed(values: Array) -> Diagnostics:
     """Diagnostics of (ensembles, steps, walkers, d) draws."""
     autocorrelation = np.maximum(slowest_autocorrelation_steps(values), 1.0)
@@ -76,12 +100,17 @@ def _diagnosed(values: Array) -> Diagnostics:
 def worth_a_new_start(state: Sampling) -> bool:
     """Whether the draws so far are to be given up: a mode may be about to be found.
 
-    So it may be where the proposal is very poor, for walkers took a mode's share from it when they began; and where it
-    still overlooks something, learned again from kept draws as often as that is done.
+    So it may be where walkers have lost what the search had found, and where the proposal is very poor, for they took a
+    mode's share from it when they began.
     """
     assert state.diagnostics is not None
-    again, poor = state.learned.again, state.diagnostics.ess.min() < _POOR * state.all_kept.evaluations
-    return bool(poor) if again < _FOR_MORE else state.learned.overlooked > 0.0 and again < _MOST_AGAIN
+    known, least = state.learned, state.diagnostics.ess.min()
+    return bool(
+        known.lost
+        and known.again < _MOST_AGAIN
+        or known.again < _FOR_MORE
+        and least < _POOR * state.all_kept.evaluations
+    )
 
 
 def worth_refining(state: Sampling, policy: Policy) -> bool:
@@ -93,12 +122,17 @@ def worth_refining(state: Sampling, policy: Policy) -> bool:
     least = state.diagnostics.ess.min()
     going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
     promising = going_on > (policy.ess - least) / USUAL + policy.round_draws
-    return bool(state.learned.again < _FOR_MORE and (state.learned.overlooked > 0.0 or promising))
+    known = state.learned
+    wanted = known.again < _MOST_AGAIN and known.overlooked > 0.0 or known.again < _FOR_MORE and promising
+    return bool(known.trusted and wanted)
 
 
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
-# times that the proposal may be learned again, and, from then on, that draws may be given up for what it overlooks
-_FOR_MORE, _MOST_AGAIN = 3, 5
+# times that the proposal may be learned again for more draws, and for what it overlooks
+_FOR_MORE, _MOST_AGAIN = 3, 8
 # standard errors between draws of two proposals: thirty numbers of which all agree exceed it in two of a thousand cases
 _DISAGREE = 4.0
+# nats over the typical ratio of posterior to proposal: walkers seldom find such places, or stay; and how much of the
+# mass, found there later, says that too little had been found before
+_LITTLE, _MISSED = 3.0, 0.01
 USUAL, _POOR = 0.6, 0.2  # effective draws per kept evaluation
