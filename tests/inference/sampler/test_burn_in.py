@@ -236,8 +236,9 @@ def test_kept_draws_are_learned_from_as_burn_in(
     assert mean(seen["hot"]) == pytest.approx(3.0**0.4 / (1.0 + 3.0**0.4))
 
 
-def test_kept_draws_teach_the_next_proposal_and_count_on() -> None:
-    """No walker moves; the proposal has twice as many components, and frozen shares."""
+@pytest.mark.parametrize("again", [0, 1])
+def test_kept_draws_teach_the_next_proposal_and_count_on(again: int) -> None:
+    """But for the first time. No walker moves; the proposal has twice as many components, and frozen shares."""
     target, rng, policy = banana(), np.random.default_rng(0), Policy(ensembles=2, walkers=8, components=3)
     d = len(target.mean)
     start = Mixture(np.ones(1), np.zeros((1, d)), np.eye(d)[None])
@@ -247,13 +248,15 @@ def test_kept_draws_teach_the_next_proposal_and_count_on() -> None:
         Kept((part,), (target(part.reshape(-1, d)).reshape(-1, 16),), len(part), 3, 5) for part in (z[:150], z[150:])
     )
     walkers = Walkers(kept.z[0][-1], kept.log_density[0][-1], np.random.RandomState(0).get_state())
-    state = Sampling(walkers, Learned(start, start, 1, again=1), rng, 700, kept, earlier=before)
+    state = Sampling(walkers, Learned(start, start, 1, again=again), rng, 700, kept, earlier=before)
     spent = target.evaluations
     found = burn_in.refined(target, state, policy)  # type: ignore[arg-type]
     assert isinstance(found, Sampling)
     assert found.walkers is walkers and found.evaluations - 700 == target.evaluations - spent  # what climbs took
-    assert found.kept == Kept() and found.diagnostics is None and found.learned.again == 2
-    assert (found.earlier.steps, found.earlier.evaluations, found.earlier.accepted) == (250, 250, 6)
+    assert found.kept == Kept() and found.diagnostics is None and found.learned.again == again + 1
+    counted = (found.earlier.steps, found.earlier.evaluations, found.earlier.accepted)
+    assert counted == ((250, 250, 6) if again else (0, 0, 0))
+    assert found.learned.previous is (start if again else None)
     learned = found.learned.proposal
     assert isinstance(learned, proposal.Proposal)
     assert learned.shares == proposal.SHARES and len(learned.close.weights) == 6

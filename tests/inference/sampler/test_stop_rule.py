@@ -192,21 +192,26 @@ def test_draws_of_a_poor_proposal_are_given_up(ess: float, anew: bool) -> None:
     assert stop_rule.worth_a_new_start(replace(both, earlier=after(50, 1.0, evaluations=6_000).kept)) is anew
 
 
-@pytest.mark.parametrize(("wanted", "more"), [(6_700.0, False), (7_500.0, True)])
-def test_what_is_left_to_do_is_weighed_against_a_better_proposal(wanted: float, more: bool) -> None:
+@pytest.mark.parametrize(
+    ("again", "wanted", "more"),
+    [(0, 10_000.0, False), (0, 11_000.0, True), (1, 6_700.0, False), (1, 7_500.0, True), (3, 7_500.0, False)],
+)
+def test_what_is_left_to_do_is_weighed_against_a_better_proposal(again: int, wanted: float, more: bool) -> None:
     """At 0.25 effective draws an evaluation 6,700 wanted cost 6,800 more, 7,500 cost 10,000; with 0.6, and 4,096 to
-    learn it, 6,929 and 8,262."""
-    assert stop_rule.worth_refining(after(100, 5000.0, evaluations=20_000), Policy(ess=wanted)) is more
-    both = replace(after(50, 5000.0, evaluations=8_000), earlier=after(50, 1.0, evaluations=12_000).kept)
-    assert stop_rule.worth_refining(both, Policy(ess=wanted)) is more
-    assert not stop_rule.worth_refining(after(100, 5000.0, evaluations=20_000, again=3), Policy(ess=wanted))
+    learn it, 6,929 and 8,262. The first time all draws are wanted: 10,000 cost 20,000 or 20,763, 11,000 cost 24,000 or
+    22,429."""
+    policy = Policy(ess=wanted)
+    assert stop_rule.worth_refining(after(100, 5000.0, evaluations=20_000, again=again), policy) is more
+    both = replace(after(50, 5000.0, evaluations=8_000, again=again), earlier=after(50, 1.0, evaluations=12_000).kept)
+    assert stop_rule.worth_refining(both, policy) is more
 
 
 @pytest.mark.parametrize(
     ("ess", "finished", "again", "overlooked", "expected"),
     [(10.0, False, 0, 0.0, "anew"), (10.0, False, 2, 9.0, "anew"), (10.0, False, 3, 0.0, "on"),
      (10.0, False, 3, 9.0, "refined"), (10.0, False, 7, 9.0, "refined"), (10.0, False, 8, 9.0, "on"),
-     (10.0, True, 0, 9.0, "on"), (2100.0, False, 0, 0.0, "refined"), (2100.0, False, 2, 9.0, "refined"),
+     (10.0, True, 0, 9.0, "on"), (2100.0, False, 0, 0.0, "on"), (2100.0, False, 1, 0.0, "refined"),
+     (2100.0, False, 2, 9.0, "refined"),
      (2100.0, False, 3, 0.0, "on"), (2100.0, False, 3, 9.0, "refined"), (2100.0, False, 8, 9.0, "on"),
      (3990.0, False, 0, 0.0, "on"), (3990.0, False, 0, 9.0, "refined"), (3990.0, True, 0, 9.0, "on")],
 )  # fmt: skip

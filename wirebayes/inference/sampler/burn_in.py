@@ -153,10 +153,11 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
 
 
 def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
-    """The run with its proposal learned again from the kept draws, which stay; walkers go on from where they are.
+    """The run with its proposal learned again from the kept draws; walkers go on from where they are.
 
-    Unless the places of which the proposal makes least lead to a mode that was unknown: then kept draws, most of which
-    do not know of it either, count as burn-in.
+    The draws stay, but for the first time: walkers were placed by the weights of few draws, and such a proposal fills
+    the arms of a posterior slowly. None stays where the places of which the proposal makes least lead to a mode that
+    was unknown, for most draws do not know of it either; then there are rounds of burn-in as in `again`.
 
     Parameters
     ----------
@@ -171,10 +172,12 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling |
     if len(found.z) > len(known.z):
         start = _overdispersed(found)
         return again(target, replace(state, learned=replace(state.learned, start=start, modes=len(found.z))), policy)
-    learned = replace(state.learned, again=state.learned.again + 1, previous=state.learned.proposal)
+    first, learned = state.learned.again == 0, state.learned
+    learned = replace(learned, again=learned.again + 1, previous=None if first else learned.proposal)
     state = replace(state, learned=learned)
     learned = _as_frozen(_of_kept(target, state, policy, policy.rounds).learned)
-    return replace(state, learned=learned, kept=Kept(), earlier=state.all_kept, diagnostics=None)
+    earlier = Kept() if first else state.all_kept
+    return replace(state, learned=learned, kept=Kept(), earlier=earlier, diagnostics=None)
 
 
 def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:

@@ -13,9 +13,10 @@ block, until for every parameter
 or until `Policy.most_steps`: then the result says *not converged*, and why.
 
 If kept draws show that a better proposal would need fewer evaluations in total, or that it overlooks something, the
-proposal is learned again from them, and walkers go on with it. The draws so far stay: they are of a chain whose
-proposal was frozen, too. They are given up, and count as burn-in, where later ones disagree with them, and where the
-proposal was so poor, or overlooks something so often, that a mode may be about to be found.
+proposal is learned again from them, and walkers go on with it. From the second time on the draws so far stay: they are
+of a chain whose proposal was frozen, too. They are given up, and count as burn-in, where later ones disagree with them,
+where places that the proposal overlooks lead to a mode that the search had missed, and where the proposal is so poor
+that a mode may be about to be found.
 """
 
 from collections.abc import Callable

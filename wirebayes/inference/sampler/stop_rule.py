@@ -114,17 +114,18 @@ def worth_a_new_start(state: Sampling) -> bool:
 
 
 def worth_refining(state: Sampling, policy: Policy) -> bool:
-    """Whether the proposal is to be learned once more, all draws kept.
+    """Whether the proposal is to be learned once more from kept draws.
 
-    For what it overlooks, or because with one as good as usual draws would be enough after fewer evaluations.
+    For what it overlooks, or because with one as good as usual draws would be enough after fewer evaluations; the first
+    time the draws so far are lost.
     """
     assert state.diagnostics is not None
-    least = state.diagnostics.ess.min()
+    known, least = state.learned, state.diagnostics.ess.min()
     going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
-    promising = going_on > (policy.ess - least) / USUAL + policy.round_draws
-    known = state.learned
-    wanted = known.again < _MOST_AGAIN and known.overlooked > 0.0 or known.again < _FOR_MORE and promising
-    return bool(known.trusted and wanted)
+    wanted = policy.ess - (least if known.again else 0.0)
+    promising = going_on > wanted / USUAL + policy.round_draws
+    needed = known.again < _MOST_AGAIN and known.overlooked > 0.0
+    return bool(known.trusted and (needed or known.again < _FOR_MORE and promising))
 
 
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
