@@ -238,7 +238,7 @@ def test_kept_draws_are_learned_from_as_burn_in(
 
 @pytest.mark.parametrize("again", [0, 1])
 def test_kept_draws_teach_the_next_proposal_and_count_on(again: int) -> None:
-    """But for the first time. No walker moves; the proposal has twice as many components, and frozen shares."""
+    """But for the first block. No walker moves; the proposal has twice as many components, and frozen shares."""
     target, rng, policy = banana(), np.random.default_rng(0), Policy(ensembles=2, walkers=8, components=3)
     d = len(target.mean)
     start = Mixture(np.ones(1), np.zeros((1, d)), np.eye(d)[None])
@@ -255,8 +255,10 @@ def test_kept_draws_teach_the_next_proposal_and_count_on(again: int) -> None:
     assert found.walkers is walkers and found.evaluations - 700 == target.evaluations - spent  # what climbs took
     assert found.kept == Kept() and found.diagnostics is None and found.learned.again == again + 1
     counted = (found.earlier.steps, found.earlier.evaluations, found.earlier.accepted)
-    assert counted == ((250, 250, 6) if again else (0, 0, 0))
-    assert found.learned.previous is (start if again else None)
+    assert counted == ((250, 250, 6) if again else (68, 68, 2))
+    assert np.array_equal(np.concatenate(found.earlier.z), z if again else z[150 + policy.block :])
+    assert found.learned.previous is start
+    assert kept.after(99).steps == 1 and kept.after(100) == Kept()
     learned = found.learned.proposal
     assert isinstance(learned, proposal.Proposal)
     assert learned.shares == proposal.SHARES and len(learned.close.weights) == 6

@@ -155,9 +155,10 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
 def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
     """The run with its proposal learned again from the kept draws; walkers go on from where they are.
 
-    The draws stay, but for the first time: walkers were placed by the weights of few draws, and such a proposal fills
-    the arms of a posterior slowly. None stays where the places of which the proposal makes least lead to a mode that
-    was unknown, for most draws do not know of it either; then there are rounds of burn-in as in `again`.
+    The draws stay, but for the first block: walkers were placed by the weights of few draws, and a proposal such as is
+    learned again fills the arms of a posterior slowly. None stays where the places of which the proposal makes least
+    lead to a mode that was unknown, for most draws do not know of it either; then there are rounds of burn-in as in
+    `again`.
 
     Parameters
     ----------
@@ -172,11 +173,10 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling |
     if len(found.z) > len(known.z):
         start = _overdispersed(found)
         return again(target, replace(state, learned=replace(state.learned, start=start, modes=len(found.z))), policy)
-    first, learned = state.learned.again == 0, state.learned
-    learned = replace(learned, again=learned.again + 1, previous=None if first else learned.proposal)
-    state = replace(state, learned=learned)
+    earlier = state.all_kept if state.learned.again else state.kept.after(policy.block)
+    previous = state.learned.proposal if earlier.steps else None
+    state = replace(state, learned=replace(state.learned, again=state.learned.again + 1, previous=previous))
     learned = _as_frozen(_of_kept(target, state, policy, policy.rounds).learned)
-    earlier = Kept() if first else state.all_kept
     return replace(state, learned=learned, kept=Kept(), earlier=earlier, diagnostics=None)
 
 
