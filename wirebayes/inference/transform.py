@@ -267,9 +267,10 @@ class Transformation:
                 z[:, ridge.where["U"]] -= ridge.log_power(z)
             with np.errstate(all="ignore"):
                 if "B" in ridge.shifted:
-                    lost = z[:, ridge.where["B"]] + self._log_loss(theta, ridge)
+                    stiffness = ridge.log_stiffness(theta)
+                    lost = z[:, ridge.where["B"]] + (self._log_creep(theta, ridge) + stiffness)
                     for part in ridge.beside:
-                        own = np.log(theta[:, part.column]) + part.log_gained(theta) + ridge.log_stiffness(theta)
+                        own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
                         z[:, part.column] = shares.score(own, lost)
                         lost = np.logaddexp(lost, own)
                     z[:, ridge.where["B"]] = lost
@@ -303,12 +304,12 @@ class Transformation:
                         log_k1 = log_k1 - rest
                     theta[:, ridge.where["k1"]] = np.exp(log_k1)
                 if "B" in ridge.shifted:
-                    lost = z[:, ridge.where["B"]]
+                    lost, stiffness = z[:, ridge.where["B"]], ridge.log_stiffness(theta)
                     for part in reversed(ridge.beside):
                         share, rest = shares.log_shares(z[:, part.column])
-                        gained = part.log_gained(theta) + ridge.log_stiffness(theta)
+                        gained = part.log_gained(theta) + stiffness
                         theta[:, part.column], lost = np.exp(lost + share - gained), lost + rest
-                    theta[:, ridge.where["B"]] = np.exp(lost - self._log_loss(theta, ridge))
+                    theta[:, ridge.where["B"]] = np.exp(lost - (self._log_creep(theta, ridge) + stiffness))
             if self.specimens is not None:
                 theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
             for slack in self.slack_edges:
@@ -356,9 +357,9 @@ class Transformation:
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
         return np.asarray(ridge.get(theta, "N") * np.log(0.5 * ridge.hold_s))
 
-    def _log_loss(self, theta: Array, ridge: _Ridge) -> Array:
+    def _log_creep(self, theta: Array, ridge: _Ridge) -> Array:
         U, k2, N = (ridge.get(theta, name) for name in ("U", "k2", "N"))
-        return ridge.log_creep(U, k2, N, theta) + ridge.log_stiffness(theta)
+        return ridge.log_creep(U, k2, N, theta)
 
     def _with_shares(self, ridge: _Ridge, sample: Sample) -> _Ridge:
         """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.

@@ -182,9 +182,8 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling |
 
 def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:
     """Where climbs end that begin at kept draws of which the proposal makes least, but for those near known modes."""
-    kept = state.all_kept
-    z = np.concatenate(kept.z).reshape(-1, known.z.shape[1])
-    over = np.concatenate(kept.log_density).ravel() - state.learned.proposal.log_density(z)
+    z, value = state.all_kept.flat
+    over = value - state.learned.proposal.log_density(z)
     least = np.unique(z[over >= np.quantile(over, 1.0 - _LEAST_OF)], axis=0)
     begin = least[mixture.spread_rows(least / z.std(axis=0), _CLIMBS, state.generator)]
     density, residuals = target.rowwise()
@@ -205,9 +204,7 @@ def _modes_of(target: LogPosterior, start: Mixture) -> Optimum:
 
 def _of_kept(target: LogPosterior, state: Sampling, policy: Policy, done: int) -> BurnIn:
     """Burn-in after so many rounds, with a proposal that was learned from all kept draws."""
-    kept = state.all_kept
-    z = np.concatenate(kept.z).reshape(-1, state.walkers.positions.shape[1])
-    value = np.concatenate(kept.log_density).ravel()
+    z, value = state.all_kept.flat
     seen = _weighted_twice(z, value, value)
     burning = BurnIn(state.walkers, state.learned, state.generator, state.evaluations, done)
     return _with_excess(_fitted(target, burning, policy, *seen), z, value, np.zeros(len(z)))
@@ -224,10 +221,10 @@ def overlooked(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
     """How far places that matter lie above what the frozen proposal makes of them, in nats.
 
     The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
-    draws, and at its 99 % quantile over the rough draws that the search left. A neck into which few
-    walkers found their way, and stayed, shows in the first, a mode that they lost in the second. Of the search's
-    draws, those do not count where even a hill as wide as the prior would hold next to nothing: where annealing lost
-    most of its rows, copies of such places are what it ended with.
+    draws, and at its 99 % quantile over the rough draws that the search left. A neck into which few walkers found their
+    way, and stayed, shows in the first, a mode that they lost in the second. Of the search's draws, those do not count
+    where even a hill as wide as the prior would hold next to nothing: where annealing lost most of its rows, copies of
+    such places are what it ended with.
 
     Parameters
     ----------

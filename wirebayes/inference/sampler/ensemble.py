@@ -13,10 +13,10 @@ block, until for every parameter
 or until `Policy.most_steps`: then the result says *not converged*, and why.
 
 If kept draws show that a better proposal would need fewer evaluations in total, or that it overlooks something, the
-proposal is learned again from them, and walkers go on with it. From the second time on the draws so far stay: they are
-of a chain whose proposal was frozen, too. They are given up, and count as burn-in, where later ones disagree with them,
-where places that the proposal overlooks lead to a mode that the search had missed, and where the proposal is so poor
-that a mode may be about to be found.
+proposal is learned again from them, and walkers go on with it. All but the first block of draws stay: they are of a
+chain whose proposal was frozen, too. They are given up, and count as burn-in, where later ones disagree with them,
+where places that the proposal overlooks lead to a mode that the search had missed, where walkers have lost one that it
+had found, and where the proposal is so poor that a mode may be about to be found.
 """
 
 from collections.abc import Callable
@@ -116,9 +116,8 @@ def sample(
         progress(_share(state, policy))
         resume.save(state, checkpoint, of_fit)
     assert state.diagnostics is not None
-    counted = state.all_kept
+    found_, counted = state.diagnostics, state.all_kept
     z, log_density = (by_ensemble(blocks, policy) for blocks in (counted.z, counted.log_density))
-    found_ = state.diagnostics
     return Chains(
         z, log_density, found_.autocorrelation, found_.ess, found_.r_hat, state.converged, state.why,
         state.evaluations, counted.evaluations, counted.accepted / max(counted.proposed, 1), state.learned.trusted,

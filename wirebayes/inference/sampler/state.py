@@ -139,6 +139,12 @@ class Kept:
     def steps(self) -> int:
         return sum(len(block) for block in self.z)
 
+    @property
+    def flat(self) -> tuple[Array, Array]:
+        """(n, d) all draws, and (n,) their log densities."""
+        z = np.concatenate(self.z)
+        return z.reshape(-1, z.shape[-1]), np.concatenate(self.log_density).ravel()
+
     def after(self, steps: int) -> "Kept":
         """The draws without so many of the first steps."""
         if steps >= self.steps:

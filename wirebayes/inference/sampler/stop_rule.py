@@ -10,8 +10,6 @@ import numpy as np
 from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
-from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Sampling, by_ensemble
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
@@ -30,13 +28,11 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     values = _judged_by(target, z)
     before = state.earlier.steps
     if before and _contradicted(state, policy, z, values):
-        state, z, values = replace(state, earlier=Kept()), z[:, before:], values[:, before:]
-    steps, d = z.shape[1], z.shape[-1]
-    found = _diagnosed(values)
+        state, values = replace(state, earlier=Kept()), values[:, before:]
+    steps, found = values.shape[1], _diagnosed(values)
     beyond = of_search = 0.0
     if state.learned.trusted:
-        places, heights = (np.concatenate(blocks) for blocks in (state.all_kept.z, state.all_kept.log_density))
-        of_kept, of_search = burn_in.overlooked(state.learned, places.reshape(-1, d), heights.ravel())
+        of_kept, of_search = burn_in.overlooked(state.learned, *state.all_kept.flat)
         beyond = max(of_kept, of_search)
     counts = beyond if beyond > OUTWEIGHS else 0.0
     learned = replace(state.learned, overlooked=counts, lost=of_search > OUTWEIGHS)
@@ -81,13 +77,10 @@ def _contradicted(state: Sampling, policy: Policy, z: Array, values: Array) -> b
         return True
     if previous is None:
         return False
-    over = by_ensemble(state.all_kept.log_density, policy) - _log_proposal(previous, z)
+    log_proposal = previous.log_density(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
+    over = by_ensemble(state.all_kept.log_density, policy) - log_proposal
     little = over > np.median(over) + _LITTLE
     return bool(little[:, before:].mean() - little[:, :before].mean() > _MISSED)
-
-
-def _log_proposal(of: Mixture | Proposal, z: Array) -> Array:
-    return of.log_density(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
 
 
 def _diagnosed(values: Array) -> Diagnostics:
