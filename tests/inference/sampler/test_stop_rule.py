@@ -193,17 +193,37 @@ def test_draws_of_a_poor_proposal_are_given_up(ess: float, anew: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("again", "wanted", "more"),
-    [(0, 10_000.0, False), (0, 11_000.0, True), (1, 6_700.0, False), (1, 7_500.0, True), (3, 7_500.0, False)],
-)
-def test_what_is_left_to_do_is_weighed_against_a_better_proposal(again: int, wanted: float, more: bool) -> None:
+    ("again", "steps", "wanted", "more"),
+    [(0, 32, 10_000.0, False), (0, 32, 11_000.0, True), (0, 64, 6_700.0, False), (0, 64, 7_500.0, True),
+     (1, 32, 6_700.0, False), (1, 32, 7_500.0, True), (3, 32, 7_500.0, False)],
+)  # fmt: skip
+def test_what_is_left_to_do_is_weighed_against_a_better_proposal(
+    again: int, steps: int, wanted: float, more: bool
+) -> None:
     """At 0.25 effective draws an evaluation 6,700 wanted cost 6,800 more, 7,500 cost 10,000; with 0.6, and 4,096 to
-    learn it, 6,929 and 8,262. The first time all draws are wanted: 10,000 cost 20,000 or 20,763, 11,000 cost 24,000 or
-    22,429."""
-    policy = Policy(ess=wanted)
-    assert stop_rule.worth_refining(after(100, 5000.0, evaluations=20_000, again=again), policy) is more
-    both = replace(after(50, 5000.0, evaluations=8_000, again=again), earlier=after(50, 1.0, evaluations=12_000).kept)
+    learn it, 6,929 and 8,262. All draws are wanted anew where only a first block is kept: 10,000 cost 20,000 or 20,763,
+    11,000 cost 24,000 or 22,429."""
+    policy, half = Policy(ess=wanted), steps // 2
+    assert stop_rule.worth_refining(after(steps, 5000.0, evaluations=20_000, again=again), policy) is more
+    both = after(half, 5000.0, evaluations=8_000, again=again)
+    both = replace(both, earlier=after(steps - half, 1.0, evaluations=12_000).kept)
     assert stop_rule.worth_refining(both, policy) is more
+
+
+@pytest.mark.parametrize(("ess", "slow"), [(6990.0, True), (7010.0, False)])
+def test_a_first_block_stays_where_enough_of_its_draws_are_effective(
+    ess: float, slow: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0.35 an evaluation; 12,000 wanted cost some 14,000 more, or 12,000 with a better proposal, 24,000 all anew."""
+    policy, state = Policy(ess=12_000.0), after(32, ess, evaluations=20_000)
+    assert stop_rule.slow_at_first(state, policy) is slow and stop_rule.worth_refining(state, policy) is not slow
+    assert not stop_rule.slow_at_first(after(33, ess, evaluations=20_000), policy)
+    assert not stop_rule.slow_at_first(after(32, ess, evaluations=20_000, again=1), policy)
+    monkeypatch.setattr(kept, "more", lambda target, state, policy: state)
+    monkeypatch.setattr(stop_rule, "apply", lambda target, state, policy: state)
+    monkeypatch.setattr(burn_in, "refined", lambda target, state, policy, draws_stay: draws_stay)
+    overlooking = replace(state, learned=replace(state.learned, overlooked=9.0))
+    assert kept.step(None, overlooking, policy) is not slow  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -219,11 +239,11 @@ def test_a_proposal_is_learned_again_three_times_and_five_more_for_what_it_overl
     ess: float, finished: bool, again: int, overlooked: float, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Draws are given up where the proposal is poor, the first three times, or walkers have lost a mode."""
-    state = replace(after(100, ess, evaluations=10_000, again=again, overlooked=overlooked), finished=finished)
+    state = replace(after(32, ess, evaluations=10_000, again=again, overlooked=overlooked), finished=finished)
     monkeypatch.setattr(kept, "more", lambda target, state, policy: state)
     monkeypatch.setattr(stop_rule, "apply", lambda target, state, policy: state)
     monkeypatch.setattr(burn_in, "again", lambda target, state, policy: "anew")
-    monkeypatch.setattr(burn_in, "refined", lambda target, state, policy: "refined")
+    monkeypatch.setattr(burn_in, "refined", lambda target, state, policy, draws_stay: "refined")
     found = kept.step(None, state, Policy())  # type: ignore[arg-type]
     lost = kept.step(None, replace(state, learned=replace(state.learned, lost=True)), Policy())  # type: ignore[arg-type]
     assert (lost == "anew") is (again < 8 and not finished)

@@ -152,19 +152,19 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     return _of_kept(target, replace(state, learned=learned), policy, done)
 
 
-def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
+def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay: bool) -> Sampling | BurnIn:
     """The run with its proposal learned again from the kept draws; walkers go on from where they are.
 
-    The draws stay, but for the first block: walkers were placed by the weights of few draws, and a proposal such as is
-    learned again fills the arms of a posterior slowly. None stays where the places of which the proposal makes least
-    lead to a mode that was unknown, for most draws do not know of it either; then there are rounds of burn-in as in
-    `again`.
+    Draws do not stay where walkers are still about where they were placed, by the weights of few draws; nor where the
+    places of which the proposal makes least lead to a mode that was unknown, for most draws do not know of it either.
+    Then there are rounds of burn-in as in `again`.
 
     Parameters
     ----------
     target : LogPosterior
     state : Sampling
     policy : Policy
+    draws_stay : bool
     """
     before = target.evaluations
     known = _modes_of(target, state.learned.start)
@@ -173,7 +173,7 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling |
     if len(found.z) > len(known.z):
         start = _overdispersed(found)
         return again(target, replace(state, learned=replace(state.learned, start=start, modes=len(found.z))), policy)
-    earlier = state.all_kept if state.learned.again else state.kept.after(policy.block)
+    earlier = state.all_kept if draws_stay else Kept()
     previous = state.learned.proposal if earlier.steps else None
     state = replace(state, learned=replace(state.learned, again=state.learned.again + 1, previous=previous))
     learned = _as_frozen(_of_kept(target, state, policy, policy.rounds).learned)

@@ -13,10 +13,10 @@ block, until for every parameter
 or until `Policy.most_steps`: then the result says *not converged*, and why.
 
 If kept draws show that a better proposal would need fewer evaluations in total, or that it overlooks something, the
-proposal is learned again from them, and walkers go on with it. All but the first block of draws stay: they are of a
-chain whose proposal was frozen, too. They are given up, and count as burn-in, where later ones disagree with them,
-where places that the proposal overlooks lead to a mode that the search had missed, where walkers have lost one that it
-had found, and where the proposal is so poor that a mode may be about to be found.
+proposal is learned again from them, and walkers go on with it. Draws stay: they are of a chain whose proposal was
+frozen, too. They are given up, and count as burn-in, where they are a first block of which few are effective, where
+later ones disagree with them, where places that the proposal overlooks lead to a mode that the search had missed, where
+walkers have lost one that it had found, and where the proposal is so poor that a mode may be about to be found.
 """
 
 from collections.abc import Callable

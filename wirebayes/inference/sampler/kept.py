@@ -30,7 +30,10 @@ def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | Bu
         return state
     if stop_rule.worth_a_new_start(state):
         return burn_in.again(target, state, policy)
-    return burn_in.refined(target, state, policy) if stop_rule.worth_refining(state, policy) else state
+    if stop_rule.worth_refining(state, policy):
+        stays = not stop_rule.slow_at_first(state, policy)
+        return burn_in.refined(target, state, policy, draws_stay=stays)
+    return state
 
 
 def more(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:

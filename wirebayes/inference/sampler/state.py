@@ -145,14 +145,6 @@ class Kept:
         z = np.concatenate(self.z)
         return z.reshape(-1, z.shape[-1]), np.concatenate(self.log_density).ravel()
 
-    def after(self, steps: int) -> "Kept":
-        """The draws without so many of the first steps."""
-        if steps >= self.steps:
-            return Kept()
-        z, log_density = (np.concatenate(blocks)[steps:] for blocks in (self.z, self.log_density))
-        counts = (round(n * len(z) / self.steps) for n in (self.evaluations, self.accepted, self.proposed))
-        return Kept((z,), (log_density,), *counts)
-
     def joined(self, later: "Kept") -> "Kept":
         """These draws and later ones of the same walkers."""
         return Kept(

@@ -109,16 +109,22 @@ def worth_a_new_start(state: Sampling) -> bool:
 def worth_refining(state: Sampling, policy: Policy) -> bool:
     """Whether the proposal is to be learned once more from kept draws.
 
-    For what it overlooks, or because with one as good as usual draws would be enough after fewer evaluations; the first
-    time the draws so far are lost.
+    For what it overlooks, or because with one as good as usual draws would be enough after fewer evaluations.
     """
     assert state.diagnostics is not None
     known, least = state.learned, state.diagnostics.ess.min()
     going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
-    wanted = policy.ess - (least if known.again else 0.0)
+    wanted = policy.ess - (0.0 if slow_at_first(state, policy) else least)
     promising = going_on > wanted / USUAL + policy.round_draws
     needed = known.again < _MOST_AGAIN and known.overlooked > 0.0
     return bool(known.trusted and (needed or known.again < _FOR_MORE and promising))
+
+
+def slow_at_first(state: Sampling, policy: Policy) -> bool:
+    """Whether so few of the first block's draws are effective that walkers hardly left where they were placed."""
+    assert state.diagnostics is not None
+    first = state.learned.again == 0 and state.all_kept.steps <= policy.block
+    return bool(first and state.diagnostics.ess.min() < _SLOW * state.all_kept.evaluations)
 
 
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
@@ -129,4 +135,4 @@ _DISAGREE = 4.0
 # nats over the typical ratio of posterior to proposal: walkers seldom find such places, or stay; and how much of the
 # mass, found there later, says that too little had been found before
 _LITTLE, _MISSED = 3.0, 0.01
-USUAL, _POOR = 0.6, 0.2  # effective draws per kept evaluation
+USUAL, _SLOW, _POOR = 0.6, 0.35, 0.2  # effective draws per kept evaluation
