@@ -198,7 +198,7 @@ def climb(
         rows = np.flatnonzero(~done)
         if not len(rows):
             break
-        local = look(ahead[rows], rows, np.einsum("nij,nj->ni", vectors[rows] ** 2, eigen[rows]))
+        local = look(ahead[rows], rows, eigen[rows], vectors[rows])
         least = np.where(arrived[rows], -np.inf, value[rows] + _ENOUGH * promised[rows])
         kept = np.isfinite(local.value) & (local.value > least)
         done[rows[arrived[rows] & ~kept]] = True
@@ -223,10 +223,11 @@ def climb(
         left = rows[~done[rows]]
         hopeless = value[left] + _PATIENCE * promised[left] < _best(value, group)[left] - reach
         if of is not None:
-            here = here[converged[here]]
-            curvature = _composed(eigen[here], vectors[here])
-            ends = ends.joined(of[here], Optimum(z[here], value[here], curvature, converged[here]))
-            hopeless |= ends.near(of[left], z[left], value[left])
+            if len(here := here[converged[here]]):
+                curvature = _composed(eigen[here], vectors[here])
+                ends = ends.joined(of[here], Optimum(z[here], value[here], curvature, converged[here]))
+            if len(ends.which):
+                hopeless |= ends.near(of[left], z[left], value[left])
         left = left[hopeless]
         done[left], value[left] = True, -np.inf
     found = Optimum(z, value, _composed(eigen, vectors), converged)
@@ -282,7 +283,7 @@ def _positive(matrices: Array) -> tuple[Array, Array]:
     return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
 
 
-def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], bend: Array) -> _Local:
+def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], *_: Array) -> _Local:
     """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
     n, d = z.shape
     points = z[:, None] + np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
@@ -297,8 +298,12 @@ def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], bend:
     return _Local(values[:, 0], np.where(np.isfinite(gradient), gradient, 0.0), curvature)
 
 
-def _by_differences(density: Density, z: Array, rows: NDArray[np.int64], bend: Array) -> _Local:
-    """Curvature and gradient from differences of values alone, as far apart as the curvature's diagonal suggests."""
+def _by_differences(density: Density, z: Array, rows: NDArray[np.int64], eigen: Array, vectors: Array) -> _Local:
+    """Curvature and gradient from differences of values alone, as far apart as the last curvature's diagonal suggests.
+
+    Of that, `eigen` (n, d) are the eigenvalues, `vectors` (n, d, d) the vectors.
+    """
+    bend = np.einsum("nij,nj->ni", vectors**2, eigen)
     value = density(z, rows)
     inside = np.isfinite(value)
     gradient, hessian = np.zeros(z.shape), np.tile(np.eye(z.shape[1]), (len(z), 1, 1))
@@ -494,12 +499,11 @@ class _SideBySide:
         ratio = np.concatenate([np.resize(_RATIOS, len(b)) for b in begin])
 
         def kept(z: Array, rows: Array) -> Array:
-            z = z.copy()
             for pair in self.noises:
                 z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
             return z
 
-        return [led.z for led in self._led(begin, kept)] if self.noises else begin
+        return [led.z for led in self._led(begin, [p.setting for p in self.noises], kept)] if self.noises else begin
 
     def further(self, found: Sequence[Optimum], begin: Sequence[Array]) -> list[Optimum]:
         """The modes of each density, with those found from further (m, d) places with the noises held for some steps.
@@ -509,26 +513,38 @@ class _SideBySide:
         best = np.repeat([f.z[np.argmax(f.log_evidence)] for f in found], [len(b) for b in begin], axis=0)
 
         def held(z: Array, rows: Array) -> Array:
-            z = z.copy()
             z[:, self.settings] = best[rows][:, self.settings] + _SETTING_UP
             z[:, self.sensors] = best[rows][:, self.sensors] - _SENSOR_DOWN
             return z
 
-        if self.settings or self.sensors:
-            begin = [distinct([led]).z for led in self._led(begin, held, together=True)]
+        if noises := [*self.settings, *self.sensors]:
+            begin = [distinct([led]).z for led in self._led(begin, noises, held, together=True)]
         return [distinct([old, new]) for old, new in zip(found, self.climbed(begin, found), strict=True)]
 
     def _led(
-        self, begin: Sequence[Array], kept: Callable[[Array, Array], Array], together: bool = False
+        self, begin: Sequence[Array], fixed: list[int], kept: Callable[[Array, Array], Array], together: bool = False
     ) -> list[Optimum]:
-        """Where some steps uphill lead from (m, d) places of each density, with something kept."""
+        """Where some steps uphill lead from (m, d) places of each density, with some coordinates fixed by the others.
+
+        Climbs have the other coordinates alone: no derivative is taken by the fixed ones, which `kept` sets.
+        """
         of = np.repeat(np.arange(self.n), [len(b) for b in begin])
+        start = np.vstack(begin)
+        free = np.delete(np.arange(start.shape[1]), fixed)
+
+        def whole(z: Array, rows: Array) -> Array:
+            out = np.empty((len(z), start.shape[1]))
+            out[:, free] = z
+            return kept(out, rows)
+
         found = climb(
-            lambda z, rows: self.density(kept(z, rows), of[rows]), np.vstack(begin),
-            lambda z, rows: self.residuals(kept(z, rows), of[rows]),
+            lambda z, rows: self.density(whole(z, rows), of[rows]), start[:, free],
+            lambda z, rows: self.residuals(whole(z, rows), of[rows]),
             iterations=_LED, tolerance=_LED_TO, of=of if together else None, curvature_at_end=False,
         )  # fmt: skip
-        found = replace(found, z=kept(found.z, np.arange(len(of))))
+        curvature = np.zeros((len(of), start.shape[1], start.shape[1]))
+        curvature[np.ix_(np.arange(len(of)), free, free)] = found.curvature
+        found = Optimum(whole(found.z, np.arange(len(of))), found.log_density, curvature, found.converged)
         return [found.rows(of == i) for i in range(self.n)]
 
 
