@@ -471,11 +471,11 @@ def _project(x: Expansion) -> _Projected:
         return np.asarray(plain[:, None] - shrink @ (one * other))
 
     r, levels_m, levels_f = levels[..., p : p + 1], levels[..., of_m], levels[..., of_f]
-    square = (x.signatures**2).sum(axis=1)
+    square = np.einsum("nim,nim->nm", x.signatures, x.signatures)
     rr = whitened((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
     mr = whitened((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
     mm = whitened(square, levels_m, levels_m)
-    c = mm - (signatures**2).sum(axis=2)
+    c = mm - np.einsum("nkpm,nkpm->nkm", signatures, signatures)
     ff = (np.swapaxes(x.flexible, 1, 2) @ x.flexible)[:, None] - np.swapaxes(flexible, 2, 3) @ flexible
     ff -= (np.swapaxes(levels_f, 1, 2)[:, None] * shrink[:, :, None]) @ levels_f[:, None]
     fr = whitened((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]

@@ -125,7 +125,10 @@ class _Ridge:
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
         if compiled.kernel is not None and not self.effects:
-            every, share = (np.ascontiguousarray(np.broadcast_to(a, (len(a), len(theta)))) for a in (drive, reached))
+            # fixed parameters are numbers
+            every, share = (
+                a if a.shape[1] == len(theta) else np.repeat(a, len(theta), axis=1) for a in (drive, reached)
+            )
             square = compiled.kernel.square_gained(every, share, self.which_time, self.kept)
         else:
             square = self._square_gained(drive, reached, theta)
@@ -485,17 +488,10 @@ class LogPosterior:
         Those of the likelihood (`wirebayes.model.problem.Problem.standardised`), and those of the prior.
         """
         self.evaluations += len(z)
-        pieces = [slice(i, i + self._rows) for i in range(0, max(len(z), 1), self._rows)]
-        parts = []
-        for p in pieces:
-            theta = self.coordinates.to_natural(z[p])
-            with np.errstate(all="ignore"):
-                prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z[p])
-                residuals = self.coordinates.prior_residuals(theta, z[p])
-            picked = None if readings is None else [y[..., p] for y in readings]
-            value, left = self.problem.standardised(theta, picked)
-            value = np.where(np.isfinite(prior), prior + value, -np.inf)
-            parts.append((value, np.concatenate([left, residuals])))
+        if len(z) <= self._rows:
+            return self._standardised(z, readings)
+        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
+        parts = [self._standardised(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
         values, residuals = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(residuals, axis=1)
 
@@ -515,6 +511,14 @@ class LogPosterior:
             lambda points, rows: self(points, seen(rows)),
             lambda points, rows: self.standardised(points, seen(rows)),
         )
+
+    def _standardised(self, z: Array, readings: Any) -> tuple[Array, Array]:
+        theta = self.coordinates.to_natural(z)
+        with np.errstate(all="ignore"):
+            prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+            residuals = self.coordinates.prior_residuals(theta, z)
+        value, left = self.problem.standardised(theta, readings)
+        return np.where(np.isfinite(prior), prior + value, -np.inf), np.concatenate([left, residuals])
 
     def _values(self, z: Array, readings: Any) -> Array:
         theta = self.coordinates.to_natural(z)

@@ -115,7 +115,7 @@ def _flat(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     shape = line.tension.shape
     parts = (line.tension, line.by_setting, line.by_creep, line.carry_by_setting, line.carry_by_creep)
     lines = (np.ascontiguousarray(part, float) for part in parts)
-    noise = (np.broadcast_to(v, shape[2:]).astype(float) for v in (variance, setting_sd))
+    noise = (np.full(shape[2], v, float) for v in (variance, setting_sd))
     seen = np.ascontiguousarray(mask).view(np.uint8)
     return *lines, np.broadcast_to(np.asarray(readings, float), shape), seen, *noise
 
