@@ -141,12 +141,13 @@ def test_what_a_smooth_process_takes_is_its_determinant_and_its_part_of_the_squa
     rng = np.random.default_rng(0)
     root, along = rng.normal(size=(5, 7, 4)), rng.normal(size=(5, 4))
     square = np.swapaxes(root, 1, 2) @ root
-    log_volume, less = linear_scan._taken_by(square, along, 8.0)
+    log_volume, less = linear_scan._taken_by(square, along)
     for i in range(5):
-        share = 64.0 / np.trace(square[i])
-        whole = np.eye(4) + share * square[i]
-        assert log_volume[i] == pytest.approx(0.5 * np.linalg.slogdet(whole)[1], rel=1e-10)
-        assert less[i] == pytest.approx(share * along[i] @ np.linalg.solve(whole, along[i]), rel=1e-10)
+        for j, size in enumerate(linear_scan.SIZES):
+            share = size**2 / np.trace(square[i])
+            whole = np.eye(4) + share * square[i]
+            assert log_volume[i, j] == pytest.approx(0.5 * np.linalg.slogdet(whole)[1], rel=1e-10)
+            assert less[i, j] == pytest.approx(share * along[i] @ np.linalg.solve(whole, along[i]), rel=1e-10)
 
 
 def test_simulations_that_come_later_are_climbed_and_the_others_kept(

@@ -500,14 +500,15 @@ def _scan_few(x: Expansion) -> Scan:
     effects = shared[..., None] - 0.5 * degrees * np.log(left)
     loose, ends = [], np.cumsum(x.processes)
     for own in (slice(last - count, last) for last, count in zip(ends, x.processes, strict=True)):
-        for size in SIZES:
-            log_volume, less = _taken_by(found.smooth_square[..., own, own], found.smooth_along[..., own], size)
-            # The process is measured in units of the noise that is left beside it.
-            loose.append(shared - log_volume - 0.5 * degrees * np.log(np.maximum(rss - less, least)))
+        log_volume, less = _taken_by(found.smooth_square[..., own, own], found.smooth_along[..., own])
+        # The process is measured in units of the noise that is left beside it.
+        left_beside = np.maximum(rss[..., None] - less, least[..., None])
+        loose.append(shared[..., None] - log_volume - 0.5 * degrees * np.log(left_beside))
     reference = log_sum(plain, axis=1)
     seen = np.isfinite(reference)
     reference = np.where(seen, reference, 0.0)
-    flexible_value = log_sum(np.concatenate(loose, axis=1), axis=1) - np.log(len(loose)) - reference
+    every = np.concatenate(loose, axis=2)
+    flexible_value = log_sum(every.reshape(len(every), -1), axis=1) - np.log(every.shape[2]) - reference
     best = np.argmax(effects, axis=1)[:, None]
     amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
     norm = np.sqrt(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best)
@@ -520,18 +521,18 @@ def _scan_few(x: Expansion) -> Scan:
     )
 
 
-def _taken_by(square: Array, along: Array, size: float) -> tuple[Array, Array]:
-    """What a process of a size takes of the readings: half a log determinant (...), and of the sum of squares (...).
+def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:
+    """What a process of each size takes: half a log determinant, and of the sum of squares, both (..., sizes).
 
     `square` (..., q, q) and `along` (..., q) are the inner products of its functions with themselves and the residual.
     """
     q = along.shape[-1]
-    share = (size**2 / np.maximum(np.einsum("...ff->...", square), 1e-300))[..., None]
+    share = SIZES**2 / np.maximum(np.einsum("...ff->...", square), 1e-300)[..., None]
     # One Cholesky factor of I + share square, bordered by the residual's products, holds both; the corner is not used.
-    bordered = np.zeros((*along.shape[:-1], q + 1, q + 1))
-    bordered[..., :q, :q] = share[..., None] * square
+    bordered = np.zeros((*share.shape, q + 1, q + 1))
+    bordered[..., :q, :q] = share[..., None, None] * square[..., None, :, :]
     bordered.reshape(-1, (q + 1) ** 2)[:, :: q + 2] += 1.0
-    bordered[..., q, :q] = np.sqrt(share) * along
+    bordered[..., q, :q] = np.sqrt(share)[..., None] * along[..., None, :]
     bordered[..., q, q] = _LARGEST
     factor = cholesky(bordered)
     with np.errstate(invalid="ignore"):
@@ -651,7 +652,7 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 _STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and rounding both stay below 1e-5 of a slope
 _LARGEST = 1e100  # of any derivative: the square of a larger one overflows
-_PIECE = 8  # parameter sets scanned at once: what stays in the cache
+_PIECE = 16  # parameter sets scanned at once: what stays in the cache
 _LEAST_SQUARE = 1e-14  # share of the largest squared singular value: less is rounding
 _LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
 ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

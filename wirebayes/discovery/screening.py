@@ -100,7 +100,7 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
     norm = np.array([scans[b].norm[:, i] for b in candidate.blocks])
     if one_sided:
         a = np.maximum(a, 0.0)
-    if not candidate.shared:
+    if not candidate.shared or len(candidate.blocks) == 1:
         return lr.sum(axis=0) + occam(one_sided) * len(candidate.blocks), a[0], 1.0 / np.maximum(norm[0], 1e-300)
     value, mean = shared_amplitude(lr, a, norm)
     return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
