@@ -220,7 +220,10 @@ def test_with_a_ratio_kept_starts_are_led_to_it_and_without_noises_they_stay():
     "likelihood, fixed", [("chain", ()), ("hold", ()), ("chain", ("sensor_sd",)), ("chain", "both")]
 )
 def test_further_climbs_begin_with_the_noises_held_near_those_of_the_best_mode(likelihood, fixed, monkeypatch):
-    """Setting errors e³ times larger, the sensor's noise e times smaller, whichever of the two are not fixed."""
+    """Setting errors e³ times larger, the sensor's noise e times smaller, whichever of the two are not fixed.
+
+    No derivative is taken by these, for it would say nothing.
+    """
     target = simulated(likelihood=likelihood)
     if fixed:
         named_so = ("sensor_sd", "setting_sd") if fixed == "both" else fixed
@@ -234,6 +237,8 @@ def test_further_climbs_begin_with_the_noises_held_near_those_of_the_best_mode(l
     found = one.climbed([modes._prior(target, 3, np.random.default_rng(1))], [])
     begun = []
     monkeypatch.setattr(one, "climbed", lambda begin, before: begun.extend(begin) or found)
+    by, look = [], modes._by_residuals
+    monkeypatch.setattr(modes, "_by_residuals", lambda of, z, *more: by.append(z.shape[1]) or look(of, z, *more))
     begin = modes._prior(target, 20, np.random.default_rng(2))
     assert one.further(found, [begin])[0].z == pytest.approx(found[0].z)
     best = found[0].z[np.argmax(found[0].log_evidence)]
@@ -244,6 +249,7 @@ def test_further_climbs_begin_with_the_noises_held_near_those_of_the_best_mode(l
         assert begun[0] is begin
     else:
         assert 0 < len(begun[0]) < 20  # those that come to the same place go on as one
+        assert set(by) == {len(names) - len({"sensor_sd", "setting_sd"} & set(names))}
 
 
 @pytest.mark.parametrize(
