@@ -8,7 +8,7 @@ prior.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +57,7 @@ class Elongation:
             own[name] = theta[:, x] if isinstance(x, int) else np.full(len(theta), x)
         carried, square = np.zeros((1, len(theta))), np.zeros(len(theta))
         for hold in self.holds:
-            until = self.effect.apply(self.kept * carried, own, replace(hold, carried=carried))
+            until = self.effect.apply(self.kept * carried, own, hold.carrying(carried))
             square = square + (until - self.kept * carried)[0] ** 2
             carried = until
         return np.asarray(0.5 * np.log(np.maximum(square / len(self.holds), 1e-300)))

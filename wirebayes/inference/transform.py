@@ -142,8 +142,7 @@ class _Ridge:
         for j, time in enumerate(self.which_time):
             amount = drive[j] - self.kept * carried
             if self.effects:
-                hold = replace(self.holds[j], carried=carried[None])
-                amount = effects.change("amount", amount[None], hold)[0]
+                amount = effects.change("amount", amount[None], self.holds[j].carrying(carried[None]))[0]
             gained = amount * reached[time]
             carried = carried + gained
             square = square + gained * gained

@@ -107,6 +107,11 @@ class HoldContext:
     carried: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     past: list[tuple[float, NDArray[Any], NDArray[Any]]] = field(default_factory=list)
 
+    def carrying(self, carried: NDArray[Any]) -> "HoldContext":
+        """The same hold with other creep carried into it, (1, n)."""
+        # coordinates need one for every hold of a batch, and `replace` takes ten times as long
+        return HoldContext(**vars(self) | {"carried": carried})
+
 
 class Effect:
     """Base of every effect: name, place, scope, amplitudes and one function of one value.
