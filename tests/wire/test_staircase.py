@@ -21,7 +21,10 @@ def readings(p, theta, model=None, setting=None):
 def test_any_staircase_is_the_paper_s_equations_hold_after_hold(p, theta, law, history):
     expected = by_hand(p, theta, law=law, history=history)
     model = Model(law, history)
-    for found in (readings(p, theta, model), linearise(p, columns(**theta), model).tension[..., 0]):
+    line = linearise(p, columns(**theta), model)
+    # where a hold begins just slack, rounding decides, of which a small power of the tension makes much
+    assume((np.abs(theta["preload"] + p.displacement_mm - line.creep[:-1, 0]) > 1e-3).all())
+    for found in (readings(p, theta, model), line.tension[..., 0]):
         for row, mask, wanted in zip(found, p.mask, expected, strict=True):
             assert row[mask] == pytest.approx(wanted, rel=1e-9, abs=1e-9 * theta["k1"])
 
