@@ -109,7 +109,7 @@ class HoldContext:
 
     def carrying(self, carried: NDArray[Any]) -> "HoldContext":
         """The same hold with other creep carried into it, (1, n)."""
-        # coordinates need one for every hold of a batch, and `replace` takes ten times as long
+        # coordinates need one for every hold of a batch, and `replace` takes three times as long
         return HoldContext(**vars(self) | {"carried": carried})
 
 

@@ -155,9 +155,8 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
 def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay: bool) -> Sampling | BurnIn:
     """The run with its proposal learned again from the kept draws; walkers go on from where they are.
 
-    Draws do not stay where walkers are still about where they were placed, by the weights of few draws; nor where the
-    places of which the proposal makes least lead to a mode that was unknown, for most draws do not know of it either.
-    Then there are rounds of burn-in as in `again`.
+    Where the places of which the proposal makes least lead to a mode that was unknown, no draws stay, for most of them
+    do not know of it, and rounds of burn-in follow as in `again`.
 
     Parameters
     ----------
@@ -165,6 +164,7 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay
     state : Sampling
     policy : Policy
     draws_stay : bool
+        False where walkers are still about where they were placed, by the weights of few draws.
     """
     before = target.evaluations
     known = _modes_of(target, state.learned.start)
