@@ -106,26 +106,15 @@ class _Ridge:
         """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
         return np.asarray(np.logaddexp(0.0, z[:, self.where["B"]] - self.log_step))
 
-    def log_creep(self, U: Array, k2: Array, N: Array, theta: Array) -> Array:
-        """log G: root mean square of the elongation gained in a hold, for B = 1.
-
-        Parameters
-        ----------
-        U, k2, N : (n,) arrays
-            Natural parameters.
-        theta : (n, d) array
-            Of all natural parameters, for the amplitudes of effects.
-
-        Returns
-        -------
-        (n,) array
-        """
+    def log_creep(self, theta: Array) -> Array:
+        """(n,) log G: root mean square of the elongation gained in a hold, for B = 1, at natural parameters (n, d)."""
+        U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
         U = np.minimum(U, self.steepest)
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
         if compiled.kernel is not None and not self.effects:
-            # fixed parameters are numbers
+            # of parameters that are fixed there is one column
             every, share = (
                 a if a.shape[1] == len(theta) else np.repeat(a, len(theta), axis=1) for a in (drive, reached)
             )
@@ -270,7 +259,7 @@ class Transformation:
             with np.errstate(all="ignore"):
                 if "B" in ridge.shifted:
                     stiffness = ridge.log_stiffness(theta)
-                    lost = z[:, ridge.where["B"]] + (self._log_creep(theta, ridge) + stiffness)
+                    lost = z[:, ridge.where["B"]] + (ridge.log_creep(theta) + stiffness)
                     for part in ridge.beside:
                         own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
                         z[:, part.column] = shares.score(own, lost)
@@ -311,7 +300,7 @@ class Transformation:
                         share, rest = shares.log_shares(z[:, part.column])
                         gained = part.log_gained(theta) + stiffness
                         theta[:, part.column], lost = np.exp(lost + share - gained), lost + rest
-                    theta[:, ridge.where["B"]] = np.exp(lost - (self._log_creep(theta, ridge) + stiffness))
+                    theta[:, ridge.where["B"]] = np.exp(lost - (ridge.log_creep(theta) + stiffness))
             if self.specimens is not None:
                 theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
             for slack in self.slack_edges:
@@ -358,10 +347,6 @@ class Transformation:
 
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
         return np.asarray(ridge.get(theta, "N") * np.log(0.5 * ridge.hold_s))
-
-    def _log_creep(self, theta: Array, ridge: _Ridge) -> Array:
-        U, k2, N = (ridge.get(theta, name) for name in ("U", "k2", "N"))
-        return ridge.log_creep(U, k2, N, theta)
 
     def _with_shares(self, ridge: _Ridge, sample: Sample) -> _Ridge:
         """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.

@@ -147,7 +147,7 @@ class Problem:
                     found = likelihoods.standardised(line, y, sample.protocol.mask, variance, setting_sd)
                 values.append(found[0])
                 residuals.append(found[1])
-            total: Array = sum(values)  # type: ignore[assignment]
+            total: Any = sum(values)
         return np.where(np.isfinite(total), total, -np.inf), np.concatenate(residuals)
 
     def without_each_hold(self, theta: Array) -> tuple[Array, list[Array]]:
