@@ -2,8 +2,8 @@
 
 The plain model on the paper's four wires with both likelihoods, or single effects with the chain likelihood:
 
-    python analyses/sampler_agreement.py
-    python analyses/sampler_agreement.py --effects clamp_transient second_relaxation --ess 20000
+    python -m analyses.sampler_agreement
+    python -m analyses.sampler_agreement --effects clamp_transient second_relaxation --ess 20000
 
 A line a posterior: how many runs converged; the spread of means over what is promised, root mean square over parameters
 and largest; the same of the shares of draws in the 5 % tails; the largest difference of two means, in posterior
@@ -47,12 +47,8 @@ def agreement(runs):
     tails = np.array([[(d < low).mean(axis=0), (d > high).mean(axis=0)] for d in draws])
     share = np.sqrt(TAILS[0] * TAILS[1])  # standard deviation of being in a tail
     apart = float((np.ptp(means, axis=0) / sd).max())
-    return (
-        sum(converged),
-        means.std(axis=0, ddof=1) / sd * promised,
-        tails.std(axis=0, ddof=1) / share * promised,
-        apart,
-    )
+    spreads = means.std(axis=0, ddof=1) / sd, tails.std(axis=0, ddof=1) / share
+    return sum(converged), *(spread * promised for spread in spreads), apart
 
 
 def main() -> None:
