@@ -115,7 +115,7 @@ def test_all_noise_ratios_at_once_are_what_dense_algebra_says_of_each() -> None:
     x = Tangent(residual, parameters, left, singular, one, gradient, precision, 1e-6 * one, one)
     found = continuation._weigh(x, signature, -0.1, 0.2, degrees)
     for i in (0, n - 1):  # of several pieces
-        heights, moves, steps = [], [], []
+        heights, moves, steps, promises = [], [], [], []
         for ratio in RATIOS:
             inverse = np.linalg.inv(np.eye(readings) + ratio * k[i] @ k[i].T)
             pp = parameters[i].T @ inverse @ parameters[i] + precision[i]
@@ -131,10 +131,38 @@ def test_all_noise_ratios_at_once_are_what_dense_algebra_says_of_each() -> None:
             heights.append(volume - 0.5 * degrees * np.log(left_over))
             moves.append(a)
             steps.append(np.linalg.solve(pp, pr))
+            promises.append(0.5 * degrees * np.log(left_over / max(left_over - steps[-1] @ pr, 1e-6 * degrees)))
         best = int(np.argmax(heights))
         assert found.height[i] == pytest.approx(np.logaddexp.reduce(heights), rel=1e-9)
         assert found.move[i] == pytest.approx(moves[best], rel=1e-6) and found.ratio[i] == RATIOS[best]
+        assert found.promise[i] == pytest.approx(promises[best], rel=1e-6)
         np.testing.assert_allclose(found.step[i], steps[best], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("promise", "goes_on"), [(0.0499, False), (0.05, True)])
+def test_no_step_is_tried_that_promises_too_little(
+    promise: float, goes_on: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block = block_of(tmp_path, {}, [], 3)
+    trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
+    way = ladders([block], trials, candidates, [data])[0]
+    weigh, follow, tried = continuation._weigh, continuation._follow, []
+
+    def promising(*arguments: Any) -> Any:
+        found = weigh(*arguments)
+        return replace(found, promise=np.full(len(found.promise), promise))
+
+    def followed(*arguments: Any) -> Any:
+        tried.append(len(arguments[1]))
+        return follow(*arguments)
+
+    monkeypatch.setattr(continuation, "_weigh", promising)
+    monkeypatch.setattr(continuation, "_follow", followed)
+    begin = start(block, block.modes.z[:1])
+    assert bool(tried) == goes_on
+    tried.clear()
+    climb(block, way, begin)
+    assert bool(tried) == goes_on
 
 
 def test_what_a_smooth_process_takes_is_its_determinant_and_its_part_of_the_square() -> None:
@@ -217,7 +245,7 @@ def test_a_path_that_adds_nothing_is_not_led_through_the_simulations(monkeypatch
     assert larger.test([], test).p == test.p == 0.01
 
 
-@pytest.mark.parametrize(("value", "climbed"), [(0.0, 40), (2.9, 200), (9.0, 999)])
+@pytest.mark.parametrize(("value", "climbed"), [(0.0, 40), (2.0, 80), (2.9, 160), (9.0, 999)])
 def test_no_more_simulations_climb_than_it_takes(value: float, climbed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once several are as high as the data, these cannot be surprising enough."""
     way: Any = SimpleNamespace(effect=SimpleNamespace(name="a"))
@@ -315,7 +343,7 @@ def test_places_with_other_errors_are_weighed_in_the_same_units(tmp_path: Path) 
     other = z.copy()
     other[:, block.target.problem.names.index("sensor_sd")] += 0.1  # in sampled coordinates, some standard deviations
     begin = start(replace(block, modes_with_expected_setting_error=other), z)
-    prior = linear_scan.prior_density(block.target, np.concatenate([z, other]))
+    _, prior = linear_scan.residuals(block.target, np.concatenate([z, other]))
     own, units = begin.log_density - prior, continuation._log_units(block.target, begin.z)
     assert abs(units[1] - units[0]) > 1.0  # a difference of units that would be seen
     assert own[0] - units[0] == pytest.approx(own[1] - units[1], abs=0.2)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wirebayes.discovery import power
-from wirebayes.discovery.linear_scan import Probe
+from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, joined
 from wirebayes.discovery.power import copies, group_of, similarity
 from wirebayes.discovery.screening import Candidate
 from wirebayes.effects import named
@@ -121,14 +121,14 @@ def test_a_detectable_amplitude_is_a_bisection_of_the_largest(one_sided: bool) -
     """Of all that are smaller than δ = 40 by the median norm; four simulations of five, exactly, are enough."""
     asked: list[Any] = []
 
-    def of(i: int, rows: int) -> Any:
-        asked.append((i, rows))
+    def of(i: int) -> Any:
+        asked.append(i)
         return SimpleNamespace(log_bayes=lambda amplitude: np.where(np.arange(5) < 4, amplitude, 0.0) / 0.7)
 
     null: Any = SimpleNamespace(norm=np.array([[9.0, 2.0], [9.0, 4.0], [9.0, 80.0]]), pieces=SimpleNamespace(of=of))
     trial: Any = SimpleNamespace(one_sided=one_sided)
     found = power.amplitude_80(null, trial, 1, power.occam(one_sided) + 2.0)
-    assert asked == [(1, 300)]
+    assert asked == [1]
     assert found == pytest.approx(1.4 + 0.5 * 10.0 / 2**12, abs=0.51 * 10.0 / 2**12) and found > 1.4
     steps = found * 2**12 / 10.0  # of the largest, 40 over the median of the norms
     assert steps == round(steps)
@@ -166,3 +166,22 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
     assert [t[0] for t in asked[1][2]] == ["_SensorGain", "_ForceOffset", "_DisplacementScale"]
     for kind in power._ABSORBABLE:
         assert kind.amplitudes[0].neutral == 0.0
+
+
+def test_pieces_are_those_of_the_first_simulations() -> None:
+    rng = np.random.default_rng(0)
+
+    def made(n: int) -> Scan:
+        shared, rss, along, square = rng.normal(size=(2, n)), rng.normal(size=(2, n)), *rng.normal(size=(2, 2, n, 3))
+        pieces = Pieces(shared, rss, along, square, 5, rng.normal(size=n), np.zeros(3, bool))
+        return Scan(rng.normal(size=(n, 3)), rng.normal(size=n), np.ones((n, 3)), np.ones((n, 3)), pieces)
+
+    parts = [made(n) for n in (200, 150, 150)]
+    first = joined(parts[:2])
+    both = joined([first, parts[2]])
+    for name, axis in (("shared", 1), ("rss", 1), ("along", 1), ("square", 1), ("least", 0)):
+        whole = np.concatenate([getattr(p.pieces, name) for p in parts], axis=axis)
+        expected = whole[:, :300] if axis else whole[:300]
+        np.testing.assert_array_equal(getattr(first.pieces, name), expected)
+        np.testing.assert_array_equal(getattr(both.pieces, name), expected)
+    np.testing.assert_array_equal(both.effects, np.concatenate([p.effects for p in parts]))

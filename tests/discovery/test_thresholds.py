@@ -37,7 +37,7 @@ def test_a_detectable_amplitude_is_found_in_four_tests_of_five() -> None:
     """The log Bayes factor grows as amplitude times a number that is evenly spread over the simulations."""
     spread = (np.arange(1000) + 0.5) / 1000
     pieces = SimpleNamespace(log_bayes=lambda amplitude: amplitude * spread)
-    null = SimpleNamespace(norm=np.ones((3, 1)), pieces=SimpleNamespace(of=lambda i, rows: pieces))
+    null = SimpleNamespace(norm=np.ones((3, 1)), pieces=SimpleNamespace(of=lambda i: pieces))
     found = amplitude_80(null, SimpleNamespace(one_sided=True), 0, occam(True) + 1.0)  # type: ignore[arg-type]
     assert found == pytest.approx(5.0, abs=0.03)  # a (1 - 0.8) = 1
     assert amplitude_80(null, SimpleNamespace(one_sided=True), 0, occam(True) + LARGEST) is None  # type: ignore[arg-type]

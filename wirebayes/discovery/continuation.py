@@ -24,7 +24,6 @@ from wirebayes.discovery.linear_scan import (
     damp,
     forms,
     moving_columns,
-    prior_density,
     residuals,
     tangent,
 )
@@ -60,7 +59,7 @@ _LONGEST = 3.0  # of a step, in any sampled coordinate
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
 _LARGE = 1e200  # above any sum of squares, and its square root finite
 _PIECE = 64  # rows weighed at once: what stays in the cache
-_FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once
+_FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once, at first and at most
 _TRIED = 3  # names
 _LEVEL = 0.95  # of chance, which a name has to exceed by most to be tried first
 
@@ -219,7 +218,7 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
             gain = value - height[rows]
         better = gain > 0
         best[rows[better]], height[rows[better]] = y[rows[better]], value[better]
-        go = np.flatnonzero(gain >= _SETTLED)
+        go = np.flatnonzero(np.minimum(gain, here.promise) >= _SETTLED)
         if step == _STEPS or not len(go):
             break
         rows, own = rows[go], None if own is None else [r[..., go] for r in own]
@@ -376,7 +375,7 @@ class _Ascent:
             here = _weigh(_without_last(both), signature, first[rows], last[rows], self.degrees)
             lr = np.nan_to_num(here.height + both.prior - self.nothing[rows], nan=_NEVER, neginf=_NEVER)
             gain = np.full(len(z), -np.inf)
-            gain[rows] = lr - best.log_bayes[rows]
+            gain[rows] = np.minimum(lr - best.log_bayes[rows], here.promise)
             better = best.improve(rows, _Places(z[rows], lr, (at - self.neutral)[rows] + here.move, here.norm))
             # A step that led down, where the wire went slack say, is the last one.
             go = np.flatnonzero(better & (self.best_start(gain) >= _SETTLED)[rows % n])
@@ -429,13 +428,17 @@ def _with_effect(block: LaplaceFit, ladder: AmplitudePath, places: Sequence[Arra
 
 @dataclass(frozen=True)
 class _Weighed:
-    """At one place: log marginal density, best move of the amplitude, δ per amplitude, step of the parameters, ρ."""
+    """At one place: log marginal density, best move of the amplitude, δ per amplitude, step of the parameters, ρ.
+
+    And by how much the density would grow with that step, were the tangent exact.
+    """
 
     height: Array
     move: Array
     norm: Array
     step: Array
     ratio: Array
+    promise: Array
 
     def of(self, rows: Array) -> "_Weighed":
         """That of some places."""
@@ -498,7 +501,9 @@ def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: i
     with np.errstate(invalid="ignore"):
         total = peak + np.log(np.exp(height - peak[:, None]).sum(axis=1))
     total = np.where(smooth & np.isfinite(total), total, -np.inf)
-    return _Weighed(total, a[best], np.sqrt(c[best] * degrees / left[best]), step, RATIOS[k])
+    after = np.maximum(left[best] - (factor[rows, k, -1, :p] ** 2).sum(axis=1), x.least)
+    promise = 0.5 * degrees * np.log(left[best] / after)
+    return _Weighed(total, a[best], np.sqrt(c[best] * degrees / left[best]), step, RATIOS[k], promise)
 
 
 def _without_last(x: Tangent) -> Tangent:
@@ -525,13 +530,13 @@ def _follow(
     trial[1:, :, columns] += _LENGTHS[:, None, None] * step
     flat = trial[1:].reshape(-1, z.shape[1])
     tiled = None if readings is None else [np.tile(y, (1, 1, many)) for y in readings]
-    moved = residuals(target, flat, tiled).reshape(many, len(z), -1)
-    r = np.concatenate([x.residual[None], moved])
+    moved, prior = residuals(target, flat, tiled)
+    r = np.concatenate([x.residual[None], moved.reshape(many, len(z), -1)])
     levels = r.transpose(1, 0, 2) @ x.left
     shrink = damp(x.singular, here.ratio[:, None])
     square = (r**2).sum(axis=2) - (levels**2 @ shrink[..., None])[..., 0].T
     with np.errstate(invalid="ignore"):
-        prior = np.concatenate([x.prior[None], prior_density(target, flat).reshape(many, -1)])
+        prior = np.concatenate([x.prior[None], prior.reshape(many, -1)])
         value = prior - 0.5 * degrees * np.log(np.maximum(square, x.least))
     best = np.argmax(np.where(np.isfinite(value), value, -np.inf), axis=0)
     return np.asarray(trial[best, np.arange(len(z))])
@@ -614,7 +619,7 @@ class Continuation:
         ways = [way for way in self._ways if way.effect.name == name]
         out, as_high = np.empty(0), 0
         while len(out) < len(linear) and (not as_high or np.log1p(len(linear)) - np.log1p(as_high) >= needed):
-            last = min(len(out) + (_ROWS if len(out) else _FIRST_ROWS), len(linear))
+            last = min(len(out) + int(np.clip(len(out), _FIRST_ROWS, _ROWS)), len(linear))
             if last > len(known):
                 rows = slice(len(known), last)
                 climbed = self._strengths(ways, [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated])

@@ -167,7 +167,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Pieces:
-    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``.
+    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``, for `_PIECES_OF` rows.
 
     Attributes
     ----------
@@ -187,11 +187,10 @@ class Pieces:
     least: Array
     one_sided: Array
 
-    def of(self, probe: int, rows: int) -> "Pieces":
-        """One probe's pieces at the first rows."""
+    def of(self, probe: int) -> "Pieces":
+        """One probe's pieces."""
         one = slice(probe, probe + 1)
-        return Pieces(self.shared[:, :rows], self.rss[:, :rows], self.along[:, :rows, one], self.square[:, :rows, one],
-                      self.degrees, self.least[:rows], self.one_sided[one])  # fmt: skip
+        return replace(self, along=self.along[..., one], square=self.square[..., one], one_sided=self.one_sided[one])
 
     def log_bayes(self, added: float) -> Array:
         """(n,) of the only probe, had its amplitude `added` been in the data besides."""
@@ -210,15 +209,14 @@ def joined(scans: Sequence[Scan]) -> Scan:
     """Scans of consecutive rows as one."""
     if len(scans) == 1:
         return scans[0]
-    first = scans[0].pieces
-    pieces = Pieces(
-        shared=np.concatenate([s.pieces.shared for s in scans], axis=1),
-        rss=np.concatenate([s.pieces.rss for s in scans], axis=1),
-        along=np.concatenate([s.pieces.along for s in scans], axis=1),
-        square=np.concatenate([s.pieces.square for s in scans], axis=1),
-        degrees=first.degrees,
-        least=np.concatenate([s.pieces.least for s in scans]),
-        one_sided=first.one_sided,
+    parts = [s.pieces for s in scans]
+    pieces = replace(
+        parts[0],
+        shared=_first([p.shared for p in parts]),
+        rss=_first([p.rss for p in parts]),
+        along=_first([p.along for p in parts]),
+        square=_first([p.square for p in parts]),
+        least=_first([p.least for p in parts], axis=0),
     )
     return Scan(
         effects=np.concatenate([s.effects for s in scans]),
@@ -227,6 +225,17 @@ def joined(scans: Sequence[Scan]) -> Scan:
         norm=np.concatenate([s.norm for s in scans]),
         pieces=pieces,
     )
+
+
+def _first(parts: Sequence[Array], axis: int = 1) -> Array:
+    """The first `_PIECES_OF` rows of consecutive arrays; of the later ones none is read."""
+    rows, few = 0, list[Array]()
+    for part in parts:
+        few.append(part[(slice(None),) * axis + (slice(_PIECES_OF - rows),)])
+        rows += part.shape[axis]
+        if rows >= _PIECES_OF:
+            break
+    return np.concatenate(few, axis=axis)
 
 
 def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array]:
@@ -302,7 +311,8 @@ def expand(
     Expansion
     """
     problem = target.problem
-    points = list(_points(target, z, readings, moving_columns(problem)))
+    around = _around(target, z, moving_columns(problem))
+    points = list(_points(target, around, readings))
     added: list[Array] = []
     functions: list[list[Array]] = []
     for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
@@ -316,7 +326,7 @@ def expand(
         functions.append([f[mask][None] / point.sd[:, None, None] for f in reference(sample.protocol)])
     signatures = np.concatenate(added, axis=1)
     one_sided = [i < len(trials) and trials[i].one_sided for i in range(signatures.shape[-1])]
-    plain = _tangent(target, z, points, moving_columns(problem))
+    plain = _tangent(target, around, points)
     processes = [_block_diagonal(each) for each in zip(*functions, strict=True)]
     return Expansion(
         **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool),
@@ -346,7 +356,34 @@ def tangent(target: LogPosterior, z: Array, readings: Sequence[Array] | None, mo
     -------
     Tangent
     """
-    return _tangent(target, z, list(_points(target, z, readings, moving)), moving)
+    around = _around(target, z, moving)
+    return _tangent(target, around, list(_points(target, around, readings)))
+
+
+@dataclass(frozen=True)
+class _Around:
+    """Points and steps from each along p coordinates: sampled and natural parameters ((1 + 3 p) n, d).
+
+    The points come first, then the steps by which tensions are differentiated, then those for the prior, both ways.
+    """
+
+    z: Array
+    theta: Array
+    columns: int
+
+    @property
+    def points(self) -> int:
+        return len(self.z) // (1 + 3 * self.columns)
+
+
+def _around(target: LogPosterior, z: Array, moving: list[int]) -> _Around:
+    """Points (n, d) with their steps along the coordinates `moving`."""
+    p = len(moving)
+    every = np.repeat(z[None], 1 + 3 * p, axis=0)
+    steps = np.repeat([_STEP, _PRIOR_STEP, -_PRIOR_STEP], p)
+    every[np.arange(1, 1 + 3 * p), :, moving * 3] += steps[:, None]
+    flat = every.reshape(-1, z.shape[1])
+    return _Around(flat, target.coordinates.to_natural(flat), p)
 
 
 @dataclass(frozen=True)
@@ -366,9 +403,9 @@ class _Point:
         return np.asarray((values[mask] / self.sd).T)
 
 
-def _points(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Iterator[_Point]:
-    problem, n = target.problem, len(z)
-    both = target.coordinates.to_natural(np.concatenate([z, *_shifted(z, moving, _STEP)]))
+def _points(target: LogPosterior, around: _Around, readings: Sequence[Array] | None) -> Iterator[_Point]:
+    problem, n = target.problem, around.points
+    both = around.theta[: n * (1 + around.columns)]
     theta = both[:n]
     for at, sample in enumerate(problem.samples):
         mask = sample.protocol.mask
@@ -377,7 +414,7 @@ def _points(target: LogPosterior, z: Array, readings: Sequence[Array] | None, mo
         line = linearise(sample.protocol, own, sample.model)
         y = sample.readings if readings is None else readings[at]
         moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
-        moved = moved.reshape(*moved.shape[:2], len(moving) + 1, n)
+        moved = moved.reshape(*moved.shape[:2], 1 + around.columns, n)
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
         scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
         jac = np.moveaxis(likelihoods.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
@@ -385,7 +422,7 @@ def _points(target: LogPosterior, z: Array, readings: Sequence[Array] | None, mo
         yield _Point(line.tension, slopes, sd, ((y - line.tension)[mask] / sd).T, scaled, jac, floor)
 
 
-def _tangent(target: LogPosterior, z: Array, points: Sequence[_Point], moving: list[int]) -> Tangent:
+def _tangent(target: LogPosterior, around: _Around, points: Sequence[_Point]) -> Tangent:
     k = _block_diagonal([p.by_setting for p in points])
     beyond = ~(np.abs(k) < _LARGEST).all(axis=(1, 2))  # what the model cannot compute has no tangent
     k[beyond] = 1.0
@@ -393,7 +430,7 @@ def _tangent(target: LogPosterior, z: Array, points: Sequence[_Point], moving: l
     # throughout: then no setting error moves any reading.
     ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
     left, singular = _directions(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None])
-    prior, gradient, precision = _prior(target, z, moving)
+    prior, gradient, precision = _prior(target, around)
     residual = np.concatenate([p.residual for p in points], axis=1)
     residual[beyond] = np.nan
     parameters = np.concatenate([p.parameters for p in points], axis=1)
@@ -583,8 +620,8 @@ def damp(singular: Array, ratio: Array | float) -> Array:
         return np.asarray(ratio * singular**2 / (1.0 + ratio * singular**2))
 
 
-def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None = None) -> Array:
-    """Readings less tensions, in units of the reading error.
+def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None = None) -> tuple[Array, Array]:
+    """Readings less tensions, in units of the reading error, and the log density of the prior.
 
     Parameters
     ----------
@@ -596,33 +633,32 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
 
     Returns
     -------
-    (n, N) array
-        All samples' readings one after the other.
+    (n, N) and (n,) arrays
+        All samples' readings one after the other; the density in the sampled coordinates.
     """
     theta = target.coordinates.to_natural(z)
     parts = []
-    for at, sample in enumerate(target.problem.samples):
-        own = target.problem.parameters(theta, sample)
-        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N))
-        y = sample.readings if readings is None else readings[at]
-        with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
+        for at, sample in enumerate(target.problem.samples):
+            own = target.problem.parameters(theta, sample)
+            sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N))
+            y = sample.readings if readings is None else readings[at]
             left = y - simulate(sample.protocol, own, sample.model)
-        parts.append((left[sample.protocol.mask] / sd).T)
-    return np.concatenate(parts, axis=1)
+            parts.append((left[sample.protocol.mask] / sd).T)
+    return np.concatenate(parts, axis=1), _prior_density(target, theta, z)
 
 
-def prior_density(target: LogPosterior, z: Array) -> Array:
-    """(n,) log density of the prior in the sampled coordinates."""
-    theta = target.coordinates.to_natural(z)
+def _prior_density(target: LogPosterior, theta: Array, z: Array) -> Array:
+    """(n,) log density of the prior in the sampled coordinates, at points whose natural parameters are known."""
     with np.errstate(all="ignore"):  # a parameter that underflows to zero has no density
         return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta, z))
 
 
-def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Array, Array]:
-    """Log density of the prior; its gradient and (diagonal, positive) precision by the sampled coordinates `moving`."""
-    h = 1e-3
-    n, p = len(z), len(moving)
-    values = prior_density(target, np.concatenate([z, *_shifted(z, moving, h), *_shifted(z, moving, -h)]))
+def _prior(target: LogPosterior, around: _Around) -> tuple[Array, Array, Array]:
+    """Log density of the prior; its gradient and (diagonal, positive) precision by the coordinates stepped along."""
+    n, p, h = around.points, around.columns, _PRIOR_STEP
+    rows = np.r_[:n, n * (1 + p) : len(around.z)]
+    values = _prior_density(target, around.theta[rows], around.z[rows])
     centre, plus, minus = values[:n, None], *values[n:].reshape(2, p, n).swapaxes(1, 2)
     # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
     inside = np.isfinite(plus) & np.isfinite(minus) & np.isfinite(centre)
@@ -632,11 +668,6 @@ def _prior(target: LogPosterior, z: Array, moving: list[int]) -> tuple[Array, Ar
     precision = np.zeros((n, p, p))
     precision[:, np.arange(p), np.arange(p)] = diagonal
     return values[:n], gradient, precision
-
-
-def _shifted(z: Array, columns: list[int], step: float) -> list[Array]:
-    """The rows of `z` with a step along each of the columns in turn."""
-    return [z + step * np.eye(z.shape[1])[i] for i in columns]
 
 
 def _block_diagonal(blocks: Sequence[Array]) -> Array:
@@ -651,8 +682,10 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 
 _STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and rounding both stay below 1e-5 of a slope
+_PRIOR_STEP = 1e-3  # of the same, for second differences of the prior, which rounding spoils before
 _LARGEST = 1e100  # of any derivative: the square of a larger one overflows
 _PIECE = 16  # parameter sets scanned at once: what stays in the cache
+_PIECES_OF = 300  # simulations of which pieces are kept, all large: enough for the amplitude that 80 % of them show
 _LEAST_SQUARE = 1e-14  # share of the largest squared singular value: less is rounding
 _LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
 ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

@@ -14,7 +14,6 @@ from wirebayes.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
-_POWER_ROWS = 300  # simulations behind an 80 % amplitude
 
 
 def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | None:
@@ -40,7 +39,7 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
         return None
     prior = occam(probe.one_sided)
     low, high = 0.0, LARGEST / norm
-    pieces = null.pieces.of(i, _POWER_ROWS)
+    pieces = null.pieces.of(i)
 
     def seen(amplitude: float) -> bool:
         return bool(np.mean(pieces.log_bayes(amplitude) + prior > threshold) >= 0.8)
