@@ -248,13 +248,29 @@ def test_a_path_that_adds_nothing_is_not_led_through_the_simulations(monkeypatch
 @pytest.mark.parametrize(("value", "climbed"), [(0.0, 40), (2.0, 80), (2.9, 160), (9.0, 999)])
 def test_no_more_simulations_climb_than_it_takes(value: float, climbed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once several are as high as the data, these cannot be surprising enough."""
-    way: Any = SimpleNamespace(effect=SimpleNamespace(name="a"))
+    larger, simulated = paths_of_one_name(value, monkeypatch)
+    found = larger._chance("a", np.full(999, -2.0), [simulated], needed=np.log(1000 / 3), largest=np.inf)
+    assert len(found) == climbed
+
+
+@pytest.mark.parametrize("more", [0.0, 1e-9])
+def test_what_is_clearly_more_surprising_than_all_simulations_needs_no_more(
+    more: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    larger, simulated = paths_of_one_name(9.0, monkeypatch)
+    surprise = continuation._surprise(9.0, simulated.z[:160, 0])
+    found = larger._chance("a", np.full(999, -2.0), [simulated], needed=8.0, largest=surprise - 3.0 + more)
+    assert (len(found) == 160) == (more == 0.0)
+
+
+def paths_of_one_name(value: float, monkeypatch: pytest.MonkeyPatch) -> tuple[Continuation, Any]:
+    """The data's log Bayes factor, and simulations of which 100 in a row have all from 0 to 3."""
     larger = Continuation.__new__(Continuation)
+    way: Any = SimpleNamespace(effect=SimpleNamespace(name="a"))
     larger._values, larger._known, larger._ways = {"a": value}, {}, [way]
     simulated: Any = SimpleNamespace(z=np.tile(np.arange(100.0), 10)[:999, None] / 33.0, readings=[])
     monkeypatch.setattr(Continuation, "_strengths", lambda self, ways, plain: {"a": plain[0][0][:, 0]})
-    found = larger._chance("a", np.full(999, -2.0), [simulated], needed=np.log(1000 / 3))
-    assert len(found) == climbed
+    return larger, simulated
 
 
 def test_what_the_plain_fit_calls_a_setting_error_larger_than_the_steps_is_seen(tmp_path: Path) -> None:

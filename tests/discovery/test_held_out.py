@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
 from tests.model.dense import jacobian, normal
@@ -76,6 +78,23 @@ def test_importance_weights_are_truncated(monkeypatch: pytest.MonkeyPatch) -> No
         problem.leave_one_hold_out = lambda theta: [np.log(impossible)]
         found = held_out.truncated_leave_one_hold_out(SimpleNamespace(), rng)  # type: ignore[arg-type]
     assert found[0] < -1e5 and found[1:] == pytest.approx(expected[1:], rel=1e-9)
+
+
+def test_a_fit_is_scored_once_however_often_it_is_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    scored: list[str] = []
+
+    def score(fit: list[str], rng: np.random.Generator) -> NDArray[Any]:
+        scored.append(fit[0])
+        return rng.normal(size=3)
+
+    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", score)
+    plain, again, other = ["plain"], ["plain"], ["other"]  # two fits may be equal, and are two
+    left_out: Any = held_out.LeftOut(np.random.default_rng(0), map)
+    first = left_out.of([plain, other, plain])
+    second = left_out.of([other, again, plain])
+    assert scored == ["plain", "other", "plain"]
+    assert first[0] is first[2] is second[2] and first[1] is second[0] and not np.allclose(second[1], first[0])
+    assert left_out.of([]) == []
 
 
 def test_scores_of_several_draws_are_averages_over_them() -> None:

@@ -131,7 +131,8 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
     monkeypatch.setattr(shrinking, "fitted", lambda *given: Model(name="~"))
     monkeypatch.setattr(shrinking, "_gain", gained)
     return shrinking.shrinking(
-        models[0], models[1:], stages, remains, np.random.default_rng(0), map  # type: ignore[arg-type]
+        models[0], models[1:], stages, remains, held_out.LeftOut(np.random.default_rng(0), map),  # type: ignore[arg-type]
+        np.random.default_rng(0), map,
     )  # fmt: skip
 
 
@@ -167,7 +168,8 @@ def test_one_experiment_with_too_few_holds_is_enough_to_hold_none_out(monkeypatc
     pair = experiments()[1], experiments()[2].train(3)
     block: Any = Model(name="plain", experiments=pair, effects=(), law="", history="")
     monkeypatch.setattr(shrinking, "_predicted", lambda *given: pytest.fail("predicted"))
-    found = shrinking.shrinking(block, [], [], True, np.random.default_rng(0), map)
+    rng = np.random.default_rng(0)
+    found = shrinking.shrinking(block, [], [], True, held_out.LeftOut(rng, map), rng, map)
     assert [(f.held_out["holds"], f.held_out["gap_closed"]) for f in found] == [([], None)] * 2
     assert [m["rmse_N"] for m in found[0].steps] == [None] and found[0].held_out is not found[1].held_out
 

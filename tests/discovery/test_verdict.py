@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wirebayes.discovery import verdict
+from wirebayes.discovery import held_out, verdict
+from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.settings import Settings
 from wirebayes.discovery.stepwise import Accepted, Explored
@@ -41,7 +42,8 @@ def decided(
     monkeypatch.setattr(verdict, "_gain", gain)
     monkeypatch.setattr(verdict, "_retested", retested)
     settings = Settings(kinds=dict.fromkeys("abcdefghijklmnopqrst"))  # type: ignore[arg-type]
-    return decide([SimpleNamespace()], sets, {}, settings, np.random.default_rng(0), map)  # type: ignore[list-item]
+    rng = np.random.default_rng(0)
+    return decide([SimpleNamespace()], sets, {}, settings, LeftOut(rng, map), rng, map)  # type: ignore[list-item]
 
 
 def names(found: verdict.Decision) -> str:
@@ -145,7 +147,7 @@ def test_nothing_left_to_add_passes_the_second_test() -> None:
 @pytest.mark.parametrize("before", [True, False])
 def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the set without it was fitted, against that, else against the plain model; in its own materials alone."""
-    monkeypatch.setattr(verdict.held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
+    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
     plain = [[1.0], [2.0, 2.0], [3.0]]
     sets = explored({"a": 1.0, "ab": 2.0})
     sets.fitted[frozenset("a")].blocks[:] = [[5.0], [6.0, 6.0], [7.0]]
@@ -154,7 +156,7 @@ def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, mon
     best.accepted = (best.accepted[0], Accepted("b", (1, 2), {}))  # type: ignore[misc]
     if not before:
         del sets.fitted[frozenset("a")]
-    found = verdict._gain(plain, best, sets, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    found = verdict._gain(plain, best, sets, LeftOut(np.random.default_rng(0), map))  # type: ignore[arg-type]
     assert found.tolist() == ([0.0, 28.0, 23.0] if before else [0.0, 36.0, 27.0])
 
 
@@ -162,12 +164,13 @@ def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, mon
 def test_the_first_effect_gains_over_the_plain_model_the_third_over_two(
     names_: str, gain: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verdict.held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
+    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
     sets = explored({"a": 1.0, "ab": 2.0, "abc": 3.0})
     for set_, elpd in (("a", 5.0), ("ab", 10.0), ("abc", 30.0)):
         sets.fitted[frozenset(set_)].blocks[:] = [[elpd]]  # type: ignore[list-item]
     best = sets.fitted[frozenset(names_)]
-    assert verdict._gain([[1.0]], best, sets, np.random.default_rng(0), map).tolist() == [gain]  # type: ignore[list-item]
+    left_out = LeftOut(np.random.default_rng(0), map)
+    assert verdict._gain([[1.0]], best, sets, left_out).tolist() == [gain]  # type: ignore[list-item]
 
 
 def test_effects_are_established_in_the_materials_where_they_act(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,6 +60,7 @@ _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the
 _LARGE = 1e200  # above any sum of squares, and its square root finite
 _PIECE = 64  # rows weighed at once: what stays in the cache
 _FIRST_ROWS, _ROWS = 40, 160  # data sets that climb at once, at first and at most
+_CLEARLY = 3.0  # nats of surprise beyond all simulations, from which a name needs no more of them
 _TRIED = 3  # names
 _LEVEL = 0.95  # of chance, which a name has to exceed by most to be tried first
 
@@ -606,19 +607,27 @@ class Continuation:
         surprises = dict(test.surprises)
         may = [n for n in lead if most[n] >= needed and most[n] > surprises[n]]
         for name in sorted(may, key=lambda n: -lead[n])[:_TRIED]:
-            chance = self._chance(name, test.chance[name], simulated, needed)
+            chance = self._chance(name, test.chance[name], simulated, needed, float(test.null.max()))
             surprises[name] = max(surprises[name], _surprise(values[name], chance))
             if surprises[name] > test.null.max():
                 break
         larger = replace(test, surprises=surprises)
         return larger if larger.p <= clear else test
 
-    def _chance(self, name: str, linear: Array, simulated: Sequence[Replicates], needed: float) -> Array:
-        """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more than it takes."""
+    def _chance(
+        self, name: str, linear: Array, simulated: Sequence[Replicates], needed: float, largest: float
+    ) -> Array:
+        """(m,) largest log Bayes factor of a name in the simulations, by scan or ladder; no more than it takes.
+
+        That is until so many are as high as the data that these cannot be as surprising as `needed`, or until these are
+        clearly more surprising than all simulations, of which the most surprising one is by `largest`.
+        """
         known = self._known.get(name, np.empty(0))
         ways = [way for way in self._ways if way.effect.name == name]
-        out, as_high = np.empty(0), 0
-        while len(out) < len(linear) and (not as_high or np.log1p(len(linear)) - np.log1p(as_high) >= needed):
+        out, as_high, clear = np.empty(0), 0, False
+        while len(out) < len(linear) and not clear:
+            if as_high and np.log1p(len(linear)) - np.log1p(as_high) < needed:
+                break
             last = min(len(out) + int(np.clip(len(out), _FIRST_ROWS, _ROWS)), len(linear))
             if last > len(known):
                 rows = slice(len(known), last)
@@ -626,6 +635,7 @@ class Continuation:
                 known = np.append(known, np.max(list(climbed.values()), axis=0))
             out = np.maximum(linear[:last], known[:last])
             as_high = int((out >= self._values[name]).sum())
+            clear = len(out) >= _ROWS and _surprise(self._values[name], out) >= largest + _CLEARLY
         self._known[name] = known
         return out
 

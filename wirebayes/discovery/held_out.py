@@ -15,6 +15,7 @@ from wirebayes.model.problem import Problem, Sample, build
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import Model, linearise
+from wirebayes.workers import ParallelMap
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,28 @@ def truncated_leave_one_hold_out(block: LaplaceFit, rng: np.random.Generator) ->
     log_weight = np.minimum(log_weight, ceiling)
     log_weight -= logsumexp(log_weight, axis=1, keepdims=True)
     return np.asarray(logsumexp(log_weight + values, axis=1))
+
+
+class LeftOut:
+    """`truncated_leave_one_hold_out` of fits that are compared again and again: each is scored once.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    parallel_map : function
+        The built-in `map`, or one over processes.
+    """
+
+    def __init__(self, rng: np.random.Generator, parallel_map: ParallelMap) -> None:
+        self._rng, self._map = rng, parallel_map
+        self._known: list[tuple[LaplaceFit, Array]] = []
+
+    def of(self, fits: Sequence[LaplaceFit]) -> list[Array]:
+        """(H,) densities of each fit; those of the same object are the same."""
+        new = list({id(fit): fit for fit in fits if all(fit is not known for known, _ in self._known)}.values())
+        scores = self._map(truncated_leave_one_hold_out, new, self._rng.spawn(len(new)))
+        self._known += zip(new, scores, strict=True)
+        return [next(score for known, score in self._known if known is fit) for fit in fits]
 
 
 def _draws(block: LaplaceFit, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from wirebayes.discovery import next_measurement, power, residual_patterns, shrinking
 from wirebayes.discovery.global_test import Gate, examine
+from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.linear_scan import Expansion, expand
 from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.name_evidence import weigh_names
@@ -136,9 +137,10 @@ def investigate(
     ]
     expansions = [_only(x, len(gate.trials)) for x in gate.expansions]
     decision, explored = None, None
+    left_out = LeftOut(rng, parallel_map)
     if gate.test.p <= ALPHA:
         report("naming", 0, 1)
-        explored, decision = _named(gate, expansions, settings, rng, parallel_map)
+        explored, decision = _named(gate, expansions, settings, left_out, rng, parallel_map)
         report("naming", 1, 1)
     answers = [_answer(gate.blocks, decision, explored, i, where[i], rng) for i in range(len(gate.blocks))]
     final = [a.stages[-1] if a.stages else block for a, block in zip(answers, gate.blocks, strict=True)]
@@ -149,7 +151,7 @@ def investigate(
         report("held-out holds", i, len(gate.blocks))
         common = _common(answers, i, gate.blocks, gate.test, where[i], alike)
         outlook = _outlook(gate, i, settings, answers[i], alike)
-        for name, own in _own_reports(gate, block, answers[i], rng, parallel_map).items():
+        for name, own in _own_reports(gate, block, answers[i], left_out, rng, parallel_map).items():
             out[name] = {**common, **outlook, **own}
     report("held-out holds", len(gate.blocks), len(gate.blocks))
     undecided = [
@@ -165,6 +167,7 @@ def _named(
     gate: Gate,
     expansions: Sequence[Expansion],
     settings: Settings,
+    left_out: LeftOut,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> tuple[Explored, Decision]:
@@ -172,16 +175,21 @@ def _named(
     found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map)
     explored = explore(gate.blocks, found, expansions, gate.trials, settings, rng, parallel_map)
     copies = power.copies(expansions, gate.trials, [float(x.ratio[0]) for x in gate.expansions])
-    return explored, decide(gate.blocks, explored, copies, settings, rng, parallel_map)
+    return explored, decide(gate.blocks, explored, copies, settings, left_out, rng, parallel_map)
 
 
 def _own_reports(
-    gate: Gate, block: LaplaceFit, answer: "_Answer", rng: np.random.Generator, parallel_map: ParallelMap
+    gate: Gate,
+    block: LaplaceFit,
+    answer: "_Answer",
+    left_out: LeftOut,
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
 ) -> dict[str, HeldOutReport]:
     """What the report says of each experiment of a block apart from the others."""
     remains = answer.verdict in ("partial", "unknown")
     names = [a.name for a in answer.accepted]
-    checks = shrinking.shrinking(block, answer.stages, names, remains, rng, parallel_map)
+    checks = shrinking.shrinking(block, answer.stages, names, remains, left_out, rng, parallel_map)
     return {
         e.name: {
             "steps": check.steps,

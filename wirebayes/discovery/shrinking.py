@@ -44,6 +44,7 @@ def shrinking(
     stages: Sequence[LaplaceFit],
     names: Sequence[str],
     remains: bool,
+    left_out: held_out.LeftOut,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> list[Shrinking]:
@@ -60,6 +61,8 @@ def shrinking(
         The effects, in the same order.
     remains : bool
         Whether the final model has a smooth discrepancy beside the effects.
+    left_out : LeftOut
+        Scores the fits.
     rng : numpy Generator
     parallel_map : function
         The built-in `map`, or one over processes.
@@ -79,9 +82,8 @@ def shrinking(
     trained += [t for beside in smooth for t in beside.trained]
     predicted = parallel_map(_predicted, trained, rng.spawn(len(trained)))
     fits = [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
-    # handed over before any result is waited for: no core idles between the two
-    left_out = parallel_map(held_out.truncated_leave_one_hold_out, fits, rng.spawn(len(fits))) if smooth else ()
-    found, elpd = list(predicted), list(left_out)
+    elpd = left_out.of(fits) if smooth else []
+    found = list(predicted)  # handed over before, so that no core idles
     by_step, alone_ = found[: len(models)], [part[0] for part in found[len(models) :]]
     n = len(train)
     flexible = alone_[:n] if smooth else [None] * n

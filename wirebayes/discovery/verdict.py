@@ -6,8 +6,9 @@ from itertools import repeat
 
 import numpy as np
 
-from wirebayes.discovery import held_out, model_space, residual_patterns, screening
+from wirebayes.discovery import model_space, residual_patterns, screening
 from wirebayes.discovery.global_test import simulated_with_patterns
+from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior, smallest_set
 from wirebayes.discovery.settings import (
@@ -73,6 +74,7 @@ def decide(
     explored: Explored,
     copies: Mapping[str, Collection[str]],
     settings: Settings,
+    left_out: LeftOut,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> Decision:
@@ -87,6 +89,8 @@ def decide(
     copies : mapping of name to set of names
         Those that share one signature in these tests (`power.copies`).
     settings : Settings
+    left_out : LeftOut
+        Scores the fits.
     rng : numpy.random.Generator
     parallel_map : function
         The built-in `map`, or one over processes.
@@ -102,7 +106,7 @@ def decide(
         """Whether the last effect of a set, if it is not the only one, predicts holds that are left out."""
         key = candidate.effects.key
         if key not in gains:
-            gains[key] = _gain(plain, candidate, explored, rng, parallel_map)
+            gains[key] = _gain(plain, candidate, explored, left_out)
         return len(key) == 1 or float(gains[key].sum()) > KEEP_ELPD
 
     while True:
@@ -185,15 +189,13 @@ def _complete(
     return None
 
 
-def _gain(
-    plain: list[LaplaceFit], best: FittedSet, explored: Explored, rng: np.random.Generator, parallel_map: ParallelMap
-) -> Array:
+def _gain(plain: list[LaplaceFit], best: FittedSet, explored: Explored, left_out: LeftOut) -> Array:
     """(b,) gain in leave-one-hold-out elpd that the last effect of a set brings in each block it acts on."""
     earlier = explored.fitted.get(frozenset(best.effects.names[:-1]))
     before = plain if earlier is None else earlier.blocks
     on = list(best.accepted[-1].blocks)
     fits = [version[b] for version in (best.blocks, before) for b in on]
-    elpd = [float(v.sum()) for v in parallel_map(held_out.truncated_leave_one_hold_out, fits, rng.spawn(len(fits)))]
+    elpd = [float(v.sum()) for v in left_out.of(fits)]
     out = np.zeros(len(plain))
     out[on] = np.subtract(elpd[: len(on)], elpd[len(on) :])
     return out
