@@ -58,7 +58,8 @@ def interrupted(
 def said_once(code: int, out: str, err: str, number: int = INT) -> str:
     assert code == 128 + number
     assert out == ""
-    (line,) = err.splitlines()
+    *before, line = err.splitlines()
+    assert all("does not describe the readings" in said for said in before)  # a check that was done by then
     assert line.startswith({INT: "interrupted; ", TERM: "terminated; "}[number])
     return line
 
