@@ -50,7 +50,9 @@ Density = Callable[[Array, Array], Array]
 Residuals = Callable[[Array, Array], tuple[Array, Array]]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
-_STEEPEST = 1.6  # a larger U of a pool is of no ridge that data see; to follow it would only bend the prior's tail
+# Much larger U and N of a pool are of no ridge that data see: to follow them would only bend the prior's tails. The
+# ridge levels off smoothly, as walkers stay too long on one side of a kink.
+_STEEPEST = 1.6
 _NONE = np.zeros(1), np.zeros(1)  # where U is sampled as it is
 _ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
@@ -106,10 +108,14 @@ class _Ridge:
         """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
         return np.asarray(np.logaddexp(0.0, z[:, self.where["B"]] - self.log_step))
 
+    def levelled(self, exponent: Any) -> Any:
+        """(n,) an exponent, U or N, that the ridge follows no further than to `steepest`."""
+        return exponent if np.isinf(self.steepest) else exponent / np.sqrt(1.0 + (exponent / self.steepest) ** 2)
+
     def log_creep(self, theta: Array) -> Array:
         """(n,) log G: root mean square of the elongation gained in a hold, for B = 1, at natural parameters (n, d)."""
         U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
-        U = np.minimum(U, self.steepest)
+        U = self.levelled(U)
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
         mean = float(self.log_tension.mean())
         drive = np.exp(U * (self.log_tension - mean)[:, None])
@@ -346,7 +352,7 @@ class Transformation:
         return np.asarray(out.T)
 
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
-        return np.asarray(ridge.get(theta, "N") * np.log(0.5 * ridge.hold_s))
+        return np.asarray(ridge.levelled(ridge.get(theta, "N")) * np.log(0.5 * ridge.hold_s))
 
     def _with_shares(self, ridge: _Ridge, sample: Sample) -> _Ridge:
         """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.
