@@ -48,22 +48,26 @@ def test_draws_follow_the_density_also_where_the_curvature_at_its_modes_misleads
         assert np.corrcoef(own.T)[0, 1] == pytest.approx(0.8, abs=4 * (1 - 0.64) / np.sqrt(n))
 
 
-@pytest.mark.parametrize(("k", "effective", "sampled"), [(0.7, 1500.0, 0), (0.71, 1500.0, 1), (0.7, 1499.0, 1)])
+@pytest.mark.parametrize(
+    ("n", "k", "effective", "sampled"),
+    [(2000, 0.7, 1500, 0), (2000, 0.71, 1500, 1), (2000, 0.7, 1499, 1), (100, 0.7, 100, 0), (100, 0.7, 99, 1)],
+)
 def test_weights_that_cannot_be_trusted_leave_it_to_the_sampler(
-    k: float, effective: float, sampled: int, monkeypatch: pytest.MonkeyPatch
+    n: int, k: float, effective: int, sampled: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Nor those that are worth fewer draws than are wanted, but no more than 1,500 are asked for."""
     runs: list[Any] = []
 
     def sample(target: Any, seed: int, policy: Any, found: Optimum) -> Any:
         runs.append(policy)
-        return SimpleNamespace(z=np.full((4, 50, 3), 9.0))
+        return SimpleNamespace(z=np.full((4, 500, 3), 9.0))
 
     monkeypatch.setattr(rough_draws, "sample", sample)
     monkeypatch.setattr(rough_draws, "tail", lambda log_weight: k)
-    monkeypatch.setattr(rough_draws, "effective", lambda log_weight: np.array([effective]))
+    monkeypatch.setattr(rough_draws, "effective", lambda log_weight: np.array([float(effective)]))
     target = two_hills(0.3)
-    z = rough_draws.draws(target, modes(target, [0, 1]), np.random.default_rng(0), 100)
-    assert len(runs) == sampled and z.shape == (100, 3) and bool((z == 9.0).all()) == bool(sampled)
+    z = rough_draws.draws(target, modes(target, [0, 1]), np.random.default_rng(0), n)
+    assert len(runs) == sampled and z.shape == (n, 3) and bool((z == 9.0).all()) == bool(sampled)
 
 
 def test_all_rounds_count(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -61,7 +61,7 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
         z, height = np.concatenate([z, new]), np.append(height, target(new))
         drawn_from = log_sum(by_proposal)
         log_weight = height - drawn_from
-        if effective(log_weight[:, None])[0] >= _ENOUGH and tail(log_weight) <= LARGEST_K:
+        if effective(log_weight[:, None])[0] >= min(n, _ENOUGH) and tail(log_weight) <= LARGEST_K:
             return z[truncated_rows(log_weight, n, rng)]
         points = Points.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
         try:
@@ -73,7 +73,7 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
 
 _WIDER = 2.0  # times the covariance at a mode
 _EACH, _ROUNDS = 2500, 12  # draws a round: twelve of them take less than a short run
-_ENOUGH = 1500.0  # effective draws
+_ENOUGH = 1500.0  # effective draws, however many are drawn
 _HOT = 0.75  # power of the density that proposals are learned from, so that their tails are not too thin
 _LEARNED = 1500  # points
 _COMPONENTS = 3  # of a proposal; all rounds together have many more
