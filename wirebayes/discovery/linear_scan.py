@@ -167,7 +167,9 @@ class Scan:
 
 @dataclass(frozen=True)
 class Pieces:
-    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``, for `_PIECES_OF` rows.
+    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``.
+
+    Of many simulations it is kept for the first `_PIECES_OF` alone.
 
     Attributes
     ----------
@@ -685,7 +687,7 @@ _STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and r
 _PRIOR_STEP = 1e-3  # of the same, for second differences of the prior, which rounding spoils before
 _LARGEST = 1e100  # of any derivative: the square of a larger one overflows
 _PIECE = 16  # parameter sets scanned at once: what stays in the cache
-_PIECES_OF = 300  # simulations of which pieces are kept, all large: enough for the amplitude that 80 % of them show
+_PIECES_OF = 300  # simulations whose pieces are kept, for they are large: enough for what 80 % of them show
 _LEAST_SQUARE = 1e-14  # share of the largest squared singular value: less is rounding
 _LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
 ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it
