@@ -175,3 +175,19 @@ def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread(
     own = [at[name] for name in problem.prior.pools[0][2]]
     assert np.abs(moved[own]).max() < 0.01 < np.abs(np.diff(z[:2], axis=0)[0][own]).max()
     assert np.isfinite(seen).all()
+
+
+@pytest.mark.parametrize("exponent", ["U", "N"])
+def test_the_ridge_of_a_pool_levels_off_without_a_kink(exponent):
+    """Coordinates of creep follow the exponents of a line where data see it, not into the prior's tail."""
+    problem = PROBLEMS["pooled"]
+    coordinates = Transformation(problem)
+    theta = np.repeat(np.array([[float(d.median()) for d in problem.prior.distributions.values()]]), 4000, axis=0)
+    values = np.linspace(0.2, 20.0, 4000)
+    theta[:, problem.names.index(exponent)] = values
+    moved = coordinates.to_sampled(theta)[:, problem.names.index({"U": "B", "N": "k2"}[exponent])]
+    slope = np.gradient(moved, values)
+    near, far = np.abs(slope[values < 0.5]).min(), np.abs(slope[-1])
+    assert far < 0.01 * near
+    # a kink would lose all of the slope from one value to the next
+    assert np.abs(np.diff(slope)).max() < 0.02 * np.abs(slope).max()
