@@ -40,7 +40,7 @@ CASES: dict[str, tuple[Experiment, str]] = {
     "constant tension": (reading(np.full(CLEAN.shape, 2.0)), "stays at 2 N while the displacement changes"),
     "no noise": (reading(CLEAN, 0.0), "the readings carry no noise"),
     # slack up to 6 mm takes a preload 6.5 standard deviations from its prior's middle: a soft wire is likelier
-    "nothing read": (reading(0.0 * CLEAN), "the wire was slack throughout"),
+    "nothing read": (reading(0.0 * CLEAN), "far outside its prior"),
     "slack": (reading(NOISE), "far outside its prior"),
     "kN written as N": (reading(USUAL / 1000), "check that tension_N is in N"),
     "mN written as N": (reading(USUAL * 1000, 10.0), "check that tension_N is in N"),

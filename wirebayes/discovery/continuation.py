@@ -604,12 +604,12 @@ class Continuation:
         # Simulations come out no lower along the paths than in the scan, so a value is no more surprising than there.
         most = {name: float(test.scales[name].surprise(v)) for name, v in values.items()}
         lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in values.items()}
-        surprises = dict(test.surprises)
+        surprises, largest = dict(test.surprises), float(test.null.max())
         may = [n for n in lead if most[n] >= needed and most[n] > surprises[n]]
         for name in sorted(may, key=lambda n: -lead[n])[:_TRIED]:
-            chance = self._chance(name, test.chance[name], simulated, needed, float(test.null.max()))
+            chance = self._chance(name, test.chance[name], simulated, needed, largest)
             surprises[name] = max(surprises[name], _surprise(values[name], chance))
-            if surprises[name] > test.null.max():
+            if surprises[name] > largest:
                 break
         larger = replace(test, surprises=surprises)
         return larger if larger.p <= clear else test
@@ -624,10 +624,8 @@ class Continuation:
         """
         known = self._known.get(name, np.empty(0))
         ways = [way for way in self._ways if way.effect.name == name]
-        out, as_high, clear = np.empty(0), 0, False
-        while len(out) < len(linear) and not clear:
-            if as_high and np.log1p(len(linear)) - np.log1p(as_high) < needed:
-                break
+        out, decided = np.empty(0), False
+        while len(out) < len(linear) and not decided:
             last = min(len(out) + int(np.clip(len(out), _FIRST_ROWS, _ROWS)), len(linear))
             if last > len(known):
                 rows = slice(len(known), last)
@@ -635,7 +633,9 @@ class Continuation:
                 known = np.append(known, np.max(list(climbed.values()), axis=0))
             out = np.maximum(linear[:last], known[:last])
             as_high = int((out >= self._values[name]).sum())
+            too_common = as_high > 0 and np.log1p(len(linear)) - np.log1p(as_high) < needed
             clear = len(out) >= _ROWS and _surprise(self._values[name], out) >= largest + _CLEARLY
+            decided = bool(too_common or clear)
         self._known[name] = known
         return out
 

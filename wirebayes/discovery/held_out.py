@@ -155,14 +155,14 @@ class LeftOut:
 
     def __init__(self, rng: np.random.Generator, parallel_map: ParallelMap) -> None:
         self._rng, self._map = rng, parallel_map
-        self._known: list[tuple[LaplaceFit, Array]] = []
+        self._known: dict[int, tuple[LaplaceFit, Array]] = {}  # by id, which is taken as long as the fit is kept
 
     def of(self, fits: Sequence[LaplaceFit]) -> list[Array]:
         """(H,) densities of each fit; those of the same object are the same."""
-        new = list({id(fit): fit for fit in fits if all(fit is not known for known, _ in self._known)}.values())
+        new = list({id(fit): fit for fit in fits if id(fit) not in self._known}.values())
         scores = self._map(truncated_leave_one_hold_out, new, self._rng.spawn(len(new)))
-        self._known += zip(new, scores, strict=True)
-        return [next(score for known, score in self._known if known is fit) for fit in fits]
+        self._known |= {id(fit): (fit, score) for fit, score in zip(new, scores, strict=True)}
+        return [self._known[id(fit)][1] for fit in fits]
 
 
 def _draws(block: LaplaceFit, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:

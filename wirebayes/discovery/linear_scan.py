@@ -212,13 +212,15 @@ def joined(scans: Sequence[Scan]) -> Scan:
     if len(scans) == 1:
         return scans[0]
     parts = [s.pieces for s in scans]
+    ends = np.cumsum([len(p.least) for p in parts])
+    few = parts[: 1 + int(np.searchsorted(ends, _PIECES_OF))]
     pieces = replace(
         parts[0],
-        shared=_first([p.shared for p in parts]),
-        rss=_first([p.rss for p in parts]),
-        along=_first([p.along for p in parts]),
-        square=_first([p.square for p in parts]),
-        least=_first([p.least for p in parts], axis=0),
+        shared=np.concatenate([p.shared for p in few], axis=1)[:, :_PIECES_OF],
+        rss=np.concatenate([p.rss for p in few], axis=1)[:, :_PIECES_OF],
+        along=np.concatenate([p.along for p in few], axis=1)[:, :_PIECES_OF],
+        square=np.concatenate([p.square for p in few], axis=1)[:, :_PIECES_OF],
+        least=np.concatenate([p.least for p in few])[:_PIECES_OF],
     )
     return Scan(
         effects=np.concatenate([s.effects for s in scans]),
@@ -227,17 +229,6 @@ def joined(scans: Sequence[Scan]) -> Scan:
         norm=np.concatenate([s.norm for s in scans]),
         pieces=pieces,
     )
-
-
-def _first(parts: Sequence[Array], axis: int = 1) -> Array:
-    """The first `_PIECES_OF` rows of consecutive arrays; of the later ones none is read."""
-    rows, few = 0, list[Array]()
-    for part in parts:
-        few.append(part[(slice(None),) * axis + (slice(_PIECES_OF - rows),)])
-        rows += part.shape[axis]
-        if rows >= _PIECES_OF:
-            break
-    return np.concatenate(few, axis=axis)
 
 
 def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array]:
