@@ -122,6 +122,22 @@ def test_filters_are_those_of_numpy(p, row, sensor_sd, setting_sd, seed):
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9)
 
 
+@settings(deadline=None)
+@given(protocols(), models, st.lists(parameters(), min_size=1, max_size=3), st.integers(0, 2**32 - 1))
+def test_filtering_a_staircase_as_it_is_computed_gives_the_same_bits_as_one_after_the_other(p, model, rows, seed):
+    theta, rng = drawn(model, rows, seed), np.random.default_rng(seed)
+    line = linearise(p, theta, model)
+    readings = rng.normal(3.0, 1.0, (*p.time_s.shape, len(rows)))
+    readings[rng.integers(len(readings)), :, 0] = np.nan  # of the first column one hold is not seen
+    noise = rng.uniform(0.01, 0.1, len(rows)), rng.uniform(0.0, 1.0, len(rows))
+    at_once = likelihoods.chain_of(p, theta, model, readings, *noise)
+    for name, value in vars(likelihoods.chain(line, readings, p.mask, *noise)).items():
+        np.testing.assert_array_equal(getattr(at_once, name), value)
+    found = likelihoods.standardised_of(p, theta, model, readings, *noise)
+    for one, other in zip(found, likelihoods.standardised(line, readings, p.mask, *noise), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 @pytest.mark.parametrize("effect", FORMS, ids=lambda e: e.key)
 def test_each_effect_moves_the_compiled_readings(effect):
     p = protocol([*ONE_WAY, 3.0, 1.0], [TIMES] * 8, warming=np.linspace(0.0, 5.0, 40).reshape(8, 5))

@@ -14,7 +14,7 @@ import numpy as np
 from wirebayes.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
+from wirebayes.wire.staircase import Linearised, Model, Theta, Walk, linearise
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -58,9 +58,10 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     -------
     Filtered
     """
-    if compiled.kernel is not None:
-        return Filtered(*compiled.kernel.chain(*_flat(line, readings, mask, variance, setting_sd)))
     holds, _, n = line.tension.shape
+    if compiled.kernel is not None:
+        observed = _observed(n, readings, mask, variance, setting_sd)
+        return Filtered(*compiled.kernel.chain(compiled.kernel.Stored(*_flat(line)), *observed))
     out = np.zeros((holds, n))
     mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
     noise = _Noise.of(variance, setting_sd)
@@ -91,9 +92,10 @@ def standardised(
     -------
     (n,) and (m, n) arrays
     """
-    if compiled.kernel is not None:
-        return compiled.kernel.standardised(*_flat(line, readings, mask, variance, setting_sd))
     n = line.tension.shape[2]
+    if compiled.kernel is not None:
+        observed = _observed(n, readings, mask, variance, setting_sd)
+        return compiled.kernel.standardised(compiled.kernel.Stored(*_flat(line)), *observed)
     noise, total, out = _Noise.of(variance, setting_sd), np.zeros(n), []
     mean, var = np.zeros(n), np.zeros(n)
     for j in range(len(mask)):
@@ -110,14 +112,63 @@ def standardised(
     return total, np.concatenate(out)
 
 
-def _flat(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> tuple[Array, ...]:
-    """What compiled filters are called with: contiguous arrays of their own types."""
-    shape = line.tension.shape
+def chain_of(
+    protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array, setting_sd: Array
+) -> Filtered:
+    """Filter readings along a staircase that is needed for nothing else: compiled, as it is computed.
+
+    Parameters
+    ----------
+    protocol, theta, model
+        As for `wirebayes.wire.staircase.linearise`.
+    readings, variance, setting_sd
+        As for `chain`.
+
+    Returns
+    -------
+    Filtered
+    """
+    call = compiled.call(protocol, theta, model)
+    if call is None:
+        return chain(linearise(protocol, theta, model), readings, protocol.mask, variance, setting_sd)
+    observed = _observed(call.theta.shape[1], readings, protocol.mask, variance, setting_sd)
+    return Filtered(*compiled.kernel.chain(compiled.kernel.Computed(*call), *observed))
+
+
+def standardised_of(
+    protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array, setting_sd: Array
+) -> tuple[Array, Array]:
+    """What `standardised` returns of a staircase that is needed for nothing else.
+
+    Parameters
+    ----------
+    protocol, theta, model
+        As for `wirebayes.wire.staircase.linearise`.
+    readings, variance, setting_sd
+        As for `chain`.
+
+    Returns
+    -------
+    (n,) and (m, n) arrays
+    """
+    call = compiled.call(protocol, theta, model)
+    if call is None:
+        return standardised(linearise(protocol, theta, model), readings, protocol.mask, variance, setting_sd)
+    observed = _observed(call.theta.shape[1], readings, protocol.mask, variance, setting_sd)
+    return compiled.kernel.standardised(compiled.kernel.Computed(*call), *observed)
+
+
+def _flat(line: Linearised) -> tuple[Array, ...]:
+    """Staircases as compiled code takes them."""
     parts = (line.tension, line.by_setting, line.by_creep, line.carry_by_setting, line.carry_by_creep)
-    lines = (np.ascontiguousarray(part, float) for part in parts)
-    noise = (np.full(shape[2], v, float) for v in (variance, setting_sd))
-    seen = np.ascontiguousarray(mask).view(np.uint8)
-    return *lines, np.broadcast_to(np.asarray(readings, float), shape), seen, *noise
+    return tuple(np.ascontiguousarray(part, float) for part in parts)
+
+
+def _observed(n: int, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> tuple[Array, ...]:
+    """Readings and noise of n columns, likewise."""
+    noise = (np.full(n, v, float) for v in (variance, setting_sd))
+    read = np.ascontiguousarray(mask).view(np.uint8)
+    return np.broadcast_to(np.asarray(readings, float), (*mask.shape, n)), read, *noise
 
 
 def held_out(
@@ -252,9 +303,9 @@ def seen(
         shapesᵀ V⁻¹ shapes and shapesᵀ V⁻¹ (readings - tension).
     """
     if compiled.kernel is not None:
-        flat = _flat(line, readings, mask, variance, setting_sd)
+        observed = _observed(line.tension.shape[2], readings, mask, variance, setting_sd)
         beside = (np.ascontiguousarray(a, float) for a in (filtered.carried_mean, filtered.carried_var, shapes))
-        return compiled.kernel.seen(*flat, *beside)
+        return compiled.kernel.seen(*_flat(line), *observed, *beside)
     holds, _, n = line.tension.shape
     k = shapes.shape[2]
     gram, along = np.zeros((k, k, n)), np.zeros((k, n))

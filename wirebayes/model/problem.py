@@ -119,8 +119,8 @@ class Problem:
             if self.likelihood == "hold":
                 out.append(likelihoods.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
-                line = linearise(sample.protocol, own, sample.model)
-                out.append(likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
+                found = likelihoods.chain_of(sample.protocol, own, sample.model, y, variance, own["setting_sd"])
+                out.append(found.log_likelihood)
         return out
 
     def log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> Array:
@@ -138,13 +138,13 @@ class Problem:
         with np.errstate(all="ignore"):
             for i, sample in enumerate(self.samples):
                 y = sample.readings if readings is None else readings[i]
+                own = self.parameters(theta, sample)
+                what = sample.protocol, own, sample.model, y
+                variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
                 if self.likelihood == "hold":
-                    own = self.parameters(theta, sample)
-                    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
-                    found = likelihoods.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
+                    found = likelihoods.standardised_hold_by_hold(*what, variance)
                 else:
-                    line, variance, setting_sd = self.linearised(theta, sample)
-                    found = likelihoods.standardised(line, y, sample.protocol.mask, variance, setting_sd)
+                    found = likelihoods.standardised_of(*what, variance, own["setting_sd"])
                 values.append(found[0])
                 residuals.append(found[1])
             total: Any = sum(values)

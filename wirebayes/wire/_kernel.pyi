@@ -22,19 +22,26 @@ class Law:
         formulas: Sequence[tuple[str, int, float]],
     ) -> None: ...
 
+class Staircases: ...
+
+class Computed(Staircases):
+    def __init__(self, test: Test, law: Law, theta: Array) -> None: ...
+
+class Stored(Staircases):
+    def __init__(
+        self,
+        tension: Array,
+        by_setting: Array,
+        by_creep: Array,
+        carry_by_setting: Array,
+        carry_by_creep: Array,
+    ) -> None: ...
+
 def linearise(test: Test, law: Law, theta: Array) -> tuple[Array, ...]: ...
 def simulate(test: Test, law: Law, theta: Array, setting_mm: Array) -> Array: ...
 def courses(test: Test, law: Law, theta: Array, first_N: Array, most_steps: int) -> tuple[Array, Array]: ...
 def chain(
-    tension: Array,
-    by_setting: Array,
-    by_creep: Array,
-    carry_by_setting: Array,
-    carry_by_creep: Array,
-    readings: Array,
-    mask: Array,
-    variance: Array,
-    setting_sd: Array,
+    of: Staircases, readings: Array, mask: Array, variance: Array, setting_sd: Array
 ) -> tuple[Array, Array, Array]: ...
 def square_gained(drive: Array, reached: Array, which: NDArray[np.int64], kept: float) -> Array: ...
 def seen(
@@ -52,13 +59,5 @@ def seen(
     shapes: Array,
 ) -> tuple[Array, Array]: ...
 def standardised(
-    tension: Array,
-    by_setting: Array,
-    by_creep: Array,
-    carry_by_setting: Array,
-    carry_by_creep: Array,
-    readings: Array,
-    mask: Array,
-    variance: Array,
-    setting_sd: Array,
+    of: Staircases, readings: Array, mask: Array, variance: Array, setting_sd: Array
 ) -> tuple[Array, Array]: ...

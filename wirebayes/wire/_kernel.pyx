@@ -59,11 +59,25 @@ cdef inline Dual through(Dual x, double value, double slope) noexcept nogil:
     return Dual(value, slope * x.s, slope * x.c)
 
 
+cdef struct Chosen:
+    # Some of a model's effects, in the order they compose.
+    int n
+    int each[_MOST_EFFECTS]
+
+
+cdef struct Places:
+    # What has to be looked at for every reading: effects on the zero-tension length, the strain, the creep, the
+    # elongation beside it and the reading; and whether there are none.
+    Chosen zero, strain, creep, beside, reading
+    bint empty
+
+
 cdef struct Wire:
     double k1, B, U, k2, N, base, length_mm, log_length_ratio, tension_ref_N, kept
     bint modified
     int effects
-    bint own_time, timed  # time passes differently from hold to hold; another law than eq (5) says how creep goes on
+    Places* at
+    bint own_time, timed  # creep has a rate or a time of its own in each hold; it goes on by another law than eq (5)
     int formula[_MOST_EFFECTS]
     double number[_MOST_EFFECTS]  # the hold of an event, the parameter that depends on the length
     double own[_MOST_EFFECTS][2]  # amplitudes
@@ -81,12 +95,13 @@ cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warmi
     """Strain after all effects on length and strain."""
     cdef Dual zero = elongation, out
     cdef double inverse, share, width
-    cdef int e
+    cdef int k, e
     zero.v += wire.length_mm
-    for e in range(wire.effects):
+    for k in range(wire.at.zero.n):
+        e = wire.at.zero.each[k]
         if wire.formula[e] == THERMAL:
             zero = times(zero, 1.0 + wire.own[e][0] * warming_K)
-        elif wire.formula[e] == SLIP and hold.order >= wire.number[e]:
+        elif hold.order >= wire.number[e]:  # a slip
             zero.v += wire.own[e][0]
     if wire.modified:
         inverse = 1.0 / hold.position.v
@@ -100,7 +115,8 @@ cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warmi
         share = hold.position.v * inverse * inverse
         out.s = inverse * hold.position.s - share * zero.s
         out.c = inverse * hold.position.c - share * zero.c
-    for e in range(wire.effects):
+    for k in range(wire.at.strain.n):
+        e = wire.at.strain.each[k]
         if wire.formula[e] == STIFFENING:
             width = wire.own[e][0]
             out = through(out, out.v * (1.0 + width * out.v), 1.0 + 2.0 * width * out.v)
@@ -189,9 +205,9 @@ cdef inline double clock_of(Wire* wire, Hold* hold, double time_s, bint first) n
     return time_s
 
 
-cdef inline Dual fraction_of(Wire* wire, Dual rate, double time_s) noexcept nogil:
-    """Share of the amount reached after a time, the rate having derivatives."""
-    cdef double reach = pow(time_s, wire.N), gone = expm1(-rate.v * reach)
+cdef inline Dual fraction_of(Dual rate, double reach) noexcept nogil:
+    """Share of the amount reached after a time, to the power N, the rate having derivatives."""
+    cdef double gone = expm1(-rate.v * reach)
     return through(rate, -gone, reach * (1.0 + gone))
 
 
@@ -212,18 +228,21 @@ cdef inline double law_of_time(Wire* wire, double time_s) noexcept nogil:
     return share
 
 
-cdef inline Dual reading_of(Wire* wire, Hold* hold, Dual tension, double time_s) noexcept nogil:
+cdef inline Dual reading_of(
+    Wire* wire, Hold* hold, Dual tension, double time_s, double[:, ::1] shares, int which
+) noexcept nogil:
     """What the sensor says of a tension."""
     cdef double a
-    cdef int e
-    for e in range(wire.effects):
+    cdef int k, e
+    for k in range(wire.at.reading.n):
+        e = wire.at.reading.each[k]
         a = wire.own[e][0]
         if wire.formula[e] == DRIFT:
             tension.v += a * (hold.start_s + time_s)
         elif wire.formula[e] == SQUARE:
             tension = through(tension, tension.v * (1.0 + a * tension.v), 1.0 + 2.0 * a * tension.v)
         elif wire.formula[e] == TRANSIENT:
-            tension = times(tension, 1.0 + a * exp(-time_s / wire.own[e][1]))
+            tension = times(tension, 1.0 + a * shares[1 + e, which])
         elif wire.formula[e] == FRICTION:
             tension = times(tension, 1.0 + a * hold.direction)
     return tension
@@ -232,7 +251,7 @@ cdef inline Dual reading_of(Wire* wire, Hold* hold, Dual tension, double time_s)
 cdef class Test:
     """What was done to a wire, as contiguous arrays (see `wirebayes.wire.protocol.Protocol`)."""
 
-    cdef int holds, width
+    cdef int holds, width, read_times  # of `times`, which begin with those of readings
     cdef double length_mm
     cdef double[:, ::1] time_s, warming_K
     cdef double[::1] displacement_mm, start_s, order, direction, times
@@ -242,16 +261,18 @@ cdef class Test:
     cdef unsigned char[::1] recorded
 
     def __init__(self, double length_mm, displacement_mm, time_s, warming_K, start_s, order, direction, times, which,
-                 last, recorded, which_age):
+                 last, recorded, which_age, int read_times):
         self.length_mm = length_mm
         self.displacement_mm, self.time_s, self.warming_K = displacement_mm, time_s, warming_K
         self.start_s, self.order, self.direction, self.times = start_s, order, direction, times
         self.which, self.last, self.recorded, self.which_age = which, last, recorded, which_age
         self.holds, self.width = self.time_s.shape[0], self.time_s.shape[1]
+        self.read_times = read_times
 
 
 cdef inline Dual remembered(
-    Wire* wire, Hold* hold, Test test, double omega, int j, int r, int earlier, double[::1] shares, double[:, ::1] past
+    Wire* wire, Hold* hold, Test test, double omega, int j, int r, int earlier, double[:, ::1] shares,
+    double[:, ::1] past
 ) noexcept:
     """What the clocks of earlier holds would still have added by a reading of hold `j`."""
     cdef double total = 0.0, share, age, k2
@@ -262,7 +283,7 @@ cdef inline Dual remembered(
             # a difference of two fractions of the creep
             share = expm1(-k2 * pow(age, wire.N)) - expm1(-k2 * pow(age + test.time_s[j, r], wire.N))
         else:
-            share = shares[test.which_age[j, i, r + 1]] - shares[test.which_age[j, i, 0]]
+            share = shares[0, test.which_age[j, i, r + 1]] - shares[0, test.which_age[j, i, 0]]
         total += past[i, 1] * share
     return constant(omega * total)
 
@@ -276,6 +297,7 @@ cdef class Law:
     cdef int formula[_MOST_EFFECTS]
     cdef int amplitudes[_MOST_EFFECTS]
     cdef double number[_MOST_EFFECTS]
+    cdef Places at
 
     def __init__(self, bint modified, double kept, double tension_ref_N, double log_length_ratio, formulas):
         self.modified, self.kept, self.tension_ref_N = modified, kept, tension_ref_N
@@ -284,16 +306,37 @@ cdef class Law:
         for e, (name, amplitudes, number) in enumerate(formulas):
             self.formula[e] = FORMULAS.index(name)
             self.amplitudes[e], self.number[e] = amplitudes, number
+        self.choose(&self.at.zero, (THERMAL, SLIP))
+        self.choose(&self.at.strain, (STIFFENING, TOE, SERIES, AT_ONCE))
+        self.choose(&self.at.creep, (MEMORY, FLOW_CARRIED))
+        self.choose(&self.at.beside, (SECOND_MODE, FLOW))
+        self.choose(&self.at.reading, (DRIFT, SQUARE, TRANSIENT, FRICTION))
+        self.at.empty = not (self.at.zero.n + self.at.strain.n + self.at.creep.n + self.at.beside.n + self.at.reading.n)
+
+    cdef void choose(self, Chosen* chosen, tuple formulas):
+        """The effects with one of these formulas."""
+        cdef int e
+        chosen.n = 0
+        for e in range(self.effects):
+            if self.formula[e] in formulas:
+                chosen.each[chosen.n] = e
+                chosen.n += 1
 
 
-cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ssize_t i, double[::1] shares) noexcept:
-    """The wire of column `i`: parameters k1 B U k2 N preload, then amplitudes; and its creep at the distinct times."""
+cdef void take(
+    Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ssize_t i, double[:, ::1] shares
+) noexcept:
+    """The wire of column `i`: parameters k1 B U k2 N preload, then amplitudes.
+
+    Also what depends on time alone, at each of the distinct times: the share of creep reached, or, where rates differ,
+    the time to the power N; then, of an effect that has one, the share of its own course.
+    """
     cdef int e, row = 6, a, t
     cdef double grown
     wire.k1, wire.B, wire.U, wire.k2, wire.N = theta[0, i], theta[1, i], theta[2, i], theta[3, i], theta[4, i]
     wire.length_mm, wire.base = test.length_mm, test.length_mm + theta[5, i]
     wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
-    wire.effects, wire.own_time, wire.timed, wire.solved = law.effects, False, False, 0.0
+    wire.effects, wire.at, wire.own_time, wire.timed, wire.solved = law.effects, &law.at, False, False, 0.0
     for e in range(law.effects):
         wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], 0.0
         for a in range(law.amplitudes[e]):
@@ -313,12 +356,23 @@ cdef void take(Wire* wire, Law law, Test test, const double[:, ::1] theta, Py_ss
                 wire.U *= grown
             else:
                 wire.N *= grown
+    wire.own_time = wire.own_time and not wire.timed  # another law of time has no rate
     if wire.timed:
         for t in range(test.times.shape[0]):
-            shares[t] = law_of_time(wire, test.times[t])
-    elif not wire.own_time:
+            shares[0, t] = law_of_time(wire, test.times[t])
+    elif wire.own_time:
         for t in range(test.times.shape[0]):
-            shares[t] = -expm1(-wire.k2 * pow(test.times[t], wire.N))
+            shares[0, t] = pow(test.times[t], wire.N)
+    else:
+        for t in range(test.times.shape[0]):
+            shares[0, t] = -expm1(-wire.k2 * pow(test.times[t], wire.N))
+    for e in range(law.effects):
+        if law.formula[e] == SECOND_MODE:
+            for t in range(test.read_times):
+                shares[1 + e, t] = -expm1(-test.times[t] / wire.own[e][1])
+        elif law.formula[e] == TRANSIENT:
+            for t in range(test.read_times):
+                shares[1 + e, t] = exp(-test.times[t] / wire.own[e][1])
 
 
 cdef void begin(Wire* wire, Hold* hold, Test test, int j, double stretched, double carried) noexcept:
@@ -357,7 +411,7 @@ cdef inline double beside_of(Wire* wire) noexcept nogil:
 
 
 cdef Dual follow(
-    Wire* wire, Hold* hold, Test test, int j, int width, int earlier, double[::1] shares, double[:, ::1] past,
+    Wire* wire, Hold* hold, Test test, int j, int width, int earlier, double[:, ::1] shares, double[:, ::1] past,
     Dual* readings
 ) noexcept:
     """The first readings of a hold that has begun, `width` of them, after `earlier` ones that it remembers.
@@ -365,68 +419,157 @@ cdef Dual follow(
     Returns the creep carried out, and leaves what is beside it in `wire`.
     """
     cdef Dual amount = amount_of(wire, hold), rate = rate_of(wire, hold), grown, total, course, out
-    cdef double time_s, share, carried_beside[_MOST_EFFECTS]
-    cdef int r, e
+    cdef double time_s, clock_s, share, carried_beside[_MOST_EFFECTS]
+    cdef int r, k, e
+    past[j, 0], past[j, 1], past[j, 2] = hold.start_s, amount.v, rate.v
+    if wire.at.empty and not (wire.own_time or wire.modified):
+        follow_hooke(wire, hold, test, j, width, amount, shares, readings)
+        return plus(hold.carried, times(amount, shares[0, test.which[j, test.last[j]]]))
     out = hold.carried
-    for e in range(wire.effects):
+    for k in range(wire.at.beside.n):
+        e = wire.at.beside.each[k]
         carried_beside[e] = wire.beside[e]
     for r in range(width):
         time_s = test.time_s[j, r]
-        if wire.own_time and not wire.timed:
-            grown = product(amount, fraction_of(wire, rate, clock_of(wire, hold, time_s, r == 0)))
+        if wire.own_time:
+            clock_s = clock_of(wire, hold, time_s, r == 0)
+            share = shares[0, test.which[j, r]] if clock_s == time_s else pow(clock_s, wire.N)
+            grown = product(amount, fraction_of(rate, share))
         else:
-            grown = times(amount, shares[test.which[j, r]])
+            grown = times(amount, shares[0, test.which[j, r]])
         grown = plus(hold.carried, grown)
-        for e in range(wire.effects):
+        for k in range(wire.at.creep.n):
+            e = wire.at.creep.each[k]
             if wire.formula[e] == MEMORY:
                 grown = plus(grown, remembered(wire, hold, test, wire.own[e][0], j, r, earlier, shares, past))
-            elif wire.formula[e] == FLOW_CARRIED:
+            else:  # flow that is carried
                 grown = plus(grown, times(hold.tension, wire.own[e][0] * time_s))
         total = grown
-        for e in range(wire.effects):
+        for k in range(wire.at.beside.n):
+            e = wire.at.beside.each[k]
             if wire.formula[e] == SECOND_MODE:
-                share = -expm1(-time_s / wire.own[e][1])
+                share = shares[1 + e, test.which[j, r]]
                 course = times(hold.tension, wire.own[e][0] * share)
                 course.v += carried_beside[e] * (1.0 - share)
-            elif wire.formula[e] == FLOW:
+            else:  # flow
                 course = times(hold.tension, wire.own[e][0] * time_s)
                 course.v += carried_beside[e]
-            else:
-                continue
             total = plus(total, course)
             if r == test.last[j]:
                 wire.beside[e] = course.v
         if r == test.last[j]:
             out = grown
-        readings[r] = reading_of(wire, hold, tension_of(wire, hold, total, test.warming_K[j, r]), time_s)
-    past[j, 0], past[j, 1], past[j, 2] = hold.start_s, amount.v, rate.v
+        total = tension_of(wire, hold, total, test.warming_K[j, r])
+        readings[r] = reading_of(wire, hold, total, time_s, shares, test.which[j, r])
     return out
+
+
+cdef inline void follow_hooke(
+    Wire* wire, Hold* hold, Test test, int j, int width, Dual amount, double[:, ::1] shares, Dual* readings
+) noexcept:
+    """The usual case of `follow`, which does the same: eq (1), and no effect to look at for every reading."""
+    cdef double share, inverse, strain, slope
+    cdef int r
+    for r in range(width):
+        share = shares[0, test.which[j, r]]
+        inverse = 1.0 / (hold.carried.v + amount.v * share + wire.length_mm)
+        strain, slope = hold.position.v * inverse - 1.0, hold.position.v * inverse * inverse
+        if strain > 0:
+            readings[r].v = strain * wire.k1
+            readings[r].s = (inverse - slope * (hold.carried.s + amount.s * share)) * wire.k1
+            readings[r].c = -slope * (hold.carried.c + amount.c * share) * wire.k1
+        else:
+            readings[r] = constant(0.0)
+
+
+cdef class Staircases:
+    """Where filters find staircases, a column of parameters each: one after the other, for they look at each once."""
+
+    cdef Py_ssize_t n
+    cdef int holds, width
+    cdef Dual* readings  # (holds, width) of the column that was asked for
+    cdef Dual* carry  # (holds,): creep carried out of each
+    cdef double[:, ::1] memory
+
+    cdef void allocate(self, Py_ssize_t n, int holds, int width):
+        self.n, self.holds, self.width = n, holds, width
+        self.memory = np.empty((holds * width + holds + 1, 3))
+        self.readings = <Dual*> &self.memory[0, 0]
+        self.carry = self.readings + holds * width
+
+    cdef void ask(self, Py_ssize_t i) noexcept:
+        """Column `i`."""
+
+
+cdef class Computed(Staircases):
+    """Staircases as they are computed."""
+
+    cdef Test test
+    cdef Law law
+    cdef const double[:, ::1] theta
+    cdef double[:, ::1] past
+    cdef double[:, ::1] shares
+
+    def __init__(self, Test test, Law law, const double[:, ::1] theta):
+        self.allocate(theta.shape[1], test.holds, test.width)
+        self.test, self.law, self.theta = test, law, theta
+        self.past, self.shares = np.empty((test.holds, 3)), np.empty((1 + law.effects, test.times.shape[0]))
+
+    cdef void ask(self, Py_ssize_t i) noexcept:
+        cdef Wire wire
+        cdef Hold hold
+        cdef double creep = 0.0
+        cdef int j
+        take(&wire, self.law, self.test, self.theta, i, self.shares)
+        for j in range(self.holds):
+            begin(&wire, &hold, self.test, j, wire.base + self.test.displacement_mm[j], creep)
+            self.carry[j] = follow(&wire, &hold, self.test, j, self.width, j, self.shares, self.past,
+                                   self.readings + j * self.width)
+            creep = self.carry[j].v
+
+
+cdef class Stored(Staircases):
+    """Staircases that were computed before (see `wirebayes.wire.staircase.Linearised`)."""
+
+    cdef const double[:, :, ::1] tension, by_setting, by_creep
+    cdef const double[:, ::1] carry_by_setting, carry_by_creep
+
+    def __init__(self, const double[:, :, ::1] tension, const double[:, :, ::1] by_setting,
+                 const double[:, :, ::1] by_creep, const double[:, ::1] carry_by_setting,
+                 const double[:, ::1] carry_by_creep):
+        self.allocate(tension.shape[2], tension.shape[0], tension.shape[1])
+        self.tension, self.by_setting, self.by_creep = tension, by_setting, by_creep
+        self.carry_by_setting, self.carry_by_creep = carry_by_setting, carry_by_creep
+
+    cdef void ask(self, Py_ssize_t i) noexcept:
+        cdef int j, r
+        for j in range(self.holds):
+            for r in range(self.width):
+                self.readings[j * self.width + r] = Dual(
+                    self.tension[j, r, i], self.by_setting[j, r, i], self.by_creep[j, r, i]
+                )
+            self.carry[j] = Dual(0.0, self.carry_by_setting[j, i], self.carry_by_creep[j, i])
 
 
 def linearise(Test test, Law law, const double[:, ::1] theta):
     """Staircases (see `wirebayes.wire.staircase.Linearised`), a column of `theta` each."""
-    cdef Py_ssize_t n = theta.shape[1], i
-    cdef int holds = test.holds, width = test.width, j, r
-    each = np.empty((3, holds, width, n))
-    carry = np.empty((2, holds, n))
-    creep = np.zeros((holds + 1, n))
+    cdef Staircases made = Computed(test, law, theta)
+    cdef int holds = made.holds, width = made.width, j, r
+    cdef Py_ssize_t i
+    each = np.empty((3, holds, width, made.n))
+    carry = np.empty((2, holds, made.n))
+    creep = np.zeros((holds + 1, made.n))
     cdef double[:, :, :, ::1] y = each
     cdef double[:, :, ::1] c = carry
-    cdef double[:, ::1] e = creep, past = np.empty((holds, 3))
-    cdef double[::1] shares = np.empty(test.times.shape[0])
-    cdef double[:, ::1] scratch = np.empty((width, 3))
-    cdef Dual* readings = <Dual*> &scratch[0, 0]
-    cdef Wire wire
-    cdef Hold hold
-    cdef Dual out
-    for i in range(n):
-        take(&wire, law, test, theta, i, shares)
+    cdef double[:, ::1] e = creep
+    cdef Dual read
+    for i in range(made.n):
+        made.ask(i)
         for j in range(holds):
-            begin(&wire, &hold, test, j, wire.base + test.displacement_mm[j], e[j, i])
-            out = follow(&wire, &hold, test, j, width, j, shares, past, readings)
             for r in range(width):
-                y[0, j, r, i], y[1, j, r, i], y[2, j, r, i] = readings[r].v, readings[r].s, readings[r].c
-            e[j + 1, i], c[0, j, i], c[1, j, i] = out.v, out.s, out.c
+                read = made.readings[j * width + r]
+                y[0, j, r, i], y[1, j, r, i], y[2, j, r, i] = read.v, read.s, read.c
+            e[j + 1, i], c[0, j, i], c[1, j, i] = made.carry[j].v, made.carry[j].s, made.carry[j].c
     return each[0], each[1], each[2], carry[0], carry[1], creep
 
 
@@ -437,7 +580,7 @@ def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] 
     tension = np.empty((holds, width, n))
     cdef double[:, :, ::1] y = tension
     cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
-    cdef double[::1] shares = np.empty(test.times.shape[0])
+    cdef double[:, ::1] shares = np.empty((1 + law.effects, test.times.shape[0]))
     cdef Dual* readings = <Dual*> &scratch[0, 0]
     cdef double creep
     cdef Wire wire
@@ -461,7 +604,7 @@ def courses(Test test, Law law, const double[:, ::1] theta, const double[:, :] f
     tension, slope = np.zeros((holds, width, n)), np.zeros((holds, width, n))
     cdef double[:, :, ::1] y = tension, by = slope
     cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
-    cdef double[::1] shares = np.empty(test.times.shape[0])
+    cdef double[:, ::1] shares = np.empty((1 + law.effects, test.times.shape[0]))
     cdef Dual* readings = <Dual*> &scratch[0, 0]
     cdef double wanted, stretched, move
     cdef Wire wire
@@ -491,7 +634,7 @@ def courses(Test test, Law law, const double[:, ::1] theta, const double[:, :] f
 
 
 cdef void alone(
-    Wire* wire, Hold* hold, Test test, int j, int width, double stretched, double[::1] shares, double[:, ::1] past,
+    Wire* wire, Hold* hold, Test test, int j, int width, double stretched, double[:, ::1] shares, double[:, ::1] past,
     Dual* readings
 ) noexcept:
     """The first readings of a hold without a past."""
@@ -508,24 +651,25 @@ cdef struct Read:
 
 
 cdef inline Read read_hold(
-    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
-    double a, double c, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j, Py_ssize_t i,
+    Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j, Py_ssize_t i,
     double m, double p, double weight, double log_variance, double q, double* left
 ) noexcept:
     """Filter one hold: the creep carried into it has mean m and variance p, its setting error variance q."""
     cdef double cc = 0.0, cs = 0.0, ss = 0.0, cr = 0.0, sr = 0.0, square = 0.0, residual, det, v_cc, v_cs, v_ss
+    cdef double a = of.carry[j].c, c = of.carry[j].s
     cdef int r, count = 0
     cdef Read out
-    for r in range(mask.shape[1]):
+    cdef Dual* line = of.readings + j * of.width
+    for r in range(of.width):
         if mask[j, r]:
-            residual = readings[j, r, i] - tension[j, r, i] - by_creep[j, r, i] * m
+            residual = readings[j, r, i] - line[r].v - line[r].c * m
             left[count] = residual
             count += 1
-            cc += by_creep[j, r, i] * by_creep[j, r, i]
-            cs += by_creep[j, r, i] * by_setting[j, r, i]
-            ss += by_setting[j, r, i] * by_setting[j, r, i]
-            cr += by_creep[j, r, i] * residual
-            sr += by_setting[j, r, i] * residual
+            cc += line[r].c * line[r].c
+            cs += line[r].c * line[r].s
+            ss += line[r].s * line[r].s
+            cr += line[r].c * residual
+            sr += line[r].s * residual
     cc, cs, ss, cr, sr = cc * weight, cs * weight, ss * weight, cr * weight, sr * weight
     # the difference of two products may come out below zero by rounding
     det = 1.0 + p * cc + q * ss + p * q * fmax(cc * ss - cs * cs, 0.0)
@@ -534,10 +678,10 @@ cdef inline Read read_hold(
     out.pull_c = ((1.0 + q * ss) * cr - q * cs * sr) / det
     out.pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
     count = 0
-    for r in range(mask.shape[1]):
+    for r in range(of.width):
         if mask[j, r]:
             # a sum of squares: the shorter difference of products can turn negative at absurd parameters
-            residual = left[count] - by_creep[j, r, i] * out.post_c - by_setting[j, r, i] * out.post_s
+            residual = left[count] - line[r].c * out.post_c - line[r].s * out.post_s
             left[count] = residual
             square += residual * residual
             count += 1
@@ -572,9 +716,8 @@ cdef double LOG_2PI = log(2.0 * np.pi)
 
 
 def chain(
-    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
-    const double[:, ::1] carry_by_setting, const double[:, ::1] carry_by_creep, const double[:, :, :] readings,
-    const unsigned char[:, ::1] mask, const double[::1] variance, const double[::1] setting_sd
+    Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, const double[::1] variance,
+    const double[::1] setting_sd
 ):
     """Log densities (H, n), means and variances of the carried creep (H + 1, n): `wirebayes.model.likelihoods.chain`."""
     cdef int holds = mask.shape[0], j
@@ -588,23 +731,22 @@ def chain(
     cdef double weight, log_variance, q, a, c
     cdef Read found
     for i in range(n):
+        of.ask(i)
         weight, log_variance, q = 1.0 / variance[i], log(variance[i]) + LOG_2PI, setting_sd[i] * setting_sd[i]
         for j in range(holds):
-            a, c = carry_by_creep[j, i], carry_by_setting[j, i]
             if read[j] and not isnan(readings[j, first[j], i]):
-                found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, mv[0, j, i], mv[1, j, i],
-                                  weight, log_variance, q, &left[0])
+                found = read_hold(of, readings, mask, j, i, mv[0, j, i], mv[1, j, i], weight, log_variance, q, &left[0])
                 out[j, i], mv[0, j + 1, i], mv[1, j + 1, i] = found.log_density, found.mean, found.var
             else:
+                a, c = of.carry[j].c, of.carry[j].s
                 mv[0, j + 1, i] = a * mv[0, j, i]
                 mv[1, j + 1, i] = a * a * mv[1, j, i] + c * c * q
     return density, carried[0], carried[1]
 
 
 def standardised(
-    const double[:, :, ::1] tension, const double[:, :, ::1] by_setting, const double[:, :, ::1] by_creep,
-    const double[:, ::1] carry_by_setting, const double[:, ::1] carry_by_creep, const double[:, :, :] readings,
-    const unsigned char[:, ::1] mask, const double[::1] variance, const double[::1] setting_sd
+    Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, const double[::1] variance,
+    const double[::1] setting_sd
 ):
     """Log-likelihood (n,) and residuals (m, n): `wirebayes.model.likelihoods.standardised`."""
     cdef int holds = mask.shape[0], j, r, row, count
@@ -617,18 +759,19 @@ def standardised(
     cdef double weight, log_variance, q, a, c, m, p, scale, setting_sd_i
     cdef Read found
     for i in range(n):
+        of.ask(i)
         weight, log_variance, setting_sd_i = 1.0 / variance[i], log(variance[i]) + LOG_2PI, fabs(setting_sd[i])
         q, scale, m, p, row = setting_sd_i * setting_sd_i, sqrt(weight), 0.0, 0.0, 0
         for j in range(holds):
-            a, c, count = carry_by_creep[j, i], carry_by_setting[j, i], counts[j]
+            count = counts[j]
             if not count or isnan(readings[j, first[j], i]):
+                a, c = of.carry[j].c, of.carry[j].s
                 m, p = a * m, a * a * p + c * c * q
                 if count:  # other columns have residuals there
                     out[row : row + count + 5, i] = 0.0
                     row += count + 5
                 continue
-            found = read_hold(tension, by_setting, by_creep, a, c, readings, mask, j, i, m, p, weight, log_variance, q,
-                              &left[0])
+            found = read_hold(of, readings, mask, j, i, m, p, weight, log_variance, q, &left[0])
             for r in range(count):
                 out[row + r, i] = left[r] * scale
             row += count

@@ -6,6 +6,7 @@ on the installation, never on the work, so the same seed gives the same bytes.
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -60,10 +61,18 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
         packed[i] = row
     log_ratio = float(np.log(protocol.length_mm / (model.length_ref_mm or protocol.length_mm)))
     kept = 1.0 if model.history == "saturating" else 0.0
-    law = kernel.Law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
+    law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, tuple(formulas))
     remembers = any(name == "memory" for name, _, _ in formulas)
     test = kernel.Test(**(protocol.flat_with_ages if remembers else protocol.flat))
     return Call(test, law, packed)
+
+
+@lru_cache(maxsize=256)
+def _law(
+    modified: bool, kept: float, tension_ref_N: float, log_ratio: float, formulas: tuple[tuple[str, int, float], ...]
+) -> Any:
+    """The kernel's law, of which every evaluation of a model needs the same."""
+    return kernel.Law(modified, kept, tension_ref_N, log_ratio, formulas)
 
 
 def has_formula(effect: Effect) -> bool:

@@ -90,6 +90,7 @@ class Protocol:
             "last": self.last_reading.astype(np.intc),
             "recorded": self.recorded.view(np.uint8),
             "which_age": np.zeros((0, 0, 0), np.intc),
+            "read_times": len(times),
         }
 
     @cached_property
