@@ -96,7 +96,12 @@ def test_the_table_is_there_as_parquet(reference):
     assert table.column("k1_mean").to_pylist() == [float(row["k1_mean"]) for row in rows_of(reference)]
 
 
-def test_the_same_bytes_within_one_process_and_without_the_draws(reference, tests, tmp_path, here):
+def test_the_same_bytes_within_one_process_and_without_the_draws(reference, tests, tmp_path, here, monkeypatch):
+    def unwanted(*args, **kwargs):
+        raise AssertionError("nobody reads it")
+
+    monkeypatch.setattr("wirebayes.results.store.save", unwanted)
+    monkeypatch.setattr("wirebayes.inference.sampler.checkpoint.write", unwanted)
     wb.batch(tests[:2], **QUICK, output=tmp_path / "out", posteriors=False)
     ours, theirs = bytes_of(tmp_path / "out"), bytes_of(reference)
     for test in tests[:2]:
@@ -139,14 +144,14 @@ def test_processes_that_die_again_and_again_end_it_in_a_line(tests, tmp_path):
 
 
 def test_a_failing_experiment_says_so_in_its_row(tests, tmp_path, here, monkeypatch):
-    fit = one_experiment.one
+    store = one_experiment.store
 
-    def fails(job, folder, *rest):
+    def fails(job, fit, folder, *rest, **options):
         if job.folder == "spool-1":
             raise FloatingPointError(f"{folder}/odd readings")
-        fit(job, folder, *rest)
+        store(job, fit, folder, *rest, **options)
 
-    monkeypatch.setattr(one_experiment, "one", fails)
+    monkeypatch.setattr(one_experiment, "store", fails)
     many = wb.batch(tests[:3], **QUICK, output=tmp_path / "out")
     assert [row["error"] for row in rows_of(tmp_path / "out")] == ["", "FloatingPointError: odd readings", ""]
     assert "spool-1: FloatingPointError: odd readings" in many.messages
@@ -155,10 +160,10 @@ def test_a_failing_experiment_says_so_in_its_row(tests, tmp_path, here, monkeypa
 
 
 def test_a_full_disk_is_nobodys_row(tests, tmp_path, here, monkeypatch):
-    def full(*rest):
+    def full(*rest, **options):
         raise OSError("no space left")
 
-    monkeypatch.setattr(one_experiment, "one", full)
+    monkeypatch.setattr(one_experiment, "store", full)
     with pytest.raises(OSError, match="no space left"):
         wb.batch(tests[:2], **QUICK, output=tmp_path / "out")
     assert not list((tmp_path / "out").rglob("row.json"))

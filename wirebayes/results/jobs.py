@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.effects import catalogue, named
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import Likelihood, build
@@ -109,19 +109,65 @@ def one(
     progress : callable
         Called with the share of the work that is done, from 0 to 1.
     """
-    from wirebayes.results.store import save  # xarray takes a second to load; not every user of jobs stores
-
-    folder = directory / job.folder
     for place in job.folders:
         (directory / place).mkdir(parents=True, exist_ok=True)
+    checkpoint = directory / job.folder / ".checkpoint"
+    store(job, fitted(job, seed, policy, checkpoint, progress), directory, seed, policy)
+    checkpoint.unlink(missing_ok=True)
+
+
+def fitted(
+    job: Job,
+    seed: int,
+    policy: Policy,
+    checkpoint: Path | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Fit:
+    """Do one fit.
+
+    Parameters
+    ----------
+    job : Job
+    seed : int
+        Of the run; the fit's own follows from it and the name of the job's folder.
+    policy : Policy
+    checkpoint : Path, optional
+        See `wirebayes.inference.fit.fit`; without one nothing is written meanwhile.
+    progress : callable
+        Called with the share of the work that is done, from 0 to 1.
+
+    Returns
+    -------
+    Fit
+    """
     known = catalogue(job.own_effects)
     problem = build(job.experiments, [named(key, known) for key in job.effects], law=job.law, history=job.history,
                     likelihood=job.likelihood, length_exponent=job.length_exponent)  # fmt: skip
     own_seed = seed_of(seed, job.folder)
-    checkpoint = folder / ".checkpoint"
-    result = fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
+    return fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
+
+
+def store(job: Job, result: Fit, directory: Path, seed: int, policy: Policy, *, draws: bool = True) -> None:
+    """Write what came of a fit into the job's folders, which exist.
+
+    Parameters
+    ----------
+    job : Job
+    result : Fit
+    directory : Path
+        Of the run.
+    seed : int
+        Of the run.
+    policy : Policy
+    draws : bool
+        Write the posterior draws, not only their summary.
+    """
+    from wirebayes.results.store import save, save_summary  # loads xarray, which takes a second
+
     about = job.provenance | {"seed": seed, "policy": vars(policy)}
-    samples = problem.samples if job.apart else (None,)
+    samples = result.problem.samples if job.apart else (None,)
     for place, sample in zip(job.folders, samples, strict=True):
-        save(result, directory / place, about, seed=own_seed, sample=sample)
-    checkpoint.unlink(missing_ok=True)
+        if draws:
+            save(result, directory / place, about, seed=seed_of(seed, job.folder), sample=sample)
+        else:
+            save_summary(result, directory / place, sample=sample)

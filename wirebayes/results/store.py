@@ -60,13 +60,29 @@ def save(
         Store the parameters of this sample alone, under their plain names; otherwise all samples, with a dimension
         ``experiment``. A problem of one sample needs none.
     """
-    if sample is None and len(fit.problem.samples) == 1:
-        sample = fit.problem.samples[0]
-    tree = _tree(fit, sample, provenance, np.random.default_rng(seed))
+    tree = _tree(fit, _alone(fit, sample), provenance, np.random.default_rng(seed))
     write_bytes(folder / "posterior.nc", _netcdf(tree))
-    summary = _summary(fit, sample, tree)
+    return save_summary(fit, folder, sample=sample)
+
+
+def save_summary(fit: Fit, folder: Path, *, sample: Sample | None = None) -> SummaryJson:
+    """Write ``summary.json`` alone, the same as `save` does, and return it.
+
+    Parameters
+    ----------
+    fit : Fit
+    folder : Path
+    sample : Sample, optional
+        See `save`.
+    """
+    summary = _summary(fit, _alone(fit, sample))
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def _alone(fit: Fit, sample: Sample | None) -> Sample | None:
+    """The sample that is stored under plain names; None where several are stored together."""
+    return fit.problem.samples[0] if sample is None and len(fit.problem.samples) == 1 else sample
 
 
 def _netcdf(tree: xr.DataTree) -> bytes:
@@ -534,15 +550,15 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
     return [f"{s.name}: {warning}" for s in fit.problem.samples for warning in posterior_checks.warnings(fit, s)]
 
 
-def _summary(fit: Fit, sample: Sample | None, tree: Any) -> SummaryJson:
+def _summary(fit: Fit, sample: Sample | None) -> SummaryJson:
     first = sample or fit.problem.samples[0]
     parameters: dict[str, Parameter] = {}
-    for name, variable in tree["posterior"].data_vars.items():
-        if variable.ndim == 2:
-            parameters[str(name)] = statistics(variable.values)
+    for name, values in _variables(fit.problem, fit.theta, sample).items():
+        if values.ndim == 2:
+            parameters[name] = statistics(values)
         else:
             for i, s in enumerate(fit.problem.samples):
-                parameters[f"{name}[{s.name}]"] = statistics(variable.values[..., i])
+                parameters[f"{name}[{s.name}]"] = statistics(values[..., i])
     tension = round(first.model.tension_ref_N, 3)
     wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
     chains = fit.chains

@@ -21,7 +21,7 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
-from wirebayes.results.jobs import Job, one
+from wirebayes.results.jobs import Job, fitted, store
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import one_thread_each
 from wirebayes.workflows.discover import jobs_of, write_findings
@@ -129,7 +129,7 @@ def first_columns(experiment: Experiment, file: str) -> Row:
 def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.law, task.history, provenance=about)
-    one(job, folder, task.seed, task.policy)
+    _store(job, folder, task, draws=task.posteriors)
     if task.check:
         write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
     summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
@@ -137,11 +137,18 @@ def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     return _columns(summary, check and check["p"], check and check["passed"])
 
 
+def _store(job: Job, folder: Path, task: Task, *, draws: bool) -> None:
+    """Fit and store; nothing would go on from a checkpoint in a folder that is gone afterwards."""
+    for place in job.folders:
+        (folder / place).mkdir(parents=True)
+    store(job, fitted(job, task.seed, task.policy), folder, task.seed, task.policy, draws=draws)
+
+
 def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.law, task.history, kinds, task.simulations), task.seed)
     for job in jobs_of(found, task.law, task.history, task.own_effects):
-        one(job, folder, task.seed, task.policy)
+        _store(job, folder, task, draws=True)  # pictures show them
     write_findings(found, folder, task.own_effects)
     report = found.report["experiments"][experiment.name]
     # the check of a fit is this global test
