@@ -29,6 +29,7 @@ columns are ordered: errors before what they widen, the shape of the creep befor
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,17 @@ class _Ridge:
         """(n,) a parameter of the material, or the number that it is fixed at."""
         return theta[:, self.where[name]] if name in self.where else self.fixed[name]
 
+    @cached_property
+    def _tensions(self) -> tuple[float, Array]:
+        """Mean of the log tensions, and how far each is from it, (H, 1)."""
+        mean = float(self.log_tension.mean())
+        return mean, (self.log_tension - mean)[:, None]
+
+    @cached_property
+    def log_half_hold(self) -> float:
+        """Logarithm of half a typical hold, s."""
+        return float(np.log(0.5 * self.hold_s))
+
     def log_power(self, z: Array) -> Array:
         """(n,) log U that suits the measured losses best at the hazards of sampled coordinates (n, d)."""
         return np.interp(z[:, self.where["k2"]], *self.powers)
@@ -117,8 +129,8 @@ class _Ridge:
         U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
         U = self.levelled(U)
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
-        mean = float(self.log_tension.mean())
-        drive = np.exp(U * (self.log_tension - mean)[:, None])
+        mean, apart = self._tensions
+        drive = np.exp(U * apart)
         if compiled.kernel is not None and not self.effects:
             # of parameters that are fixed there is one column
             every, share = (
@@ -190,6 +202,7 @@ class Transformation:
         for i, distribution in free:
             if i not in self.edges:
                 self.scale[i] = _spread(distribution)
+        self._log_scale = np.log(self.scale).sum()
         slack = [slack_edge(problem, sample) for sample in problem.samples] if for_draws else []
         self.slack_edges = [s for s in slack if s and not self.log_columns[s.preload] and s.preload not in self.edges]
         self.log_spread = np.ones(len(names))
@@ -321,7 +334,7 @@ class Transformation:
         theta, z : (n, d) arrays
             Natural parameters and their coordinates.
         """
-        total = np.log(theta[:, self.log_columns]).sum(axis=1) + np.log(self.scale).sum()
+        total = np.log(theta[:, self.log_columns]).sum(axis=1) + self._log_scale
         for i, at in self.edges.items():
             total = total + (shares.log_slope(theta[:, i], z[:, i]) if i in self.shares else at.log_slope(theta[:, i]))
         for slack in self.slack_edges:
@@ -352,7 +365,7 @@ class Transformation:
         return np.asarray(out.T)
 
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
-        return np.asarray(ridge.levelled(ridge.get(theta, "N")) * np.log(0.5 * ridge.hold_s))
+        return np.asarray(ridge.levelled(ridge.get(theta, "N")) * ridge.log_half_hold)
 
     def _with_shares(self, ridge: _Ridge, sample: Sample) -> _Ridge:
         """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.

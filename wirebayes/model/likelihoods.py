@@ -167,8 +167,7 @@ def _flat(line: Linearised) -> tuple[Array, ...]:
 def _observed(n: int, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> tuple[Array, ...]:
     """Readings and noise of n columns, likewise."""
     noise = (np.full(n, v, float) for v in (variance, setting_sd))
-    read = np.ascontiguousarray(mask).view(np.uint8)
-    return np.broadcast_to(np.asarray(readings, float), (*mask.shape, n)), read, *noise
+    return np.asarray(readings, float), np.ascontiguousarray(mask).view(np.uint8), *noise
 
 
 def held_out(

@@ -63,9 +63,10 @@ class Prior:
         """A function of (n, d) parameters that returns the (n,) log density."""
         forms = [_parsed(d) for d in self.distributions.values()]
         # most columns are of this form, and a call for each would take longer than the arithmetic
-        positive = [i for i, d in enumerate(forms) if d.name == "lognorm" and d.loc == 0.0]
+        is_positive = np.array([d.name == "lognorm" and d.loc == 0.0 for d in forms])
+        positive = np.flatnonzero(is_positive)
         together = _lognormal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("shape", "scale")))
-        others = [(i, fast_logpdf(d)) for i, d in enumerate(self.distributions.values()) if i not in positive]
+        others = [(i, fast_logpdf(d)) for i, d in enumerate(self.distributions.values()) if not is_positive[i]]
 
         def evaluate(theta: Array) -> Array:
             total = together(theta[:, positive]).sum(axis=1)
@@ -129,7 +130,8 @@ def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
     """The log density of a frozen distribution; closed forms of the common ones avoid scipy's overhead per call."""
     name, shape, loc, scale = _parsed(dist)
     if name == "norm":
-        return lambda x: -0.5 * ((x - loc) / scale) ** 2 - (np.log(scale) + _HALF_LOG_2PI)
+        constant = float(np.log(scale)) + _HALF_LOG_2PI
+        return lambda x: -0.5 * ((x - loc) / scale) ** 2 - constant
     if name == "halfnorm":
         constant = 0.5 * float(np.log(2.0 / np.pi)) - float(np.log(scale))
         return lambda x: np.where(x >= loc, constant - 0.5 * ((x - loc) / scale) ** 2, -np.inf)
@@ -160,8 +162,9 @@ def _lognormal(spread: Any, median: Any) -> Callable[[Array], Array]:
     middle, constant = np.log(median), np.log(spread) + _HALF_LOG_2PI
 
     def evaluate(x: Array) -> Array:
-        log_x = np.log(np.where(x > 0, x, 1.0))
-        return np.where(x > 0, -0.5 * ((log_x - middle) / spread) ** 2 - log_x - constant, -np.inf)
+        inside = x > 0
+        log_x = np.log(np.where(inside, x, 1.0))
+        return np.where(inside, -0.5 * ((log_x - middle) / spread) ** 2 - log_x - constant, -np.inf)
 
     return evaluate
 

@@ -574,7 +574,7 @@ def linearise(Test test, Law law, const double[:, ::1] theta):
 
 
 def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] setting_mm):
-    """Noise-free readings (H, R, n); `setting_mm` (H, n)."""
+    """Noise-free readings (H, R, n); `setting_mm` (H, n) or (H, 1)."""
     cdef Py_ssize_t n = theta.shape[1], i
     cdef int holds = test.holds, width = test.width, j, r
     tension = np.empty((holds, width, n))
@@ -582,14 +582,17 @@ def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] 
     cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
     cdef double[:, ::1] shares = np.empty((1 + law.effects, test.times.shape[0]))
     cdef Dual* readings = <Dual*> &scratch[0, 0]
-    cdef double creep
+    cdef double creep, moved
     cdef Wire wire
     cdef Hold hold
+    if setting_mm.shape[0] != holds or setting_mm.shape[1] not in (1, n):
+        raise ValueError("setting errors and columns are of different sizes")
     for i in range(n):
         take(&wire, law, test, theta, i, shares)
         creep = 0.0
         for j in range(holds):
-            begin(&wire, &hold, test, j, wire.base + test.displacement_mm[j] + setting_mm[j, i], creep)
+            moved = setting_mm[j, i if setting_mm.shape[1] > 1 else 0]
+            begin(&wire, &hold, test, j, wire.base + test.displacement_mm[j] + moved, creep)
             creep = follow(&wire, &hold, test, j, width, j, shares, past, readings).v
             for r in range(width):
                 y[j, r, i] = readings[r].v
@@ -660,6 +663,7 @@ cdef inline Read read_hold(
     cdef int r, count = 0
     cdef Read out
     cdef Dual* line = of.readings + j * of.width
+    i = i if readings.shape[2] > 1 else 0  # all columns see the same
     for r in range(of.width):
         if mask[j, r]:
             residual = readings[j, r, i] - line[r].v - line[r].c * m
@@ -715,6 +719,27 @@ def square_gained(const double[:, ::1] drive, const double[:, ::1] reached, cons
 cdef double LOG_2PI = log(2.0 * np.pi)
 
 
+cdef int[:, ::1] counted(const double[:, :, :] readings, const unsigned char[:, ::1] mask, Py_ssize_t n):
+    """How many readings each hold has, and which is the first of them; of the same readings or others in n columns."""
+    cdef int j, r
+    if readings.shape[0] != mask.shape[0] or readings.shape[1] != mask.shape[1] or readings.shape[2] not in (1, n):
+        raise ValueError("readings, mask and columns are of different sizes")
+    cdef int[:, ::1] found = np.zeros((2, mask.shape[0]), np.intc)
+    for j in range(mask.shape[0]):
+        for r in range(mask.shape[1] - 1, -1, -1):
+            if mask[j, r]:
+                found[0, j] += 1
+                found[1, j] = r
+    return found
+
+
+cdef inline bint is_unseen(
+    const double[:, :, :] readings, const int[:, ::1] counts, int j, Py_ssize_t i
+) noexcept nogil:
+    """Whether column `i` has no readings of a hold."""
+    return not counts[0, j] or isnan(readings[j, counts[1, j], i if readings.shape[2] > 1 else 0])
+
+
 def chain(
     Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, const double[::1] variance,
     const double[::1] setting_sd
@@ -725,8 +750,7 @@ def chain(
     density, carried = np.zeros((holds, n)), np.zeros((2, holds + 1, n))
     cdef double[:, ::1] out = density
     cdef double[:, :, ::1] mv = carried
-    cdef unsigned char[::1] read = np.asarray(mask).any(axis=1).view(np.uint8)
-    cdef int[::1] first = np.asarray(mask).argmax(axis=1).astype(np.intc)
+    cdef int[:, ::1] counts = counted(readings, mask, n)
     cdef double[::1] left = np.empty(max(mask.shape[1], 1))
     cdef double weight, log_variance, q, a, c
     cdef Read found
@@ -734,7 +758,7 @@ def chain(
         of.ask(i)
         weight, log_variance, q = 1.0 / variance[i], log(variance[i]) + LOG_2PI, setting_sd[i] * setting_sd[i]
         for j in range(holds):
-            if read[j] and not isnan(readings[j, first[j], i]):
+            if not is_unseen(readings, counts, j, i):
                 found = read_hold(of, readings, mask, j, i, mv[0, j, i], mv[1, j, i], weight, log_variance, q, &left[0])
                 out[j, i], mv[0, j + 1, i], mv[1, j + 1, i] = found.log_density, found.mean, found.var
             else:
@@ -749,11 +773,12 @@ def standardised(
     const double[::1] setting_sd
 ):
     """Log-likelihood (n,) and residuals (m, n): `wirebayes.model.likelihoods.standardised`."""
-    cdef int holds = mask.shape[0], j, r, row, count
+    cdef int holds = mask.shape[0], j, r, row = 0, count
     cdef Py_ssize_t n = variance.shape[0], i
-    taken = np.asarray(mask).sum(axis=1).astype(np.intc)
-    total, residuals = np.zeros(n), np.empty((taken.sum() + 5 * np.count_nonzero(taken), n))
-    cdef int[::1] counts = taken, first = np.asarray(mask).argmax(axis=1).astype(np.intc)
+    cdef int[:, ::1] counts = counted(readings, mask, n)
+    for j in range(holds):
+        row += counts[0, j] + 5 * (counts[0, j] > 0)
+    total, residuals = np.zeros(n), np.empty((row, n))
     cdef double[::1] value = total, left = np.empty(max(mask.shape[1], 1))
     cdef double[:, ::1] out = residuals
     cdef double weight, log_variance, q, a, c, m, p, scale, setting_sd_i
@@ -763,8 +788,8 @@ def standardised(
         weight, log_variance, setting_sd_i = 1.0 / variance[i], log(variance[i]) + LOG_2PI, fabs(setting_sd[i])
         q, scale, m, p, row = setting_sd_i * setting_sd_i, sqrt(weight), 0.0, 0.0, 0
         for j in range(holds):
-            count = counts[j]
-            if not count or isnan(readings[j, first[j], i]):
+            count = counts[0, j]
+            if is_unseen(readings, counts, j, i):
                 a, c = of.carry[j].c, of.carry[j].s
                 m, p = a * m, a * a * p + c * c * q
                 if count:  # other columns have residuals there
@@ -798,7 +823,7 @@ def seen(
     own = np.einsum("hr,hrf,hrg->hfg", np.asarray(mask, float), shapes, shapes)
     cdef double[:, :, ::1] gram = square, each = own
     cdef double[:, ::1] along = product
-    cdef unsigned char[::1] read = np.asarray(mask).any(axis=1).view(np.uint8)
+    cdef int[:, ::1] counts = counted(readings, mask, n)
     cdef double[:, ::1] scratch = np.empty((6, max(k, 1)))
     cdef double[::1] mean = scratch[0], fc = scratch[1], fs = scratch[2], fr = scratch[3], pc = scratch[4], ps = scratch[5]
     cdef double weight, q, p, a, c, cc, cs, ss, cr, sr, det, v_cc, v_cs, v_ss, rest, by_c, by_s, shape, moved
@@ -808,7 +833,7 @@ def seen(
             mean[f] = 0.0  # of the carried creep, had the shapes been the readings
         for j in range(holds):
             a, c, p = carry_by_creep[j, i], carry_by_setting[j, i], carried_var[j, i]
-            if not read[j]:
+            if not counts[0, j]:
                 for f in range(k):
                     mean[f] *= a
                 continue
@@ -818,7 +843,7 @@ def seen(
             for r in range(mask.shape[1]):
                 if mask[j, r]:
                     by_c, by_s = by_creep[j, r, i], by_setting[j, r, i]
-                    rest = readings[j, r, i] - tension[j, r, i] - by_c * carried_mean[j, i]
+                    rest = readings[j, r, i if readings.shape[2] > 1 else 0] - tension[j, r, i] - by_c * carried_mean[j, i]
                     cc += by_c * by_c
                     cs += by_c * by_s
                     ss += by_s * by_s

@@ -54,7 +54,7 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
         names += effect.columns()
         formulas.append((effect.formula, len(effect.amplitudes), effect.formula_constant))
     rows = [theta[name] for name in names]
-    if any(np.iscomplexobj(row) for row in rows):
+    if any(row.dtype.kind == "c" for row in rows):
         return None
     packed = np.empty((len(rows), len(rows[0])))
     for i, row in enumerate(rows):

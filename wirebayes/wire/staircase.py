@@ -91,11 +91,10 @@ def simulate(
     (H, R, n) array, N
     """
     n = np.shape(theta["k1"])[0]
-    exact = np.zeros((1, 1)) if setting_mm is None else np.asarray(setting_mm)
+    exact = np.zeros((len(protocol.displacement_mm), 1)) if setting_mm is None else np.asarray(setting_mm)
     call = None if np.iscomplexobj(exact) else compiled.call(protocol, theta, model)
     if call is not None:
-        exact = np.broadcast_to(exact.astype(float), (len(protocol.displacement_mm), n))
-        return compiled.kernel.simulate(*call, exact)
+        return compiled.kernel.simulate(*call, exact.astype(float))
     walk = Walk(protocol, theta, model)
     creep: NDArray[Any] = np.zeros(n)
     beside: dict[str, NDArray[Any]] = {}
