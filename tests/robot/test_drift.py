@@ -151,6 +151,63 @@ def test_smaller_errors_allowed_a_step_change_little():
     np.testing.assert_allclose(ends[0].tension_N[0, 0], relaxed, rtol=1e-3)
 
 
+@pytest.fixture
+def tries(monkeypatch):
+    """Steps that a walk tries; it is ended after a thousand."""
+    tried, once = [], drift.Walk._try
+
+    def counted(walk, time, least):
+        assert len(tried) < 1000
+        tried.append((time, least))
+        return once(walk, time, least)
+
+    monkeypatch.setattr(drift.Walk, "_try", counted)
+    return tried
+
+
+@pytest.mark.parametrize("name", ["linear-7", "hangprinter-4"])
+def test_a_hold_after_one_in_which_all_creep_was_over_ends_where_it_began(name, tries):
+    # What is left to creep is rounding in the tensions: no step makes its error small against it.
+    robot = schema.read(name)
+    wires = draws.for_robot(robot, _line(40, sd=0.05, k2=0.5))
+    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    joint = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau).joint_m
+    first = drift.hold(robot, wires, joint, np.array([3600.0]), robot.home_m, np.eye(3))
+    pose = first.position_m[:, 0], first.rotation[:, 0]
+    again = drift.hold(robot, wires, joint, np.array([3600.0]), *pose, carried=first.end)
+    assert again.found.all()
+    np.testing.assert_allclose(again.position_m[:, 0], pose[0], atol=1e-8)
+
+
+def test_nothing_is_followed_where_no_draw_hangs_in_balance(tries):
+    robot = schema.read("linear-7")
+    wires = draws.for_robot(robot, _line(3))
+    course = drift.hold(robot, wires, np.full((3, 7), np.nan), np.array([60.0]), robot.home_m, np.eye(3))
+    assert not course.found.any() and len(tries) == 1
+
+
+@pytest.mark.parametrize("off", [-1e-9, 1e-9])
+def test_a_step_is_taken_whatever_its_error_where_creep_grows_by_a_ten_thousandth(off, monkeypatch):
+    robot = schema.read("linear-7")
+    walk = drift.Walk(robot, draws.for_robot(robot, _line()), np.full(7, np.nan), (robot.home_m, np.eye(3)))
+    walk.live[:] = True
+    seen = []
+
+    class Seen(Exception):
+        pass
+
+    def noted(time, least):
+        seen.append(least)
+        raise Seen
+
+    monkeypatch.setattr(walk, "_try", noted)
+    walk.creep.time_s = 10.0
+    walk.step = drift._LEAST_STEP * (10.0**walk.power + walk.first) * (1.0 + off)
+    with pytest.raises(Seen):
+        walk.to(1000.0)
+    assert seen == [off < 0]
+
+
 def test_shared_draws_sink_and_specimens_tilt():
     robot = schema.read("cogiro-desk")
     line = _line(400, sd=0.05, seed=2)

@@ -101,7 +101,8 @@ def estimate(
         found = Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count]))
     else:
         found = way.followed(known.draws)
-    misfit = float(np.nanmean((left / read.of.sd) ** 2))
+    squares = (left / read.of.sd) ** 2
+    misfit = float(np.nanmean(squares)) if np.isfinite(squares).any() else np.nan
     return replace(found, misfit=misfit, converged=mode.converged, effective=out.effective, used=used)
 
 

@@ -79,6 +79,10 @@ class Falls:
 
 _TOLERANCE = 2e-4  # of the creep so far, a step: the drift is then right to .2 % even where wires go slack
 _FIRST = 0.02  # first step tried, in creep's own clock k2 t^N
+# of the way so far, a step that is taken whatever its error: creep grows by as little in it, so the error is no step's
+_LEAST_STEP = 1e-4
+_RESOLVED = 1e-6  # of all creep that tension leads to: what grows less is rounding in tensions, not a drift
+_POWERS = 0.1, 3.0  # of time, between which steps are laid; draws of an estimate may have any N
 
 
 def hold(
@@ -177,8 +181,10 @@ class Walk:
         self.here = forward.solve(robot, wires, *self.lengths, *start)
         self.live = self.here.found
         self.creep = HoldCreep(wires, state, self.here.tension_N.T, follow)
-        self.power = float(np.median(wires.theta["N"]))  # steps are laid in t^power, in which creep starts straight
-        self.step = _FIRST / max(float(np.max(self.creep.k2)), 1e-300)
+        # steps are laid in t^power, in which creep starts straight
+        self.power = float(np.clip(np.median(wires.theta["N"]), *_POWERS))
+        fastest = np.max(self.creep.k2, initial=1e-300, where=np.isfinite(self.creep.k2))
+        self.step = self.first = _FIRST / float(fastest)
         self.slope: Floats | None = None  # of the amount by creep's clock, and the length of the step it comes from
         self.before: Floats = np.zeros(1)
         self.fall_s, self.drop_m = np.full(self.n, np.inf), np.zeros(self.n)
@@ -198,13 +204,15 @@ class Walk:
         """Go on to a time, by steps of bounded error."""
         while self.creep.time_s < stop_s:
             clock, end = self.creep.time_s**self.power, stop_s**self.power
-            whole = clock + self.step >= end * (1 - 1e-12)
+            whole = clock + self.step >= end * (1 - 1e-12) or not self.live.any()
             time = stop_s if whole else (clock + self.step) ** (1 / self.power)
-            error = self._try(time)
+            length = end - clock if whole else self.step
+            least = length <= _LEAST_STEP * (clock + self.first)
+            error = self._try(time, least)
             factor = min(max(0.8 * (self.tolerance / max(error, 1e-300)) ** (1 / 3), 0.2), 3.0)
-            length = min(self.step, end - clock)
-            refused = error > self.tolerance and length > 1e-9 * end
-            if refused or not whole or factor < 1:
+            if least and error > self.tolerance:  # shorter steps do not help
+                self.step = 3.0 * length
+            elif error > self.tolerance or not whole or factor < 1:
                 self.step = factor * length
             else:  # cut short by the requested time: no reason to go on so cautiously
                 self.step = max(self.step, factor * length)
@@ -219,8 +227,16 @@ class Walk:
         creep, self.slope = self.creep, None
         creep.amount = np.where(self.live, creep.amount_at(self.here.tension_N.T), creep.amount)
 
-    def _try(self, time: float) -> float:
-        """One step by prediction and correction; taken unless its error, which is returned, is too large."""
+    def _try(self, time: float, least: bool) -> float:
+        """One step by prediction and correction; taken unless its error, which is returned, is too large.
+
+        Parameters
+        ----------
+        time : float
+            Where it leads.
+        least : bool
+            It is taken in any case.
+        """
         creep, now = self.creep, self.creep.time_s
         done = np.maximum(creep.progress(time), 1e-300)
         guess = creep.toward(time, np.zeros(1) if self.slope is None else self.slope)
@@ -237,10 +253,11 @@ class Walk:
             last, off = first, np.abs(first.grown - guess.grown) * share
             last.grown = first.grown - (first.grown - guess.grown) * share
         alive = self.live & there.here.found
-        size = np.broadcast_to(np.abs(last.grown), (self.robot.legs, self.n)).max(0)
+        size = np.maximum(np.abs(last.grown), _RESOLVED * np.abs(creep.carried.creep_mm + creep.amount))
+        size = np.broadcast_to(size, (self.robot.legs, self.n)).max(0)
         error = (np.broadcast_to(off, (self.robot.legs, self.n)).max(0) / np.maximum(size, 1e-300))[alive]
         worst = float(max(np.quantile(error, 0.9), 0.1 * error.max())) if error.size else 0.0
-        if worst > self.tolerance and time**self.power - now**self.power > 1e-9 * time**self.power:
+        if worst > self.tolerance and not least:
             return worst
         here = self._settle(last, time, there.here)
         fell = self.live & ~(there.here.found & here.found)
