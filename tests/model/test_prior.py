@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from wirebayes.errors import InputError
-from wirebayes.model.prior import Prior, fast_logpdf, from_table, wire_defaults
+from wirebayes.model.prior import Prior, fast_logpdf, from_table, possible, wire_defaults
 
 FORMS = [
     stats.norm(0.5, 2.0), stats.halfnorm(0.0, 0.3), stats.lognorm(1.2, scale=0.03), stats.uniform(-1.0, 3.0),
@@ -75,3 +75,40 @@ def test_a_malformed_table_is_named_with_what_was_expected(table, message):
     assert "prior.k1" in str(complaint.value)
     assert message in str(complaint.value)
     assert len(str(complaint.value).splitlines()) == 1
+
+
+NORMAL = {"distribution": "normal", "sd": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "message"),
+    [
+        ("k1", {"fixed": 0.0}, "prior.k1.fixed: found 0, expected a number above 0"),
+        ("N", {"fixed": -1.0}, "prior.N.fixed: found -1, expected a number above 0"),
+        ("B", {"fixed": -1.0}, "prior.B.fixed: found -1, expected 0 or more"),
+        ("k2", {"distribution": "uniform", "low": -5.0, "high": 1.0}, "prior.k2.low: found -5, expected 0 or more"),
+        ("setting_sd", NORMAL | {"mean": -1e-9}, "prior.setting_sd.mean: found -1e-09, expected 0 or more"),
+    ],
+)
+def test_a_prior_of_what_is_never_negative_has_no_values_below_zero(name, table, message):
+    with pytest.raises(InputError, match=message):
+        possible(f"prior.{name}", name, from_table(f"prior.{name}", table))
+    for free in ("preload", "U", "toe.c"):
+        assert possible("prior", free, from_table("prior", NORMAL | {"mean": -3.0})).mean() == -3.0
+
+
+@pytest.mark.parametrize("name", ["B", "k2", "sensor_sd"])
+def test_nothing_creeps_and_nothing_errs_where_that_is_stated(name):
+    assert possible(f"prior.{name}", name, from_table(f"prior.{name}", {"fixed": 0.0})) == 0.0
+
+
+@pytest.mark.parametrize(("mean", "cut"), [(0.0, True), (0.01, True), (0.0799, True), (0.0801, False)])
+def test_a_normal_prior_is_cut_off_at_zero_where_some_of_it_is_below(mean, cut):
+    made = possible("prior.sensor_sd", "sensor_sd", from_table("prior.sensor_sd", NORMAL | {"mean": mean}))
+    assert made.dist.name == ("truncnorm" if cut else "norm")
+    x = np.linspace(-0.01, 0.2, 400)
+    whole = stats.norm(mean, 0.01)
+    expected = np.where(x >= 0, whole.logpdf(x) - whole.logsf(0.0), -np.inf)
+    if cut:
+        assert fast_logpdf(made)(x) == pytest.approx(expected, rel=1e-9)
+        assert made.logpdf(x) == pytest.approx(expected, rel=1e-9)

@@ -37,11 +37,13 @@ class Edge:
 
 
 def edge(distribution: Any) -> Edge | None:
-    """The map for a half-normal at zero or a uniform distribution; none for others."""
+    """The map for a half-normal at zero, a normal one cut off below or a uniform distribution; none for others."""
     kind = distribution.dist.name
-    _, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
+    shapes, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
     if kind == "halfnorm" and loc == 0.0:
         return _half_normal(float(scale), fast_logpdf(distribution))
+    if kind == "truncnorm" and shapes[1] == np.inf:
+        return _cut_off(float(shapes[0]), float(loc), float(scale), distribution)
     return _uniform(float(loc), float(scale), fast_logpdf(distribution)) if kind == "uniform" else None
 
 
@@ -58,6 +60,24 @@ def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
         return np.asarray(unit * np.where(score < 0.0, low, high))
 
     return Edge(score, value, log_prior, False)
+
+
+def _cut_off(least: float, middle: float, sd: float, distribution: Any) -> Edge:
+    """Of a normal distribution what lies above `least` standard deviations; each half from its own tail."""
+    below, above, end = ndtr(least), ndtr(-least), float(distribution.support()[0])
+    end = 0.0 if abs(end) < 1e-12 * sd else end  # where it was cut off, but for rounding
+
+    def score(value: Array) -> Array:
+        u = np.maximum((value - middle) / sd, least)
+        left = ndtr(-u) / above
+        return np.where(left < 0.5, -ndtri(left), ndtri(np.maximum((ndtr(u) - below) / above, _NEAREST)))
+
+    def value(score: Array) -> Array:
+        low = ndtri(below + ndtr(np.minimum(score, 0.0)) * above)
+        found = middle + sd * np.where(score < 0.0, low, -ndtri(ndtr(-np.maximum(score, 0.0)) * above))
+        return np.asarray(np.maximum(found, end))  # rounding may lead beyond
+
+    return Edge(score, value, fast_logpdf(distribution), False)
 
 
 def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> Edge:

@@ -21,11 +21,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
+from scipy.special import log_ndtr
 
 from wirebayes.errors import InputError
 from wirebayes.io.readings import shown
 from wirebayes.typing import Array
 
+ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # or no wire or bench is like that
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
 
 
@@ -137,6 +139,9 @@ def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
         return lambda x: np.where(x >= loc, constant - 0.5 * ((x - loc) / scale) ** 2, -np.inf)
     if name == "lognorm" and loc == 0.0:
         return _lognormal(shape, scale)
+    if name == "truncnorm" and dist.support()[1] == np.inf:
+        least, whole = loc + shape * scale, float(np.log(scale)) + _HALF_LOG_2PI + float(log_ndtr(-shape))
+        return lambda x: np.where(x >= least, -0.5 * ((x - loc) / scale) ** 2 - whole, -np.inf)
     if name == "uniform":
         return lambda x: np.where((x >= loc) & (x <= loc + scale), -np.log(scale), -np.inf)
     return lambda x: np.asarray(dist.logpdf(x))
@@ -234,6 +239,46 @@ def from_table(key: str, table: Any) -> Any:
     return build(**values)
 
 
+def possible(key: str, name: str, wanted: Any) -> Any:
+    """A prior without the values that a parameter cannot have: a normal one ends at zero where no value is below it.
+
+    Parameters
+    ----------
+    key : str
+        Where it was written, for messages.
+    name : str
+        Of the parameter.
+    wanted : float or scipy frozen distribution
+        As `from_table` returned it.
+
+    Returns
+    -------
+    float or scipy frozen distribution
+
+    Raises
+    ------
+    InputError
+        A fixed value that the parameter cannot have, a uniform prior that begins below zero, or a normal one with most
+        of its mass there.
+    """
+    if name not in (*ABOVE_ZERO, *NOT_BELOW_ZERO):
+        return wanted
+    if isinstance(wanted, float):
+        if wanted < 0 or (wanted == 0 and name in ABOVE_ZERO):
+            least = "a number above 0" if name in ABOVE_ZERO else "0 or more"
+            raise InputError(f"{key}.fixed: found {wanted:g}, expected {least}")
+        return wanted
+    low = float(wanted.support()[0])
+    if low >= 0:
+        return wanted
+    if np.isfinite(low):
+        raise InputError(f"{key}.low: found {low:g}, expected 0 or more: {name} is never negative")
+    mean, sd = float(wanted.mean()), float(wanted.std())
+    if mean < 0:
+        raise InputError(f"{key}.mean: found {mean:g}, expected 0 or more: {name} is never negative")
+    return wanted if mean > _NEVER_BELOW * sd else stats.truncnorm(-mean / sd, np.inf, loc=mean, scale=sd)
+
+
 def _number(key: str, value: Any) -> float:
     expected = f"a finite number of at most {_LARGEST:.0e} in size"
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
@@ -241,4 +286,5 @@ def _number(key: str, value: Any) -> float:
     return float(value)
 
 
+_NEVER_BELOW = 8.0  # standard deviations: a normal prior so far above zero has 1e-15 below it
 _LARGEST = 1e100  # squares and exponentials of what is larger overflow

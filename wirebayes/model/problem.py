@@ -13,7 +13,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
-from wirebayes.model.prior import Prior, from_table, wire_defaults
+from wirebayes.model.prior import Prior, from_table, possible, wire_defaults
 from wirebayes.typing import Array
 from wirebayes.units import nearest
 from wirebayes.wire.effect import Effect, EventEffect
@@ -283,7 +283,7 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
         for name, table in experiment.priors.items():
             line = experiment.prior_lines.get(name)
             key = f"{experiment.source}{f', line {line}' if line else ''}: prior.{name}"
-            wanted = from_table(key, table)
+            wanted = possible(key, name, from_table(key, table))
             hits = [
                 c for c in (f"{name}[{experiment.name}]", f"{name}[{experiment.material}]", name) if c in distributions
             ]

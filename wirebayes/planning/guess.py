@@ -10,7 +10,7 @@ import numpy as np
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws as rough_draws
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.prior import from_table, wire_defaults
+from wirebayes.model.prior import from_table, possible, wire_defaults
 from wirebayes.model.problem import MATERIAL, SAMPLE
 from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
@@ -75,7 +75,8 @@ def from_tables(
             out[name] = defaults[name].rvs(n, random_state=rng)
             continue
         table = tables[name] if isinstance(tables[name], dict) else {"fixed": tables[name]}
-        found = from_table(f"{source}, line {lines[name]}: guess.{name}", table)
+        key = f"{source}, line {lines[name]}: guess.{name}"
+        found = possible(key, name, from_table(key, table))
         fixed = isinstance(found, float)
         out[name] = np.full(n, found) if fixed else np.asarray(found.rvs(n, random_state=rng))
     given = ", ".join(tables) if tables else "nothing"

@@ -5,12 +5,12 @@ from typing import Any, get_args
 
 import numpy as np
 
+from wirebayes.model.prior import ABOVE_ZERO, NOT_BELOW_ZERO
 from wirebayes.model.problem import Likelihood, Sample
 from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 
 _LARGEST = 1e30  # no parameter, time or tension comes near, and its square does not overflow
-_ABOVE_ZERO, _NOT_BELOW = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")
 
 
 def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
@@ -38,7 +38,7 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
     for name, values in draws.items():
         if len(values) < 2 or not _usable(values):
             raise ValueError(f"draws of {name} that are too few or no finite numbers")
-        if (name in _ABOVE_ZERO and values.min() <= 0) or (name in _NOT_BELOW and values.min() < 0):
+        if (name in ABOVE_ZERO and values.min() <= 0) or (name in NOT_BELOW_ZERO and values.min() < 0):
             raise ValueError(f"draws of {name} below zero")
     holds = (len(protocol.displacement_mm),)
     for what, array in [("durations", protocol.duration_s), ("hold numbers", protocol.number)]:
