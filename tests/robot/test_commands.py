@@ -7,6 +7,7 @@ import pytest
 from wirebayes.cli import main
 from wirebayes.model.problem import Sample
 from wirebayes.results.store import Stored
+from wirebayes.robot.mechanics import schema
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Model
 
@@ -103,7 +104,9 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
         (["linear-6", "--times", "a"], "--times"),
         (["linear-6", "--tolerance", "0"], "--tolerance"),
         (["linear-6", "--tolerance-tilt", "nan"], "--tolerance-tilt"),
-        (["linear-6", "--specimen-spread", "0"], "--specimen-spread"),
+        (["linear-6", "--specimen-spread", "0"], "found 0; expected a number above 0 and below 1, 0.05 for 5 %"),
+        (["linear-6", "--specimen-spread", "1"], "found 1; expected a number above 0 and below 1, 0.05 for 5 %"),
+        (["linear-6", "--specimen-spread", "nan"], "found nan"),
     ],
 )
 def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys, arguments, message):
@@ -113,6 +116,20 @@ def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys
     assert message in line
     assert "\n" not in line
     assert not out.exists()
+
+
+@pytest.mark.parametrize("leg", [0, 3])
+def test_a_platform_point_on_an_exit_point_is_no_pose(leg, fitted, tmp_path, capsys):
+    robot = schema.read("linear-6")
+    there = ",".join(map(str, robot.exit_m[leg] - robot.platform_m[leg]))
+    assert (
+        main(["pose", "linear-6", f"--position={there}", "--wires", str(fitted), "--output", str(tmp_path / "out")])
+        == 0
+    )
+    shown = capsys.readouterr()
+    assert "A platform point lies on an exit point" in shown.out
+    assert "Next: another pose or payload" in shown.out and "calibrate" not in shown.out
+    assert json.loads((tmp_path / "out" / "pose.json").read_text())["feasible"] is False
 
 
 def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):

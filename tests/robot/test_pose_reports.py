@@ -413,7 +413,9 @@ def test_a_pose_that_no_tensions_hold_is_answered_with_the_reason(hung: Any, mon
     assert found.content["tension_distribution"]["lowest_N"] == robot.rule.lowest_N
     monkeypatch.setattr(answer.statics.Geometry, "clear", property(lambda shape: np.array([False])))
     inside = answer.answer(robot, line, far).content["sentence"]
-    assert inside == "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
+    assert (
+        inside == "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
+    )
 
 
 def test_an_emptied_drum_is_named_with_its_wire(monkeypatch: pytest.MonkeyPatch) -> None:

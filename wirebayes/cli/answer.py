@@ -117,6 +117,8 @@ def next_step(result: Result[Any]) -> str:
     if isinstance(result, Pose):
         if (folder / "corrections.csv").is_file():
             return f"give the controller the joint values of {folder / 'corrections.csv'}"
+        if not result.summary().get("feasible", True):
+            return "another pose or payload, or other bounds of the tension in the robot's file"
         return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
     if isinstance(result, Calibration):
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"

@@ -19,7 +19,7 @@ from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.session import Prior
 from wirebayes.workers import computing
-from wirebayes.workflows.options import PathLike, above_zero, check_seed, path_of
+from wirebayes.workflows.options import PathLike, above_zero, check_seed, check_spread, path_of
 from wirebayes.workflows.results import Calibration, Place
 from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import (
@@ -101,10 +101,8 @@ def calibrate(
     """
     own, seed = path_of(own_effects), check_seed(seed)
     tension_sd, tilt_sd, reference_sd = float(tension_sd), float(tilt_sd), float(reference_sd)
-    specimen_spread = float(specimen_spread)
+    specimen_spread = check_spread(specimen_spread)
     above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd))
-    if not 0 <= specimen_spread < 1:
-        raise InputError(f"--specimen-spread: found {specimen_spread:g}; expected a number from 0 to 1")
     machine = robot_of(robot)
     bias = machine.tension_bias_N if tension_bias is None else float(tension_bias)
     if not 0 <= bias < math.inf:

@@ -136,6 +136,15 @@ def rising_times(values: Numbers) -> Any:
     return found
 
 
+def check_spread(value: float, *, alike: bool = True) -> float:
+    """A relative difference between specimens, below 1; above 0 where they may not be `alike`."""
+    value = float(value)
+    if not 0.0 <= value < 1.0 or (value == 0.0 and not alike):
+        above = "from 0" if alike else "above 0"
+        raise InputError(f"--specimen-spread: found {value:g}; expected a number {above} and below 1, 0.05 for 5 %")
+    return value
+
+
 def above_zero(*options: tuple[str, float]) -> None:
     """Refuse what is not a finite number above zero."""
     for name, value in options:

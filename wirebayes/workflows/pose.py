@@ -23,6 +23,7 @@ from wirebayes.workflows.options import (
     Progress,
     above_zero,
     check_seed,
+    check_spread,
     numbers,
     path_of,
     rising_times,
@@ -165,9 +166,9 @@ def pose(
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
     moments = rising_times(times)
-    tolerance, tolerance_tilt, specimen_spread = float(tolerance), float(tolerance_tilt), float(specimen_spread)
-    above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt), ("--specimen-spread", specimen_spread))
-    specimen_spread = typical_spread(line, specimen_spread)
+    tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
+    above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
+    specimen_spread = typical_spread(line, check_spread(specimen_spread, alike=False))
     carried = (payload, None if payload_at is None else text_of(payload_at))
     if over_time:
         _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)

@@ -14,6 +14,8 @@ from wirebayes.robot.mechanics.pulleys import WireRun, run
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 from wirebayes.typing import Floats
 
+_NOWHERE = 1e-300  # m; a wire without length has no direction, and no pull
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -43,9 +45,8 @@ class Geometry:
 
     @property
     def clear(self) -> NDArray[np.bool_]:
-        """(n,) False where a platform point lies inside a pulley or on its swivel axis."""
-        none = np.ones(self.distance_m.shape[-1], bool)
-        return none if self.over is None else np.asarray(self.over.clear.all(0))
+        """(n,) False where a platform point lies on an exit point, inside a pulley or on its swivel axis."""
+        return np.asarray((self.distance_m > 0 if self.over is None else self.over.clear).all(0))
 
 
 def turned(points_m: Floats, rotation: Floats) -> Floats:
@@ -74,7 +75,7 @@ def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
         over = run(robot.pulleys, line)
         return Geometry(over.length_m, over.direction, arm, over)
     distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
-    return Geometry(distance, line / distance, arm)
+    return Geometry(distance, line / np.maximum(distance, _NOWHERE), arm)
 
 
 def jacobian(robot: Robot, shape: Geometry) -> Floats:

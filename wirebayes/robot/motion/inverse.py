@@ -40,7 +40,7 @@ def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice 
     """Tensions that hold the platform at poses, ``(p, w)`` N; NaN where none within the bounds do.
 
     They depend on geometry and mass alone, not on the wires: one set serves all draws. None hold a pose with a platform
-    point inside a pulley or on its swivel axis.
+    point on an exit point, inside a pulley or on its swivel axis.
 
     Parameters
     ----------

@@ -71,7 +71,9 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     if not content["feasible"]:
         content["sentence"] = "No tensions within the bounds hold the platform at this pose."
         if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
-            content["sentence"] = "A platform point lies inside a pulley or on its swivel axis: no wire runs there."
+            content["sentence"] = (
+                "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
+            )
         return Answer(content, {})
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
