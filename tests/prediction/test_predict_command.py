@@ -166,3 +166,29 @@ def test_refusals_name_what_is_wrong(
     hold = refused(str(fits / "hold"), str(path), *out, *wire)
     assert "tension_N" in hold and "first reading" in hold
     assert "no writable folder" in refused(str(fits / "chain"), str(path), *wire, "--output", str(path / "a" / "b.csv"))
+
+
+def test_a_given_reading_far_from_what_is_expected_is_a_warning(
+    fits: Path, protocol: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = predicted(fits, protocol([9, 10]))
+    mean, sd = (float(rows[0][name]) for name in ("mean_N", "sd_N"))
+    given = next(line for line in protocol([9, 10], first=True).read_text().splitlines() if line.startswith("9,"))
+    capsys.readouterr()
+    for deviations, warned in ((4.7, False), (5.3, True), (-300.0, True)):
+        changed = given.rsplit(",", 1)[0] + f",{mean + deviations * sd}"
+        predicted(fits, protocol([9, 10], first=True, changes={given: changed}))
+        shown = capsys.readouterr().err
+        assert ("warning: hold 9: its first reading" in shown) == warned, deviations
+        assert "hold 10" not in shown
+
+
+def test_the_protocol_is_not_overwritten(
+    fits: Path, protocol: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = protocol([9])
+    before = path.read_bytes()
+    name = ["--experiment", "roc-line-1.71m", "--output", str(path.parent / "." / path.name)]
+    assert cli.main(["predict", str(fits / "chain"), str(path), *name]) == 2
+    assert "found the protocol itself, expected another file" in capsys.readouterr().err
+    assert path.read_bytes() == before

@@ -47,4 +47,6 @@ def predict(
         folder, protocol, experiment=experiment, model=model, fresh=fresh, own_effects=own_effects, seed=seed,
         output=output,
     )  # fmt: skip
+    for warning in predicted.attrs.get("warnings", []):
+        typer.echo(f"warning: {warning}", err=True)
     typer.echo(f"{protocol}: {predicted.attrs['prediction']}", err=True)

@@ -1,6 +1,7 @@
 """Predicted readings as a table: one row for each row of the protocol file."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,11 @@ import xarray as xr
 from wirebayes.inference.fit import seed_of
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
+from wirebayes.typing import Floats
 
 HEADER = ("experiment", "hold", "displacement_mm", "time_s", "mean_N", "sd_N", "q05_N", "q50_N", "q95_N")
+FAR_OFF = 5.0  # standard deviations of a first reading: one in a million by chance, a wrong unit is at hundreds
+_FEW = 500  # draws, enough for a standard deviation
 DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
 
@@ -40,14 +44,7 @@ def mixture_table(
     draws : int
         In all.
     """
-    rng = np.random.default_rng(seed_of(seed, "predict", members[0][1].stored.sample.name))
-    parts = []
-    for probability, request in members:
-        stored, n = request.stored, max(round(probability * draws), 2)
-        theta = stored.theta
-        theta = theta[np.unique(np.linspace(0, len(theta) - 1, n).round().astype(int))]
-        parts.append(predict(stored.problem, theta, stored.sample, request.prediction, rng))
-    drawn = np.concatenate(parts, axis=-1)
+    drawn = _drawn(members, seed, draws)
     request = members[0][1]
     stored, prediction = request.stored, request.prediction
     rows: list[list[Any]] = []
@@ -59,6 +56,45 @@ def mixture_table(
             figures = [here[k, 0] + about.mean(), about.std(ddof=1), *quantiles[:, k]]
             rows.append([stored.sample.name, hold.number, hold.displacement_mm, float(time), *map(float, figures)])
     return rows
+
+
+def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0) -> list[str]:
+    """A sentence for every given first reading that is far from what is expected where it is not given.
+
+    Parameters
+    ----------
+    members : sequence of (probability, ProtocolRequest)
+        As for `mixture_table`.
+    seed : int
+    """
+    request = members[0][1]
+    given = np.isfinite(request.prediction.first_N) & request.prediction.requested
+    if request.stored.likelihood == "hold" or not given.any():  # each hold starts from its own reading
+        return []
+    blind = [(p, replace(r, prediction=replace(r.prediction, first_N=np.full(len(given), np.nan)))) for p, r in members]
+    first = _drawn(blind, seed, _FEW)[:, 0]
+    out = []
+    for hold, at in zip(request.holds, np.flatnonzero(request.prediction.requested), strict=True):
+        read, mean, sd = request.prediction.first_N[at], first[at].mean(), first[at].std(ddof=1)
+        if given[at] and abs(read - mean) > FAR_OFF * sd:
+            out.append(
+                f"hold {hold.number}: its first reading, {read:.4g} N, is {abs(read - mean) / sd:.0f} standard "
+                f"deviations from the {mean:.4g} N expected there: check tension_N (in N?) and displacement_mm; what "
+                "follows from it is not to be relied on"
+            )
+    return out
+
+
+def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: int) -> Floats:
+    """Readings (H, R, n) of all models, each with as many draws as it is probable."""
+    rng = np.random.default_rng(seed_of(seed, "predict", members[0][1].stored.sample.name))
+    parts = []
+    for probability, request in members:
+        stored, n = request.stored, max(round(probability * draws), 2)
+        theta = stored.theta
+        theta = theta[np.unique(np.linspace(0, len(theta) - 1, n).round().astype(int))]
+        parts.append(predict(stored.problem, theta, stored.sample, request.prediction, rng))
+    return np.concatenate(parts, axis=-1)
 
 
 def dataset(rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any]) -> xr.Dataset:

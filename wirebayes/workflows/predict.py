@@ -10,7 +10,7 @@ from wirebayes.io.arrays import is_table, protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.prediction.request import request_of
-from wirebayes.prediction.table import HEADER, dataset, mixture_table
+from wirebayes.prediction.table import HEADER, dataset, mixture_table, unlikely_readings
 from wirebayes.results import store
 from wirebayes.results.mixture import members_of
 from wirebayes.results.store import Stored
@@ -59,7 +59,8 @@ def predict(
     -------
     xarray.Dataset
         Dimension ``reading``, a row of the protocol each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``,
-        ``q95_N`` with units as attributes. The attribute ``prediction`` says which sample was predicted, given what.
+        ``q95_N`` with units as attributes. The attribute ``prediction`` says which sample was predicted, given what;
+        ``warnings``, where there is one, which given readings are far from what was expected.
 
     Raises
     ------
@@ -89,6 +90,8 @@ def predict(
     seed = check_seed(seed)
     if output is not None:
         check_file(Path(output))
+        if isinstance(protocol, str | os.PathLike) and Path(output).exists() and Path(output).samefile(protocol):
+            raise InputError(f"--output {output}: found the protocol itself, expected another file")
     rows = mixture_table(requests, seed)
     if output is not None:
         write_csv(Path(output), HEADER, rows)
@@ -97,7 +100,8 @@ def predict(
         sentence += (
             f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
         )
-    return dataset(rows, {"prediction": sentence, "seed": seed})
+    unlikely = unlikely_readings(requests, seed)
+    return dataset(rows, {"prediction": sentence, "seed": seed} | ({"warnings": unlikely} if unlikely else {}))
 
 
 def stored_posteriors(
