@@ -132,6 +132,14 @@ def test_a_wrong_option_of_fit_is_named(options, message):
         wb.fit(wb.from_arrays(**GOOD, **ABOUT), **options)
 
 
+def test_what_is_no_test_at_all_is_named():
+    with pytest.raises(wb.InputError, match="source: found int, expected the path of a file or Experiments"):
+        wb.fit(3)
+    for tests in (0, -1, 1.5, True):
+        with pytest.raises(wb.InputError, match=f"--tests: found {tests}, expected a whole number, 1 or more"):
+            wb.simulate_tests(tests=tests)
+
+
 SCRIPT = """
 import wirebayes as wb
 print("script", flush=True)

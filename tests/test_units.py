@@ -54,6 +54,19 @@ def test_typing_mistakes_are_still_recognised(word, meant):
     assert nearest(word, COLUMNS) == f" (did you mean {meant}?)"
 
 
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("x_mm", "1 mm = 0.001 m; convert it to x_m"),
+        ("y_in", "1 in = 0.0254 m; convert it to y_m"),
+        ("joint_2_mm", "1 mm = 0.001 m; convert it to joint_2_m"),
+        ("roll_deg", "1 deg = 0.01745329252 rad; convert it to roll_rad"),
+    ],
+)
+def test_columns_of_a_robot_are_in_metres_and_radians(word, message):
+    assert message in nearest(word, ["time_s", "x_m", "y_m", "z_m", "joint_1_m", "joint_2_m", "roll_rad"])
+
+
 def test_words_without_units_are_compared_as_before():
     assert nearest("wire_a", ["wire_b", "kite"]) == " (did you mean wire_b?)"
     assert nearest("kite-15m", ["kite-1.5m"]) == " (did you mean kite-1.5m?)"

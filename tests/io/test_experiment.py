@@ -187,6 +187,7 @@ BAD_TOML = [
     ('"wire-a"', '"wire a"', "line 2, experiment wire a, key name: found 'wire a', expected a name of letters"),
     ('"wire-a"', '".."', "key name: found '..'"),
     ('"wire-a"', '"wire-ä"', "key name: found 'wire-ä'"),
+    ('"wire-a"', '".lock"', "key name: found '.lock', expected a name of letters"),
     ('"wire-a"', '"configuration.json"', "key name: found 'configuration.json', expected a name of letters"),
     ('"wire-a"', '"' + "w" * 101 + '"', "key name: found 'www"),
     ('"wire-a"', "7", "key name: found 7"),

@@ -66,6 +66,8 @@ def test_a_sum_alone_is_a_ridge() -> None:
 def test_sensitivity_is_zero_for_a_flat_component_and_grows_with_its_part() -> None:
     values = np.random.default_rng(1).normal(size=4000)
     assert sensitivity(values, np.zeros(4000)) == 0.0
+    assert sensitivity(values, 1e-7 * values) == 0.0  # readings of a sensor too coarse to say anything
+    assert 0.0 < sensitivity(values, 1e-6 * values) < 1e-5
     small, large = (sensitivity(values, -0.5 * part * values**2) for part in (0.01, 0.5))
     assert small < 0.02 < large
 

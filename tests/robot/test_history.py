@@ -337,12 +337,18 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
         ("time_s,joint_1_m,joint_2_m,joint_3_m\n", "line 1: found no column joint_4_m; expected time_s"),
         (HEAD + ",x_m\n", "line 1: found no column y_m"),
         (HEAD + ",time_s\n", "line 1: found the column time_s twice"),
-        (HEAD + "\n0,1,1,1,1\n", "found 1 rows of values; expected two or more"),
+        (HEAD + "\n0,1,1,1,1\n", "found 1 row of values; expected two or more"),
         (HEAD + "\n0,1,1,1,1\n\n0,1,1,1,1\n", "line 4, column time_s: found 0; expected a time after 0 s"),
         (HEAD + "\n0,1,1,1,1\n9,1,1,1\n", "line 3: found 4 cells; expected 5"),
-        (HEAD + "\n0,1,1,,1\n9,1,1,1,1\n", "line 2, column joint_3_m: found ''; expected a finite number"),
+        (
+            HEAD + "\n0,1,1,,1\n9,1,1,1,1\n",
+            "line 2, column joint_3_m: found ''; expected a number of at most 1e+09 in size",
+        ),
         (HEAD + "\n0,1,inf,1,1\n9,1,1,1,1\n", "line 2, column joint_2_m: found 'inf'"),
-        (HEAD + ",payload_kg\n0,1,1,1,1,-1\n9,1,1,1,1,1\n", "line 2, column payload_kg: found '-1'; expected a finite"),
+        (
+            HEAD + ",payload_kg\n0,1,1,1,1,-1\n9,1,1,1,1,1\n",
+            "line 2, column payload_kg: found '-1'; expected a number from 0 to 1e+09",
+        ),
         (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5'; expected a whole number"),
     ],
 )

@@ -24,7 +24,8 @@ __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
 _KEYS = ("name", "material", "length_mm", "resolution_N", "readings", "unrecorded_holds", "prior")
 _HOLD_KEYS = ("before_hold", "displacement_mm", "duration_s")
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
-_TAKEN = re.compile(r"\.{1,2}|.*\.(json|html|partial)", re.IGNORECASE)  # a folder beside the results' own files
+# a folder beside the results' own files
+_TAKEN = re.compile(r"\.{1,2}|\.(lock|computing|checkpoint)|.*\.(json|html|partial)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)

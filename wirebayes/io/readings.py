@@ -131,10 +131,11 @@ class Table:
         return value
 
     def whole(self, row: int, column: str) -> int:
-        """A whole number, 0 or more."""
+        """A whole number, 0 or more, of at most nine digits."""
         text = self.cell(row, column)
         if not _WHOLE.fullmatch(text):
-            raise self.complain(row, column, shown(text) if text else "an empty cell", "a whole number, 0 or more")
+            found = shown(text) if text else "an empty cell"
+            raise self.complain(row, column, found, "a whole number from 0 to 999999999")
         return int(text)
 
 
@@ -162,9 +163,8 @@ def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) ->
         if len(fields) != len(header):
             found = f"{len(fields)} field{'s' * (len(fields) != 1)}" if line.strip() else "a blank line"
             column = min(len(fields), len(header))
-            raise InputError(
-                f"{path}, line {number}, column {column}: found {found}, expected {len(header)} ({','.join(header)})"
-            )
+            expected = f"{len(header)} fields ({','.join(header)})"
+            raise InputError(f"{path}, line {number}, column {column}: found {found}, expected {expected}")
         rows.append(fields)
     if not rows:
         raise InputError(f"{path}, line 2: found no readings, expected at least one")

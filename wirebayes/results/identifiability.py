@@ -22,6 +22,7 @@ from wirebayes.wire.fresh import FreshSample
 SENSITIVE = 0.05  # the threshold that the authors of the method propose
 RIDGE = 0.9  # correlation above which two parameters are known in combination only
 _POWERS = (1.0 / 1.1, 1.1)  # so small that weights stay even, so large that the change exceeds the chance of 4000 draws
+_NOTHING = 1e-6  # nats by which a component varies: it moves nothing, and its weights differ by rounding alone
 _DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
 
@@ -89,7 +90,7 @@ def in_words(name: str, figures: IdentifiabilityFigures) -> str:
 
 def sensitivity(values: Array, log_component: Array) -> float:
     """Distance the distribution of (n,) `values` moves for each doubling of a component's power."""
-    if np.ptp(log_component) == 0:
+    if np.ptp(log_component) < _NOTHING:
         return 0.0
     statistics = array_statistics()
     weights = [np.exp(statistics.power_scale_lw(log_component, alpha=alpha))[None] for alpha in _POWERS]

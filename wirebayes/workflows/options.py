@@ -48,7 +48,9 @@ def experiments_of(source: Source, name: str | None = None) -> list[Experiment]:
     """
     if isinstance(source, str | os.PathLike):
         return select(read_experiments(Path(source)), name)
-    experiments = [source] if isinstance(source, Experiment) else list(source)
+    if isinstance(source, Experiment):
+        return select([source], name)
+    experiments = list(source) if isinstance(source, Iterable) else [source]
     for value in experiments:
         if not isinstance(value, Experiment):
             raise InputError(f"source: found {type(value).__name__}, expected the path of a file or Experiments")

@@ -89,6 +89,8 @@ def simulate_tests(
     chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
     found, amplitudes = _effects(effects, own)
     chosen |= amplitudes
+    if isinstance(tests, bool) or not isinstance(tests, int) or tests < 1:
+        raise InputError(f"--tests: found {tests!r}, expected a whole number, 1 or more")
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
     path = _path(displacements, unload)
     gaps = frozenset(unrecorded)

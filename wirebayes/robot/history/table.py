@@ -120,7 +120,7 @@ def parse(
     _check_header(f"{source}: {place(first)}", names, columns)
     cells = np.array([_row(f"{source}: {place(line)}", row, names) for line, row in numbered[1:]])
     if len(cells) < 2:
-        raise InputError(f"{source}: found {len(cells)} rows of values; expected two or more")
+        raise InputError(f"{source}: found {len(cells)} row{'s' * (len(cells) != 1)} of values; expected two or more")
     late = np.flatnonzero(np.diff(cells[:, names.index("time_s")]) <= 0)
     if len(late):
         line, time = numbered[late[0] + 2][0], cells[:, names.index("time_s")]
@@ -172,10 +172,10 @@ def _bounds(name: str) -> tuple[float, float, str]:
     if name in TILT:
         return -180.0, 180.0, "an angle from -180 to 180 degrees"
     if name == "hold":
-        return 0.0, _LARGEST, "a whole number"
+        return 0.0, _LARGEST, f"a whole number from 0 to {_LARGEST:.0e}"
     if name in ("time_s", PAYLOAD):
-        return 0.0, _LARGEST, "a finite number of at least 0"
-    return -_LARGEST, _LARGEST, "a finite number"
+        return 0.0, _LARGEST, f"a number from 0 to {_LARGEST:.0e}"
+    return -_LARGEST, _LARGEST, f"a number of at most {_LARGEST:.0e} in size"
 
 
 def _history(robot: Robot, columns: Columns, names: Sequence[str], cells: Floats) -> History:

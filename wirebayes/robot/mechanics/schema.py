@@ -136,13 +136,13 @@ class _Table:
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
         value = self.take(key, f"a number{bound}", default)
         if not _is_number(value) or not value > above or not value >= least:
-            raise self.fail(key, f"found {_shown(value)}", f"a finite number{bound}")
+            raise self.fail(key, f"found {_shown(value)}", f"a number{bound}, below {_LARGEST:.0e} in size")
         return float(value)
 
     def triple(self, key: str, default: list[float] | None = None) -> Floats:
         value = self.take(key, "three numbers", default)
         if not isinstance(value, list) or len(value) != 3 or not all(_is_number(v) for v in value):
-            raise self.fail(key, f"found {_shown(value)}", "a list of three finite numbers")
+            raise self.fail(key, f"found {_shown(value)}", f"a list of three numbers below {_LARGEST:.0e} in size")
         return np.array(value, float)
 
     def unit(self, key: str) -> Floats:

@@ -187,13 +187,13 @@ def _row(place: str, row: list[str], names: list[str], biased: bool) -> list[flo
             value = float(cell)
         except ValueError:
             value = np.nan
-        allowed, kind = abs(value) < _LARGEST, "a finite number"
+        allowed, kind = abs(value) < _LARGEST, f"a number below {_LARGEST:.0e} in size"
         if name == "duration_s":
-            allowed, kind = 0 < value < _LARGEST, "a number above 0"
+            allowed, kind = 0 < value < _LARGEST, f"a number above 0, below {_LARGEST:.0e}"
         elif name.startswith("motion_"):
             allowed, kind = value in (-1, 0, 1), "1 (pulled in last), -1 (let out) or 0"
         elif name.startswith("tension_") and not biased:
-            allowed, kind = 0 <= value < _LARGEST, "a finite number of at least 0"
+            allowed, kind = 0 <= value < _LARGEST, f"a number of at least 0, below {_LARGEST:.0e}"
         elif name in NORMAL:
             allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
         if not np.isfinite(value) or not allowed:
