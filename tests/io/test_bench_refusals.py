@@ -17,6 +17,7 @@ THREE_DECIMALS = "1;0;1,234\n1;30;1,205\n1;60;1,111\n2;0;2,345\n2;30;2,222\n2;60
 CLOCK = "Weg [mm],Zeit,Kraft [N]\n" + "".join(
     f"{h},{h - 1}:{t:02d},{h}.{9 - t // 10}\n" for h in range(1, 5) for t in (0, 20, 50)
 )
+DOWN = "Weg [mm],Zeit [s],Kraft [N]\n-1,0,2.2\n-1,30,2.1\n-2,0,4.1\n-2,30,3.9\n-3,0,6.2\n-3,30,6.0\n"
 PUSH = HEADER + "".join(f"{h},{t},{-2 * h + t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
 TWO_HOLDS = "hold," + HEADER + "1,1,0,2\n1,1,30,1.9\n2,2,60,4\n2,2,90,3.9\n2,2,120,3.8\n"
 POSITION = HEADER + "".join(f"{520 + h},{t},{2 * h - t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
@@ -101,6 +102,7 @@ def test_each_answer_means_what_it_says(tmp_path):
         (HEADER.replace("[N]", "[V]") + BODY, r"line 1, column 3 \(Kraft .V.\): found the unit 'V', expected one of"),
         (HEADER.replace("Zeit [s]", "Kanal 7") + BODY, "line 1: found no column of time among Weg"),
         (PUSH, r"line 14, column 3 .*expected a pull .*with --map \"Kraft \[N\]=tension \[-N\]\""),
+        (DOWN, r"line 2, column 1 .*down to -3 mm, .*with --map \"Weg \[mm\]=displacement \[-mm\]\""),
         (HEADER + "1,0,2\n1,30,1.9\n2,0,4\n2,30,3.9\n", "raw.csv: found 2 holds with 4 readings, expected at least 2"),
         (
             "x [mm],t [s],F [N]\n" + "".join(f"{i / 100},{i / 10},{i / 50}\n" for i in range(400)),
@@ -112,6 +114,12 @@ def test_each_answer_means_what_it_says(tmp_path):
 def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, message):
     with pytest.raises(wb.InputError, match=message):
         read(tmp_path, text)
+
+
+def test_a_displacement_downwards_is_turned_and_one_upwards_from_below_zero_is_read(tmp_path):
+    turned = read(tmp_path, DOWN, mapping=("Weg [mm]=displacement [-mm]",))
+    assert [row[1] for row in turned.rows[::2]] == [1.0, 2.0, 3.0]
+    assert read(tmp_path, DOWN.replace("-1,", "-4,"), zero_mm=-5.0).rows[0][1] == 1.0
 
 
 @pytest.mark.parametrize(

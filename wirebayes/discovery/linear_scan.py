@@ -541,7 +541,8 @@ def _scan_few(x: Expansion) -> Scan:
     flexible_value = log_sum(every.reshape(len(every), -1), axis=1) - np.log(every.shape[2]) - reference
     best = np.argmax(effects, axis=1)[:, None]
     amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
-    norm = np.sqrt(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best)
+    # there may be fewer readings than parameters, of which nothing is known
+    norm = np.sqrt(np.maximum(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best, 0.0))
     return Scan(
         np.where(seen[:, None], log_sum(effects, axis=1) - reference[:, None], 0.0),
         np.where(seen, flexible_value, 0.0),

@@ -368,7 +368,8 @@ def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
     for end, label in ((weaker["q05"], "prior at half weight"), (weaker["q95"], None)):
         axes.plot(ahead["time_s"], end, color=HOLD, lw=1, ls="--", label=label)
     axes.set_xscale("log")
-    axes.set_yscale("log")
+    if max(posterior["q95"]) > 0.0:  # a creep that is stated to be none has no logarithm
+        axes.set_yscale("log")
     for t, word in ((3600.0, "1 h"), (86400.0, "1 day")):
         axes.axvline(t, color=INK, lw=0.5, alpha=0.4)
         axes.annotate(word, (t, 1.0), xycoords=("data", "axes fraction"), ha="right", va="top", fontsize=8, color=INK,

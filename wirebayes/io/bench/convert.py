@@ -35,6 +35,7 @@ _COLUMN_ROLES: dict[str, Role] = {
 }  # fmt: skip
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
 MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
+_FALLS = -0.9  # correlation of displacement and tension: creep and friction bend the line, but do not turn it
 FAR_STEPS = 2.0  # and this many times the range of the test
 
 
@@ -150,6 +151,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
             rows.append(line if "temperature" not in values else [*line, float(values["temperature"][row])])
             origin.append(int(row))
     experiment = _experiment(table, columns, header, rows, origin, about, resolution)
+    _check_direction(table, columns["displacement"], experiment)
     recording = None
     if holds.of_test:
         since = values["time"] - values["time"][0]
@@ -239,6 +241,20 @@ def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[A
             line, index = table.rows[row].line, columns[role].index
             expected = f"at most {LARGEST[name]:.0e} {UNITS[role]} in size"
             raise table.complain(line, index, shown(table.rows[row].cell(index)), expected)
+
+
+def _check_direction(table: RawTable, column: Column, experiment: Experiment) -> None:
+    """Refuse a displacement counted downwards: the wire pulls the more, the further it is below zero."""
+    holds = experiment.recorded_holds
+    place, pull = (np.array(v) for v in zip(*((h.displacement_mm, h.tension_N.mean()) for h in holds), strict=True))
+    if len(set(place)) < 2 or place.max() > 0 or np.ptp(pull) == 0 or np.corrcoef(place, pull)[0, 1] > _FALLS:
+        return
+    unit = column.unit.text if column.unit else "mm"
+    found = f"displacements down to {place.min():g} mm, the further down the more tension"
+    expected = (
+        f'what lengthens the wire counted up; change the sign with --map "{column.header}=displacement [-{unit}]"'
+    )
+    raise table.complain(table.rows[0].line, column.index, found, expected)
 
 
 def _from_zero(table: RawTable, column: Column, x: Floats, about: About, zero_mm: float | None) -> Floats:

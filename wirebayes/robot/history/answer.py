@@ -257,7 +257,8 @@ def _warnings(
         )
     clock = content["clock"]
     width = content["drift"][0]["distance_mm"]
-    if clock["largest_mm"] > 0.5 * np.nanmax(np.asarray(width["q95"]) - np.asarray(width["q05"])):
+    widths = np.asarray(width["q95"], float) - np.asarray(width["q05"], float)
+    if clock["largest_mm"] > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
         out.append(
             f"when the wires' clocks restart matters here: by up to {clock['largest_mm']:.3g} mm, more than half of "
             "the band; give a column hold to say it"
