@@ -100,3 +100,23 @@ def test_json_is_the_summary_and_quiet_is_nothing(tmp_path: Path, capsys: pytest
     assert capsys.readouterr().out == ""
     answer.conclude(known)
     assert f"Results: {tmp_path} (open {tmp_path / 'report.html'})\n" in capsys.readouterr().out
+
+
+def test_a_pose_that_no_draw_keeps_to_the_end_is_said_to_be_none(tmp_path: Path) -> None:
+    band = {"q05": [0.0, None], "q50": [0.0, None], "q95": [0.0, None]}
+    drift = {"distance_mm": band, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
+    lost = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": True, "drift": [drift], "wires": {}})
+    assert answer.answer(lost) == ["r: no draw of the wires could be solved"]
+    band = {"q05": [0.0, 1.0], "q50": [0.0, 1.5], "q95": [0.0, 2.0]}
+    held = stored(
+        Pose, tmp_path, "pose.json",
+        {"robot": "r", "feasible": True, "drift": [drift | {"distance_mm": band}], "wires": {}},
+    )  # fmt: skip
+    assert answer.answer(held)[0].startswith("r: after 60 s the platform has drifted by 1.5 mm [1, 2]")
+
+
+def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:
+    found = {"robot": "r", "feasible": False, "sentence": "No.", "wires": {}}
+    assert answer.next_step(stored(Pose, tmp_path, "pose.json", found)).startswith("another pose or payload")
+    held = stored(Pose, tmp_path, "pose.json", found | {"feasible": True})
+    assert answer.next_step(held).startswith("wirebayes calibrate")

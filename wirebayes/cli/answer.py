@@ -275,7 +275,7 @@ def _pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     moved = "is away from where it is meant to be" if measured else "has drifted"
     for drift in found["drift"]:
         far, time = drift["distance_mm"], drift["times_s"][-1]
-        if far["q50"] is not None:
+        if far["q50"] is not None and far["q50"][-1] is not None:
             lines.append(
                 f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
                 f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"

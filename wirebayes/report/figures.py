@@ -132,8 +132,10 @@ def named(name: str, effects: tuple[Any, ...] = ()) -> str:
 
 
 def logarithmic(axes: Any, which: str = "x") -> None:
-    """Logarithmic axes that print plain numbers."""
+    """Logarithmic axes that print plain numbers; linear where nothing is above zero."""
     for name in ("x", "y") if which == "both" else (which,):
+        if getattr(axes.dataLim, f"{name}1") <= 0:
+            continue
         getattr(axes, f"set_{name}scale")("log")
         axis = getattr(axes, f"{name}axis")
         low, high = sorted(getattr(axes, f"get_{name}lim")())
