@@ -18,6 +18,7 @@ from analyses.hidden_effects.cases import SIZES, Plan, Spec, seal, specs
 from analyses.hidden_effects.rates import rate
 from analyses.resumable import records
 from wirebayes.discovery import global_test
+from wirebayes.discovery.screening import GlobalTest
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.experiment import Experiment, read_experiments
@@ -29,14 +30,14 @@ def looked(experiments: list[Experiment], seed: int, simulations: int) -> tuple[
     """The p at each look with whether the test would go on, the last p, and its number of simulations."""
     blocks, rng = plain_fits(experiments, seed)
     looks: dict[int, tuple[float, bool]] = {}
-    is_close = global_test.is_close
+    is_open = global_test.is_open
 
-    def noted(p: float, alpha: float, count: int) -> bool:
-        close = is_close(p, alpha, count)
-        looks[count] = p, close
-        return close or count < simulations - simulations // 3
+    def noted(test: GlobalTest, alpha: float, by_larger: float, made: int, asked: int) -> bool:
+        goes_on = is_open(test, alpha, by_larger, made, asked)
+        looks[made] = test.p, goes_on
+        return goes_on or made < simulations
 
-    with patch.object(global_test, "is_close", noted):
+    with patch.object(global_test, "is_open", noted):
         test = global_test.examine(blocks, CATALOGUE, simulations, rng).test
     return [looks[count] for count in sorted(looks)], test.p, len(test.null)
 

@@ -138,6 +138,7 @@ def test_what_is_no_test_at_all_is_named():
     for tests in (0, -1, 1.5, True):
         with pytest.raises(wb.InputError, match=f"--tests: found {tests}, expected a whole number, 1 or more"):
             wb.simulate_tests(tests=tests)
+    assert len(wb.simulate_tests(tests=np.int64(2), seed=1).experiments) == 2
 
 
 SCRIPT = """

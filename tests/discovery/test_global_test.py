@@ -19,7 +19,12 @@ SIMULATIONS = 199
 
 
 def examined(
-    monkeypatch: pytest.MonkeyPatch, linear: float, larger: float, alpha: float = ALPHA, simulations: int = SIMULATIONS
+    monkeypatch: pytest.MonkeyPatch,
+    linear: float,
+    larger: float,
+    alpha: float = ALPHA,
+    simulations: int = SIMULATIONS,
+    counts: bool = True,
 ) -> tuple[Any, int]:
     """The test of a block whose scan has one p and whose test from larger effects another, and the simulations made."""
     made: list[int] = []
@@ -32,13 +37,13 @@ def examined(
         return SimpleNamespace(scan=None, z=np.concatenate([part.z for part in parts]))
 
     class Larger:
-        log_bayes = {"a": 3.0}
+        log_bayes, p = {"a": 3.0}, larger
 
         def __init__(self, *given: Any) -> None:
             pass
 
         def test(self, *given: Any) -> Any:
-            return SimpleNamespace(p=larger, null=np.zeros(sum(made)))
+            return SimpleNamespace(p=larger if counts else linear, null=np.zeros(sum(made)))
 
     test = lambda *given: SimpleNamespace(p=linear, null=np.zeros(sum(made)))  # noqa: E731
     monkeypatch.setattr(global_test.screening, "candidate_probes", lambda *given: ([], [Candidate(0, "a", (0,), True)]))
@@ -74,7 +79,16 @@ def test_larger_effects_decide_and_a_p_on_the_level_gets_more_simulations(
 
 def test_the_requested_level_decides_what_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
     assert examined(monkeypatch, linear=0.3, larger=0.2, alpha=0.2)[1] == MOST_TIMES * SIMULATIONS
-    assert examined(monkeypatch, linear=0.3, larger=0.04, alpha=0.2)[1] == 100
+    assert examined(monkeypatch, linear=0.3, larger=0.09, alpha=0.2)[1] == 100
+
+
+@pytest.mark.parametrize(("larger", "wanted"), [(0.02, SIMULATIONS), (0.08, SIMULATIONS), (0.09, 100), (0.9, 100)])
+def test_all_simulations_are_made_where_larger_effects_nearly_count(
+    larger: float, wanted: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With half of them they do not; with all they might. More than were asked for are for the level alone."""
+    found, made = examined(monkeypatch, linear=0.3, larger=larger, counts=False)
+    assert found.test.p == 0.3 and made == wanted
 
 
 def test_without_an_effect_that_could_show_nothing_is_tested(monkeypatch: pytest.MonkeyPatch) -> None:

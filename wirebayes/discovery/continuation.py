@@ -569,7 +569,14 @@ class Continuation:
         See `ladders`.
     parallel_map : function, optional
         The built-in `map`, or one over processes.
+
+    Attributes
+    ----------
+    p : float
+        What the paths made of the last test's p, whether it counted or not.
     """
+
+    p = 1.0
 
     def __init__(
         self,
@@ -612,6 +619,7 @@ class Continuation:
             if surprises[name] > largest:
                 break
         larger = replace(test, surprises=surprises)
+        self.p = larger.p
         return larger if larger.p <= clear else test
 
     def _chance(

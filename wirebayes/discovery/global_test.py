@@ -16,7 +16,7 @@ from wirebayes.discovery import gross_errors, residual_patterns, screening
 from wirebayes.discovery.continuation import Continuation
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates
-from wirebayes.discovery.settings import ALPHA
+from wirebayes.discovery.settings import ALPHA, BY_LARGER
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.json_files.discovery import GrossError
@@ -122,6 +122,7 @@ def examine(
         simulated = [screening.joined_replicates(parts) for parts in pairs]
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
+        by_larger = 1.0
         beyond_linear = test.p > max(PLAIN_TO_SEE, 1.0 / (1 + len(test.null)))
         if beyond_linear:
             report("larger effects", 0, 1)
@@ -129,8 +130,9 @@ def examine(
             # They only make p smaller: nothing is gained where it is below the level beyond doubt.
             if test.p > alpha or is_close(test.p, alpha, len(test.null)):
                 test = larger.test(simulated, test)
+                by_larger = larger.p
             report("larger effects", 1, 1)
-        if total >= MOST_TIMES * simulations or not is_close(test.p, alpha, len(test.null)):
+        if not is_open(test, alpha, by_larger, total, simulations):
             break
     report("simulations", len(blocks), len(blocks))
     further = larger.log_bayes if larger is not None and beyond_linear else {}
@@ -142,6 +144,25 @@ def _next_total(made: int, simulations: int) -> int:
     if not made:
         return (simulations + 1) // 2
     return simulations if made < simulations else 2 * made
+
+
+def is_open(test: GlobalTest, alpha: float, by_larger: float, made: int, simulations: int) -> bool:
+    """Whether more simulations are to be made: while p is close to the level, or, until all are made, to `BY_LARGER`.
+
+    Parameters
+    ----------
+    test : GlobalTest
+    alpha : float
+        The level.
+    by_larger : float
+        p as the paths to larger effects have it, which counts up to `BY_LARGER`; 1 where they were not asked.
+    made, simulations : int
+        How many there are, and how many were asked for.
+    """
+    if made >= MOST_TIMES * simulations:
+        return False
+    trials = len(test.null)
+    return is_close(test.p, alpha, trials) or (made < simulations and is_close(by_larger, BY_LARGER, trials))
 
 
 def is_close(p: float, alpha: float, simulations: int) -> bool:

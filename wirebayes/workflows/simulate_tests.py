@@ -1,6 +1,7 @@
 """Synthetic tests with known truth, as files the other functions read."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import get_args
 
@@ -89,8 +90,9 @@ def simulate_tests(
     chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
     found, amplitudes = _effects(effects, own)
     chosen |= amplitudes
-    if isinstance(tests, bool) or not isinstance(tests, int) or tests < 1:
+    if isinstance(tests, bool) or not isinstance(tests, Integral) or tests < 1:
         raise InputError(f"--tests: found {tests!r}, expected a whole number, 1 or more")
+    tests = int(tests)
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
     path = _path(displacements, unload)
     gaps = frozenset(unrecorded)
