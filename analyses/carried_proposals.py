@@ -1,7 +1,7 @@
 """Would proposals learned on one test fit the next test of a batch?
 
 Tests of one protocol on simulated wires are sampled. Each one's frozen proposal is then moved and stretched, by mode
-and covariance there, to every other test, and its draws are weighed by that posterior. A line a test: the share of
+and covariance there, to every other test, and its draws are weighted by that posterior. A line a test: the share of
 effective draws of its own proposal before each round of learning and when it is frozen, and of the others' proposals.
 
     python -m analyses.carried_proposals
@@ -18,14 +18,15 @@ from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.state import Sampling, State
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import build
+from wirebayes.resampling import effective_number
 from wirebayes.workers import workers
 
 _DRAWS = 4000
 
 
-def drawn(of: Any, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def drawn(of: Any) -> tuple[np.ndarray, np.ndarray]:
     """Draws (n, d) of a proposal and their log densities (n,)."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     points = rng.uniform(size=(_DRAWS, len(of.start.centres[0]) + 1))
     z = proposal.components(of).from_cube(points, rng)
     return z, of.log_density(z)
@@ -33,8 +34,7 @@ def drawn(of: Any, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def share(log_weight: np.ndarray) -> float:
     """Effective draws a draw."""
-    weight = np.exp(log_weight - log_weight.max())
-    return float(weight.sum() ** 2 / (weight**2).sum() / len(weight))
+    return effective_number(np.exp(log_weight - log_weight.max())) / len(log_weight)
 
 
 def learned(experiment: Any) -> tuple[list[float], Any, np.ndarray, np.ndarray]:
@@ -43,7 +43,7 @@ def learned(experiment: Any) -> tuple[list[float], Any, np.ndarray, np.ndarray]:
     state: State = burn_in.init(target, 0, DEFAULT, None, None, None)
     shares = []
     while True:
-        z, log_density = drawn(state.learned.proposal, 1)
+        z, log_density = drawn(state.learned.proposal)
         shares.append(share(target(z) - log_density))
         if isinstance(state, Sampling):
             break
@@ -66,7 +66,7 @@ def main() -> None:
         target, others = LogPosterior(build([experiments[j]])), []
         for i, (_, other, its_middle, its_factor) in enumerate(found):
             if i != j:
-                z, log_density = drawn(other, 1)
+                z, log_density = drawn(other)
                 z = middle + np.linalg.solve(its_factor, (z - its_middle).T).T @ factor.T
                 others.append(share(target(z) - log_density))  # the map's determinant is a constant
         print(f"{experiments[j].name:8s} own {' '.join(f'{s:.2f}' for s in own)}   others' "

@@ -14,13 +14,10 @@ _FACTORS: dict[str, dict[str, float]] = {
         "lbf": 4.4482216152605, "lb": 4.4482216152605, "lbs": 4.4482216152605, "ozf": 0.27801385095378125,
         "oz": 0.27801385095378125,
     },
-    "m": {
-        "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "km": 1e3,
-        "in": 0.0254, "inch": 0.0254, "ft": 0.3048,
-    },
     "rad": {"deg": math.pi / 180.0, "degree": math.pi / 180.0, "degrees": math.pi / 180.0},
     "s": {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0, "h": 3600.0, "hr": 3600.0, "d": 86400.0},
 }  # fmt: skip
+_FACTORS["m"] = {unit: factor / 1e3 for unit, factor in (_FACTORS["mm"] | {"mm": 1.0}).items() if unit != "m"}
 _TEMPERATURES = {"F": "°C = (°F - 32) / 1.8", "K": "°C = K - 273.15"}
 _LONGEST = 80  # a word that is longer is no misspelt name, and is not compared with one
 _NAME = re.compile(r".*?[\s_\-/([]+°?(?P<unit>[^\W\d_]+)[\])]?")

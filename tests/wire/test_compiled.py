@@ -21,7 +21,7 @@ from wirebayes.model import likelihoods
 from wirebayes.model.problem import build
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.wire.staircase import Model, linearise, simulate
+from wirebayes.wire.staircase import Linearised, Model, linearise, simulate, streamed
 
 if compiled.kernel is None:
     pytest.skip("the package was installed without a C compiler", allow_module_level=True)
@@ -130,10 +130,11 @@ def test_filtering_a_staircase_as_it_is_computed_gives_the_same_bits_as_one_afte
     readings = rng.normal(3.0, 1.0, (*p.time_s.shape, len(rows)))
     readings[rng.integers(len(readings)), :, 0] = np.nan  # of the first column one hold is not seen
     noise = rng.uniform(0.01, 0.1, len(rows)), rng.uniform(0.0, 1.0, len(rows))
-    at_once = likelihoods.chain_of(p, theta, model, readings, *noise)
+    assert not isinstance(streamed(p, theta, model), Linearised)
+    at_once = likelihoods.chain(streamed(p, theta, model), readings, p.mask, *noise)
     for name, value in vars(likelihoods.chain(line, readings, p.mask, *noise)).items():
         np.testing.assert_array_equal(getattr(at_once, name), value)
-    found = likelihoods.standardised_of(p, theta, model, readings, *noise)
+    found = likelihoods.standardised(streamed(p, theta, model), readings, p.mask, *noise)
     for one, other in zip(found, likelihoods.standardised(line, readings, p.mask, *noise), strict=True):
         np.testing.assert_array_equal(one, other)
 

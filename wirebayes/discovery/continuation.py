@@ -576,8 +576,6 @@ class Continuation:
         What the paths made of the last test's p, whether it counted or not.
     """
 
-    p = 1.0
-
     def __init__(
         self,
         blocks: Sequence[LaplaceFit],
@@ -594,6 +592,7 @@ class Continuation:
         self._values = {c.name: float(linear[c.name][0]) for c in found}
         for c, value in self.log_bayes.items():
             self._values[c.name] = max(self._values[c.name], value)
+        self.p = 1.0
         self._known: dict[str, Array] = {}  # of each name, in the simulations climbed so far
 
     def test(self, simulated: Sequence[Replicates], test: GlobalTest) -> GlobalTest:

@@ -18,6 +18,7 @@ from wirebayes.wire.protocol import Protocol
 RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
 NEGATIVE = 0.05  # share of the largest tension; sensors drift by less
 FLAT = 3.0  # noise levels by which the holds' means must differ to say anything of stiffness
+FALLS = -0.9  # correlation of displacement and tension: creep and friction bend the line, but do not turn it
 LEAST_STRAIN = 5e-5  # 10 N/mm² in steel: benches that step so little cannot set their steps
 LARGEST_STRAIN = 0.5  # lines and ropes break below; rubber is no wire of this model
 ISOLATED = 10.0  # times as far from its neighbours as nine in ten readings
@@ -121,6 +122,12 @@ def negative_tension(readings: Readings) -> str:
     )
 
 
+def falls(displacement_mm: Floats, tension_N: Floats) -> bool:
+    """Whether the tension of holds, each (H,), falls as the displacement rises."""
+    changes = np.ptp(displacement_mm) > 0 and np.ptp(tension_N) > 0
+    return bool(changes and np.corrcoef(displacement_mm, tension_N)[0, 1] < FALLS)
+
+
 def response(readings: Readings) -> str:
     """Tension that does not follow the displacement, or follows it the wrong way."""
     means, place = readings.means_N, readings.displacement_mm
@@ -138,7 +145,7 @@ def response(readings: Readings) -> str:
         )
     jumps = np.array([b[0] - a[-1] for a, b in zip(readings.each, readings.each[1:], strict=False)])
     moves = np.diff(place)
-    if (jumps * moves).sum() < 0 and len(means) > 2 and np.corrcoef(place, means)[0, 1] < -0.9:
+    if (jumps * moves).sum() < 0 and len(means) > 2 and falls(place, means):
         return "tension falls as the displacement rises: check the sign of displacement_mm and of tension_N"
     return ""
 

@@ -7,14 +7,17 @@ factors hold by hold in linear time: a Kalman filter whose state is that number.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from wirebayes.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Model, Theta, Walk, linearise
+from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
+
+if TYPE_CHECKING:
+    from wirebayes.wire._kernel import Staircases
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -41,12 +44,15 @@ def reading_variance(sensor_sd: Array, resolution_N: float) -> Array:
     return np.asarray(sensor_sd * sensor_sd + resolution_N * resolution_N / 12.0)
 
 
-def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> Filtered:
+def chain(
+    line: "Linearised | Staircases", readings: Array, mask: Array, variance: Array, setting_sd: Array
+) -> Filtered:
     """Filter the readings along the holds.
 
     Parameters
     ----------
-    line : Linearised
+    line : Linearised or Staircases
+        What `wirebayes.wire.staircase.linearise` or `streamed` returned.
     readings : (H, R, n) or (H, R, 1) array
         NaN where a row does not see a hold: it is then as one without readings.
     mask : (H, R) bool array
@@ -58,10 +64,10 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
     -------
     Filtered
     """
-    holds, _, n = line.tension.shape
     if compiled.kernel is not None:
-        observed = _observed(n, readings, mask, variance, setting_sd)
-        return Filtered(*compiled.kernel.chain(compiled.kernel.Stored(*_flat(line)), *observed))
+        return Filtered(*compiled.kernel.chain(*_compiled(line, readings, mask, variance, setting_sd)))
+    assert isinstance(line, Linearised)  # nothing is streamed without the kernel
+    holds, _, n = line.tension.shape
     out = np.zeros((holds, n))
     mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
     noise = _Noise.of(variance, setting_sd)
@@ -75,7 +81,7 @@ def chain(line: Linearised, readings: Array, mask: Array, variance: Array, setti
 
 
 def standardised(
-    line: Linearised, readings: Array, mask: Array, variance: Array, setting_sd: Array
+    line: "Linearised | Staircases", readings: Array, mask: Array, variance: Array, setting_sd: Array
 ) -> tuple[Array, Array]:
     """Log-likelihood, and residuals whose derivatives J give its curvature nearly: the expected information is J'J.
 
@@ -92,10 +98,10 @@ def standardised(
     -------
     (n,) and (m, n) arrays
     """
-    n = line.tension.shape[2]
     if compiled.kernel is not None:
-        observed = _observed(n, readings, mask, variance, setting_sd)
-        return compiled.kernel.standardised(compiled.kernel.Stored(*_flat(line)), *observed)
+        return compiled.kernel.standardised(*_compiled(line, readings, mask, variance, setting_sd))
+    assert isinstance(line, Linearised)  # nothing is streamed without the kernel
+    n = line.tension.shape[2]
     noise, total, out = _Noise.of(variance, setting_sd), np.zeros(n), []
     mean, var = np.zeros(n), np.zeros(n)
     for j in range(len(mask)):
@@ -112,60 +118,22 @@ def standardised(
     return total, np.concatenate(out)
 
 
-def chain_of(
-    protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array, setting_sd: Array
-) -> Filtered:
-    """Filter readings along a staircase that is needed for nothing else: compiled, as it is computed.
-
-    Parameters
-    ----------
-    protocol, theta, model
-        As for `wirebayes.wire.staircase.linearise`.
-    readings, variance, setting_sd
-        As for `chain`.
-
-    Returns
-    -------
-    Filtered
-    """
-    call = compiled.call(protocol, theta, model)
-    if call is None:
-        return chain(linearise(protocol, theta, model), readings, protocol.mask, variance, setting_sd)
-    observed = _observed(call.theta.shape[1], readings, protocol.mask, variance, setting_sd)
-    return Filtered(*compiled.kernel.chain(compiled.kernel.Computed(*call), *observed))
-
-
-def standardised_of(
-    protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array, setting_sd: Array
-) -> tuple[Array, Array]:
-    """What `standardised` returns of a staircase that is needed for nothing else.
-
-    Parameters
-    ----------
-    protocol, theta, model
-        As for `wirebayes.wire.staircase.linearise`.
-    readings, variance, setting_sd
-        As for `chain`.
-
-    Returns
-    -------
-    (n,) and (m, n) arrays
-    """
-    call = compiled.call(protocol, theta, model)
-    if call is None:
-        return standardised(linearise(protocol, theta, model), readings, protocol.mask, variance, setting_sd)
-    observed = _observed(call.theta.shape[1], readings, protocol.mask, variance, setting_sd)
-    return compiled.kernel.standardised(compiled.kernel.Computed(*call), *observed)
+def _compiled(
+    line: "Linearised | Staircases", readings: Array, mask: Array, variance: Array, setting_sd: Array
+) -> tuple[Any, ...]:
+    """What the compiled filters are called with."""
+    of = compiled.kernel.Stored(*_flat(line)) if isinstance(line, Linearised) else line
+    return of, *_observed(of.n, readings, mask, variance, setting_sd)
 
 
 def _flat(line: Linearised) -> tuple[Array, ...]:
-    """Staircases as compiled code takes them."""
+    """Staircases as contiguous arrays."""
     parts = (line.tension, line.by_setting, line.by_creep, line.carry_by_setting, line.carry_by_creep)
     return tuple(np.ascontiguousarray(part, float) for part in parts)
 
 
 def _observed(n: int, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> tuple[Array, ...]:
-    """Readings and noise of n columns, likewise."""
+    """Readings, which of them were taken, and the noise of n columns, in the types of compiled code."""
     noise = (np.full(n, v, float) for v in (variance, setting_sd))
     return np.asarray(readings, float), np.ascontiguousarray(mask).view(np.uint8), *noise
 

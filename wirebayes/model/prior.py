@@ -27,7 +27,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.readings import shown
 from wirebayes.typing import Array
 
-ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # or no wire or bench is like that
+ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # as stiffness, creep and errors are
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
 
 
@@ -240,7 +240,7 @@ def from_table(key: str, table: Any) -> Any:
 
 
 def possible(key: str, name: str, wanted: Any) -> Any:
-    """A prior without the values that a parameter cannot have: a normal one ends at zero where no value is below it.
+    """A prior without values that its parameter cannot have: where those are below zero, a normal one is cut off there.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from wirebayes.units import nearest
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Model, linearise, tension_reference
+from wirebayes.wire.staircase import Linearised, Model, linearise, streamed, tension_reference
 
 Likelihood = Literal["chain", "hold"]
 
@@ -119,8 +119,8 @@ class Problem:
             if self.likelihood == "hold":
                 out.append(likelihoods.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
-                found = likelihoods.chain_of(sample.protocol, own, sample.model, y, variance, own["setting_sd"])
-                out.append(found.log_likelihood)
+                line = streamed(sample.protocol, own, sample.model)
+                out.append(likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
         return out
 
     def log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> Array:
@@ -139,12 +139,12 @@ class Problem:
             for i, sample in enumerate(self.samples):
                 y = sample.readings if readings is None else readings[i]
                 own = self.parameters(theta, sample)
-                what = sample.protocol, own, sample.model, y
                 variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
                 if self.likelihood == "hold":
-                    found = likelihoods.standardised_hold_by_hold(*what, variance)
+                    found = likelihoods.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
                 else:
-                    found = likelihoods.standardised_of(*what, variance, own["setting_sd"])
+                    line = streamed(sample.protocol, own, sample.model)
+                    found = likelihoods.standardised(line, y, sample.protocol.mask, variance, own["setting_sd"])
                 values.append(found[0])
                 residuals.append(found[1])
             total: Any = sum(values)

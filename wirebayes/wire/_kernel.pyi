@@ -22,7 +22,8 @@ class Law:
         formulas: Sequence[tuple[str, int, float]],
     ) -> None: ...
 
-class Staircases: ...
+class Staircases:
+    n: int
 
 class Computed(Staircases):
     def __init__(self, test: Test, law: Law, theta: Array) -> None: ...

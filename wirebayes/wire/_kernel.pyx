@@ -485,7 +485,7 @@ cdef inline void follow_hooke(
 cdef class Staircases:
     """Where filters find staircases, a column of parameters each: one after the other, for they look at each once."""
 
-    cdef Py_ssize_t n
+    cdef readonly Py_ssize_t n
     cdef int holds, width
     cdef Dual* readings  # (holds, width) of the column that was asked for
     cdef Dual* carry  # (holds,): creep carried out of each

@@ -6,7 +6,7 @@ what numpy is fast at.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from wirebayes.wire import compiled, laws
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import Effect, HoldContext, Placed
 from wirebayes.wire.protocol import Protocol
+
+if TYPE_CHECKING:
+    from wirebayes.wire._kernel import Staircases
 
 Theta = Mapping[str, NDArray[Any]]
 _NONE: NDArray[Any] = np.zeros((1, 1))  # stands in for what the hold has not computed yet
@@ -157,6 +160,23 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     for derivative in (by_setting, by_creep, carry_by_setting, carry_by_creep):
         derivative /= _STEP
     return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
+
+
+def streamed(protocol: Protocol, theta: Theta, model: Model = Model()) -> "Linearised | Staircases":
+    """A staircase for one filter alone: compiled, it is filtered as it is computed, and never written to memory.
+
+    Parameters
+    ----------
+    protocol, theta, model
+        As for `linearise`.
+
+    Returns
+    -------
+    Linearised or Staircases
+        The latter where the model is compiled.
+    """
+    call = compiled.call(protocol, theta, model)
+    return linearise(protocol, theta, model) if call is None else compiled.kernel.Computed(*call)
 
 
 class Walk:

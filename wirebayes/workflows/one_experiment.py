@@ -129,7 +129,7 @@ def first_columns(experiment: Experiment, file: str) -> Row:
 def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.law, task.history, provenance=about)
-    _store(job, folder, task, draws=task.posteriors)
+    _fit_and_store(job, folder, task, draws=task.posteriors)
     if task.check:
         write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
     summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
@@ -137,7 +137,7 @@ def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     return _columns(summary, check and check["p"], check and check["passed"])
 
 
-def _store(job: Job, folder: Path, task: Task, *, draws: bool) -> None:
+def _fit_and_store(job: Job, folder: Path, task: Task, *, draws: bool) -> None:
     """Fit and store; nothing would go on from a checkpoint in a folder that is gone afterwards."""
     for place in job.folders:
         (folder / place).mkdir(parents=True)
@@ -148,7 +148,7 @@ def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryCo
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.law, task.history, kinds, task.simulations), task.seed)
     for job in jobs_of(found, task.law, task.history, task.own_effects):
-        _store(job, folder, task, draws=True)  # pictures show them
+        _fit_and_store(job, folder, task, draws=True)  # pictures show them
     write_findings(found, folder, task.own_effects)
     report = found.report["experiments"][experiment.name]
     # the check of a fit is this global test

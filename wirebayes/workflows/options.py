@@ -62,9 +62,22 @@ def experiments_of(source: Source, name: str | None = None) -> list[Experiment]:
 
 def check_seed(seed: int) -> int:
     """The seed as a Python integer, 0 or more."""
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed: found {seed!r}, expected a whole number, 0 or more")
-    return int(seed)
+    return check_whole("seed", seed, 0)
+
+
+def check_whole(option: str, value: int, least: int) -> int:
+    """A whole number as a Python integer.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    value, least : int
+        What was given, and the smallest that it may be.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{option}: found {value!r}, expected a whole number, {least} or more")
+    return int(value)
 
 
 def check_train_holds(holds: int | None) -> int | None:

@@ -1,7 +1,6 @@
 """Synthetic tests with known truth, as files the other functions read."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral
 from pathlib import Path
 from typing import get_args
 
@@ -12,7 +11,16 @@ from wirebayes.io.run_folder import check_run, open_run
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workflows.options import Numbers, PathLike, check_choice, check_seed, path_of, text_of, words
+from wirebayes.workflows.options import (
+    Numbers,
+    PathLike,
+    check_choice,
+    check_seed,
+    check_whole,
+    path_of,
+    text_of,
+    words,
+)
 from wirebayes.workflows.results import Place, SimulatedTests
 
 
@@ -90,9 +98,7 @@ def simulate_tests(
     chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
     found, amplitudes = _effects(effects, own)
     chosen |= amplitudes
-    if isinstance(tests, bool) or not isinstance(tests, Integral) or tests < 1:
-        raise InputError(f"--tests: found {tests!r}, expected a whole number, 1 or more")
-    tests = int(tests)
+    tests = check_whole("--tests", tests, 1)
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
     path = _path(displacements, unload)
     gaps = frozenset(unrecorded)

@@ -23,6 +23,7 @@ from wirebayes.io.bench.sheet import Sheet, is_number, is_value
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.thinning import MOST, thinned
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
+from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment, experiment_of
 from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
 from wirebayes.io.toml_keys import Keys
@@ -34,9 +35,8 @@ _COLUMN_ROLES: dict[str, Role] = {
     "temperature_C": "temperature",
 }  # fmt: skip
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
-MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
-_FALLS = -0.9  # correlation of displacement and tension: creep and friction bend the line, but do not turn it
 FAR_STEPS = 2.0  # and this many times the range of the test
+MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
 
 
 @dataclass(frozen=True)
@@ -247,7 +247,7 @@ def _check_direction(table: RawTable, column: Column, experiment: Experiment) ->
     """Refuse a displacement counted downwards: the wire pulls the more, the further it is below zero."""
     holds = experiment.recorded_holds
     place, pull = (np.array(v) for v in zip(*((h.displacement_mm, h.tension_N.mean()) for h in holds), strict=True))
-    if len(set(place)) < 2 or place.max() > 0 or np.ptp(pull) == 0 or np.corrcoef(place, pull)[0, 1] > _FALLS:
+    if place.max() > 0 or not falls(place, pull):
         return
     unit = column.unit.text if column.unit else "mm"
     found = f"displacements down to {place.min():g} mm, the further down the more tension"

@@ -79,7 +79,7 @@ class Falls:
 
 _TOLERANCE = 2e-4  # of the creep so far, a step: the drift is then right to .2 % even where wires go slack
 _FIRST = 0.02  # first step tried, in creep's own clock k2 t^N
-# of the way so far, a step that is taken whatever its error: creep grows by as little in it, so the error is no step's
+# of the way so far: so short a step is taken whatever its error, which a shorter one would not make smaller
 _LEAST_STEP = 1e-4
 _RESOLVED = 1e-6  # of all creep that tension leads to: what grows less is rounding in tensions, not a drift
 _POWERS = 0.1, 3.0  # of time, between which steps are laid; draws of an estimate may have any N
