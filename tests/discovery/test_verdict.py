@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wirebayes.discovery import held_out, verdict
+from wirebayes.discovery import global_test, held_out, verdict
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.settings import Settings
@@ -138,7 +138,7 @@ def test_sets_that_failed_the_second_test_lose_their_weight_to_the_one_that_pass
 def test_nothing_left_to_add_passes_the_second_test() -> None:
     """No candidate is left that could be missing, so no simulation is needed."""
     whole = SimpleNamespace(probed=([], []), blocks=[None, None])
-    found = verdict._retested(whole, Settings(), np.random.default_rng(0), map)  # type: ignore[arg-type]
+    found = verdict._retested(whole, np.random.default_rng(0), map)  # type: ignore[arg-type]
     assert found == Retest(None, [[], []])
     assert not verdict._fails(found)
     assert verdict._fails(Retest(0.03, [[]])) and not verdict._fails(Retest(0.0301, [[]]))
@@ -240,8 +240,8 @@ def test_an_effect_that_gains_exactly_four_does_not_predict(monkeypatch: pytest.
     assert names(decided(monkeypatch, explored({"a": 10.0}), {"a": -9.0}, {})) == "a"
 
 
-def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every block simulated with its probes and its patterns; their scans are what p and the findings come from."""
+def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any], Any]:
+    """The second test of a set on two blocks, where p is as given, its blocks, and what was simulated."""
     blocks: Any = [
         SimpleNamespace(target=SimpleNamespace(problem=f"p{b}"), modes=SimpleNamespace(z=np.array([[b], [9]])),
                         names=[f"n{b}", "m"])
@@ -251,20 +251,25 @@ def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.M
 
     def simulated(block: Any, trials: Any, n: int, rng: Any) -> Any:
         asked.append((block, trials, n))
-        return SimpleNamespace(scan=f"null of {block.target.problem}")
+        return SimpleNamespace(scan=f"{n} null of {block.target.problem}")
+
+    def joined(parts: Any) -> Any:
+        return SimpleNamespace(scan=" and ".join(part.scan for part in parts))
 
     def findings(listed: Any, first: int, data: Any, null: Any, where: str) -> Any:
         return [listed, first, data, null, where]
 
     def tested(candidates: Any, data: Any, nulls: Any) -> Any:
-        assert candidates == ["candidate"] and nulls == ["null of p0", "null of p1"]
-        return SimpleNamespace(p=0.3 if data == [("p0", 0, "p0 columns"), ("p1", 1, "p1 columns")] else None)
+        assert candidates == ["candidate"] and [null[-2:] for null in nulls] == ["p0", "p1"]
+        assert data == [("p0", 0, "p0 columns"), ("p1", 1, "p1 columns")]
+        return SimpleNamespace(p=p, null=np.zeros(100 if len(asked) == 2 else 200))
 
     def expand(target: Any, z: Any, trials: Any, columns: Any) -> Any:
         assert trials == ["t1", "t2"] and z.shape == (1, 1)
         return target.problem, z[0, 0], columns
 
-    monkeypatch.setattr(verdict, "simulated_with_patterns", simulated)
+    monkeypatch.setattr(global_test, "simulated_with_patterns", simulated)
+    monkeypatch.setattr(global_test.screening, "joined_replicates", joined)
     monkeypatch.setattr(
         verdict.residual_patterns, "patterns", lambda problem: (f"{problem} list", f"{problem} columns")
     )
@@ -273,11 +278,26 @@ def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.M
     monkeypatch.setattr(verdict, "expand", expand)
     monkeypatch.setattr(verdict, "scan", lambda x: x)
     best: Any = SimpleNamespace(blocks=blocks, probed=(["t1", "t2"], ["candidate"]))
-    found = verdict._retested(best, Settings(), np.random.default_rng(0), map)
-    assert asked == [(block, ["t1", "t2"], 299) for block in blocks] and found.p == 0.3
+    return blocks, asked, verdict._retested(best, np.random.default_rng(0), map)
+
+
+def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every block simulated with its probes and its patterns; their scans are what p and the findings come from."""
+    blocks, asked, found = retested(monkeypatch, 0.3)
+    assert asked == [(block, ["t1", "t2"], 150) for block in blocks] and found.p == 0.3
     assert found.where == [
-        [f"p{b} list", 2, (f"p{b}", b, f"p{b} columns"), f"null of p{b}", f"n{b}, m"] for b in range(2)
+        [f"p{b} list", 2, (f"p{b}", b, f"p{b} columns"), f"150 null of p{b}", f"n{b}, m"] for b in range(2)
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("larger", "decides"), [(0, False), (9, False), (10, True), (60, True)])
+def test_the_second_test_takes_half_of_its_simulations_where_p_is_clearly_above_its_level(
+    larger: int, decides: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With p on the level, three of a hundred are as surprising on average, and ten or more once in 1,144 times."""
+    _, asked, found = retested(monkeypatch, (1 + larger) / 101)
+    assert [n for _, _, n in asked] == ([150, 150] if decides else [150, 150, 149, 149])
+    assert all(item[3].startswith("150 null") == decides or "and 149" in item[3] for item in found.where)
 
 
 def test_a_remainder_that_fails_the_test_may_leave_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,6 +83,7 @@ def test_an_experiment_file_is_no_plan(experiment_file):
         ("k1 = 1500.0", "prelod = 1", "line 6, key guess.prelod: found an unknown parameter (did you mean preload?)"),
         ("k1 = 1500.0", "k1 = true", "line 6, key guess.k1: found True, expected a number, or a table"),
         ('["toe", "memory"]', '"fame"', 'line 3, key aim: found \'fame\', expected "parameters", "creep"'),
+        ('["toe", "memory"]', '["toe", "toe"]', "line 3, key aim: found ['toe', 'toe'], expected"),
         ('["toe", "memory"]', '["toe", "memori"]', "line 3, key aim: found 'memori' (did you mean memory?)"),
         ("budget_min = 30.0", "budget_min = 0", "line 2, key budget_min: found 0, expected a time budget above 0"),
         ('material = "line"', 'posterior = "nowhere"', "line 1, key posterior: found 'nowhere', which is no folder"),

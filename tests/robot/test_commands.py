@@ -286,6 +286,7 @@ def test_the_documented_session_is_one():
         (",30.0,", ",", "line 2"),
         (",,,,,,,\n", ",1.0,,,,,,\n", "line 2"),
         ("\n1,", "\n\nx,", "line 3, column hold"),  # an empty line counts
+        ("\n3,", "\n1,", "line 4, column hold: found 1 once more; expected a row for each hold"),
     ],
 )
 def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, message):

@@ -142,7 +142,8 @@ def test_findings_that_could_not_decide_say_what_to_tell_apart(fitted, tmp_path)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"aim": "fame"}, "--aim: found fame; expected parameters, creep, or two effects"),
+        ({"aim": "fame"}, "--aim: found fame; expected parameters, creep, or two different effects"),
+        ({"aim": ["toe", "toe"]}, "--aim: found toe, toe; expected parameters, creep, or two different effects"),
         ({"budget_min": 0.0}, "--budget-min"),
         ({"tests": 1}, "tests: found 1, expected a whole number, 2 or more"),
         ({"robot": "nobody"}, "nobody"),

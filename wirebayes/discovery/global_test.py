@@ -116,10 +116,7 @@ def examine(
         report("simulations", len(simulated), len(blocks))
         made = len(simulated[0].z) if simulated else 0
         total = _next_total(made, simulations)
-        n = total - made
-        more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
-        pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
-        simulated = [screening.joined_replicates(parts) for parts in pairs]
+        simulated = with_more(simulated, blocks, trials, total - made, rng, parallel_map)
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
         by_larger = 1.0
@@ -197,6 +194,20 @@ def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, 
         Its scan has the probes first and the residual patterns behind them.
     """
     return screening.replicated(block, trials, n, rng, residual_patterns.patterns(block.target.problem)[1])
+
+
+def with_more(
+    simulated: Sequence[Replicates],
+    blocks: Sequence[LaplaceFit],
+    trials: Sequence[Probe],
+    n: int,
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
+) -> list[Replicates]:
+    """What was simulated for each block, if anything was, with `n` data sets more (see `simulated_with_patterns`)."""
+    more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
+    pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
+    return [screening.joined_replicates(parts) for parts in pairs]
 
 
 def _strike_gross_errors(

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import repeat
 
 import numpy as np
 
 from wirebayes.discovery import model_space, residual_patterns, screening
-from wirebayes.discovery.global_test import simulated_with_patterns
+from wirebayes.discovery.global_test import is_close, with_more
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior, smallest_set
+from wirebayes.discovery.screening import Replicates
 from wirebayes.discovery.settings import (
     ALPHA_AFTER,
     GIVE_WAY,
@@ -118,9 +118,9 @@ def decide(
         if predicts(best):
             break
         sets = [s for s in sets if not best.effects.key <= s.key]
-    retest = _retested(best, settings, rng, parallel_map)
+    retest = _retested(best, rng, parallel_map)
     if _fails(retest):
-        passing = _complete(found, explored, best, predicts, settings, rng, parallel_map)
+        passing = _complete(found, explored, best, predicts, rng, parallel_map)
         if passing is not None:
             sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
             best, retest = passing.best, passing.retest
@@ -165,7 +165,6 @@ def _complete(
     explored: Explored,
     best: FittedSet,
     predicts: Callable[[FittedSet], bool],
-    settings: Settings,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> _Passing | None:
@@ -182,7 +181,7 @@ def _complete(
         if candidate is best:
             continue
         if predicts(candidate):
-            retest = _retested(candidate, settings, rng, parallel_map)
+            retest = _retested(candidate, rng, parallel_map)
             if not _fails(retest):
                 return _Passing(candidate, retest, failed)
         failed.add(key)
@@ -201,21 +200,30 @@ def _gain(plain: list[LaplaceFit], best: FittedSet, explored: Explored, left_out
     return out
 
 
-def _retested(best: FittedSet, settings: Settings, rng: np.random.Generator, parallel_map: ParallelMap) -> Retest:
-    """The global test with the set inside, and where its residuals still depend on something."""
+def _retested(best: FittedSet, rng: np.random.Generator, parallel_map: ParallelMap) -> Retest:
+    """The global test with the set inside, and where its residuals still depend on something.
+
+    Half of the simulations decide where p is clearly above the level; below it, the odds depend on how small p is.
+    """
     trials, candidates = best.probed
     if not candidates:
         return Retest(None, [[] for _ in best.blocks])
-    simulated = list(
-        parallel_map(simulated_with_patterns, best.blocks, repeat(trials), repeat(RETESTS), rng.spawn(len(best.blocks)))
-    )
-    nulls = [s.scan for s in simulated]
-    data, where = [], []
-    for block, null in zip(best.blocks, nulls, strict=True):
-        listed, columns = residual_patterns.patterns(block.target.problem)
-        data.append(scan(expand(block.target, block.modes.z[:1], trials, columns=columns)))
-        where.append(residual_patterns.findings(listed, len(trials), data[-1], null, ", ".join(block.names)))
-    return Retest(screening.global_test(candidates, data, nulls).p, where)
+    patterns = [residual_patterns.patterns(block.target.problem) for block in best.blocks]
+    data = [
+        scan(expand(block.target, block.modes.z[:1], trials, columns=columns))
+        for block, (_, columns) in zip(best.blocks, patterns, strict=True)
+    ]
+    simulated: list[Replicates] = []
+    for n in ((RETESTS + 1) // 2, RETESTS // 2):
+        simulated = with_more(simulated, best.blocks, trials, n, rng, parallel_map)
+        test = screening.global_test(candidates, data, [s.scan for s in simulated])
+        if test.p > ALPHA_AFTER and not is_close(test.p, ALPHA_AFTER, len(test.null)):
+            break
+    where = [
+        residual_patterns.findings(listed, len(trials), here, s.scan, ", ".join(block.names))
+        for block, (listed, _), here, s in zip(best.blocks, patterns, data, simulated, strict=True)
+    ]
+    return Retest(test.p, where)
 
 
 def _more_beside(sets: Sequence[EffectSet], beside: Array, i: int, extra: float) -> Array:

@@ -246,8 +246,8 @@ def _aim(top: Keys, effects: Sequence[str]) -> tuple[str, ...]:
     aim = top.table.get("aim", "parameters")
     if aim in ("parameters", "creep"):
         return (str(aim),)
-    expected = '"parameters", "creep", or a list of two effects to distinguish'
-    if not (isinstance(aim, list) and len(aim) == 2 and all(isinstance(name, str) for name in aim)):
+    expected = '"parameters", "creep", or a list of two different effects to distinguish'
+    if not (isinstance(aim, list) and all(isinstance(name, str) for name in aim) and len(set(aim)) == len(aim) == 2):
         raise top.complain("aim", shown(aim), expected)
     for name in aim:
         if name not in effects:

@@ -295,9 +295,9 @@ def _measured(sample: Sample, folder: Path) -> Experiment:
 
 def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
     words = (aim,) if isinstance(aim, str) else tuple(aim)
-    if words in (("parameters",), ("creep",)) or (len(words) == 2 and set(words) <= set(effects)):
+    if words in (("parameters",), ("creep",)) or (len(set(words)) == len(words) == 2 and set(words) <= set(effects)):
         return words
-    expected = "parameters, creep, or two effects of the catalogue"
+    expected = "parameters, creep, or two different effects of the catalogue"
     raise InputError(f"--aim: found {', '.join(map(str, words))}; expected {expected}")
 
 

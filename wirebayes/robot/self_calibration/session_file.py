@@ -140,6 +140,11 @@ def parse(
     table = np.array(cells).reshape(-1, len(wanted))
     if not len(table):
         raise InputError(f"{source}: found no holds; expected at least one row")
+    numbers = table[:, 0].tolist()
+    for i, number in enumerate(numbers):
+        if number in numbers[:i]:
+            again = f"{source}: {place(numbered[i + 1][0])}, column hold: found {number:g} once more"
+            raise InputError(f"{again}; expected a row for each hold")
     w = robot.legs
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
     if motors and robot.drums is not None:
