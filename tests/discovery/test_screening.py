@@ -1,14 +1,17 @@
 """Which forms of effects are candidates."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from wirebayes.discovery import screening
+from wirebayes.discovery.linear_scan import expand
 from wirebayes.discovery.screening import Scale, candidate_probes
 from wirebayes.effects import CATALOGUE
+from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
 
@@ -64,3 +67,25 @@ def test_p_depends_less_on_the_simulations_drawn_than_by_counting(monkeypatch: p
     share = 1.0 - (1.0 - 0.004) ** 15
     assert p.mean() == pytest.approx(share, rel=0.1) and counts.mean() == pytest.approx(share, rel=0.1)
     assert np.log(p).std() < 0.7 * np.log(counts).std()
+
+
+def test_what_has_many_signatures_is_scanned_in_smaller_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many simulations at once as fit, one at least, to the same log Bayes factors."""
+    block = fitted(experiments()[1:2], (), "hooke", "saturating", np.random.default_rng(0))
+    trials, _ = candidate_probes([block], CATALOGUE)
+    numbers = len(trials) * block.target.problem.samples[0].protocol.mask.size
+    rows: list[int] = []
+
+    def counted(target: Any, z: Any, *given: Any) -> Any:
+        rows.append(len(z))
+        return expand(target, z, *given)
+
+    monkeypatch.setattr(screening, "expand", counted)
+    found = []
+    for room in (100.0, 3.0, 0.0):
+        monkeypatch.setattr(screening, "_NUMBERS", room * numbers)
+        found.append(screening.replicated(block, trials, 7, np.random.default_rng(1)).scan)
+    assert rows == [7, 3, 3, 1, *[1] * 7]
+    for scan in found[1:]:
+        assert scan.effects == pytest.approx(found[0].effects, rel=1e-6, abs=1e-6)
+        assert scan.flexible == pytest.approx(found[0].flexible, rel=1e-6, abs=1e-6)

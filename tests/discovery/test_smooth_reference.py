@@ -40,11 +40,28 @@ def test_the_processes_are_products_of_one_over_holds_and_one_over_time() -> Non
         assert covariance(functions, mask) == pytest.approx(expected, abs=1e-9)
 
 
+def test_of_many_readings_the_covariance_of_some_gives_nearly_the_best_functions(tmp_path: Path) -> None:
+    """Twice as many readings as are decomposed: no functions at all hold more of the variance, these nearly as much."""
+    displacements, times = [0.2 * k for k in range(1, 41)], [4.0 * k for k in range(30)]
+    write(tmp_path, [Bench(displacements_mm=displacements, times_s=times)], Truth(QUIET), seed=3)
+    protocol = read_experiments(tmp_path / "experiments.toml")[0].protocol()
+    mask = protocol.mask
+    hold, reading = np.nonzero(mask)
+    assert len(hold) == 2 * smooth_reference._DECOMPOSED
+    time = np.log1p(protocol.time_s[mask] / (0.2 * np.median(protocol.time_s[mask][protocol.time_s[mask] > 0])))
+    found = covariance(smooth_reference.family(protocol)[1], mask)
+    apart = (np.subtract.outer(hold, hold) / 1.5) ** 2 + (np.subtract.outer(time, time) / 0.7) ** 2
+    whole = np.exp(-0.5 * apart)
+    values = np.linalg.eigvalsh(whole)
+    assert 0.99 * values[-40:].sum() < np.trace(found) < values[-40:].sum() + 1e-6
+    assert np.linalg.eigvalsh(whole - found)[0] > -1e-6 * values[-1]
+
+
 def test_the_evidence_of_several_processes_is_the_mean_of_theirs() -> None:
     block = fitted([WIRE], (), "hooke", "saturating", np.random.default_rng(0))
     z, family = block.modes.z[:1], smooth_reference.family(WIRE.protocol())
-    each = [scan(expand(block.target, z, [], reference=lambda p, f=f: [f])).flexible[0] for f in family]
-    together = scan(expand(block.target, z, [], reference=lambda p: family)).flexible[0]
+    each = [scan(expand(block.target, z, [], reference=[[f]])).flexible[0] for f in family]
+    together = scan(expand(block.target, z, [], reference=[family])).flexible[0]
     assert np.ptp(each) > 1.0
     assert together == pytest.approx(logsumexp(each) - np.log(len(each)))
 

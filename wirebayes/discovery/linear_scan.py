@@ -20,7 +20,6 @@ from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import linearise, simulate
 
 # of setting to sensor error, squared: from one that does not matter to one beside which the sensor's does not; steps of
@@ -271,6 +270,11 @@ def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array
     return out
 
 
+def plain_reference(problem: Problem) -> list[list[Array]]:
+    """The flexible reference of one process, unit size: functions (H, R, q) of every sample, N."""
+    return [[smooth_reference.basis(sample.protocol, 1.0)] for sample in problem.samples]
+
+
 def expand(
     target: LogPosterior,
     z: Array,
@@ -278,7 +282,7 @@ def expand(
     readings: Sequence[Array] | None = None,
     columns: Callable[[Problem, int, Array, Array], Array] | None = None,
     shapes: Sequence[Array] | None = None,
-    reference: Callable[[Protocol], Sequence[Array]] = lambda protocol: [smooth_reference.basis(protocol, 1.0)],
+    reference: Sequence[Sequence[Array]] | None = None,
 ) -> Expansion:
     """Linearise a block at some parameters, with the signatures of the probes.
 
@@ -296,8 +300,8 @@ def expand(
         its derivatives (H, R, n, p), it returns (H, R, n, more), N.
     shapes : sequence of (H, R, m) arrays, optional
         Signatures from `forms`, used for all rows: an effect's form hardly differs between refits.
-    reference : function of Protocol to list of (H, R, q) arrays, optional
-        Functions of each process of the flexible reference, N.
+    reference : sequence of lists of (H, R, q) arrays, optional
+        Functions of each process of the flexible reference, N, a list a sample; `plain_reference` when left out.
 
     Returns
     -------
@@ -308,6 +312,7 @@ def expand(
     points = list(_points(target, around, readings))
     added: list[Array] = []
     functions: list[list[Array]] = []
+    reference = reference or plain_reference(problem)
     for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
         mask = sample.protocol.mask
         shape = (shapes or forms(target, z[:1], trials))[at][mask]
@@ -316,7 +321,7 @@ def expand(
             more = columns(problem, at, point.tension, point.slopes)
             each.append(np.stack([point.rows(more[..., i], mask) for i in range(more.shape[-1])], axis=-1))
         added.append(np.concatenate(each, axis=-1))
-        functions.append([f[mask][None] / point.sd[:, None, None] for f in reference(sample.protocol)])
+        functions.append([f[mask][None] / point.sd[:, None, None] for f in reference[at]])
     signatures = np.concatenate(added, axis=1)
     one_sided = [i < len(trials) and trials[i].one_sided for i in range(signatures.shape[-1])]
     plain = _tangent(target, around, points)

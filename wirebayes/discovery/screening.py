@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, probes, scan
+from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, plain_reference, probes, scan
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.settings import ABOVE_COUNT, ONE_NAT, UPPER
 from wirebayes.effects.elastic import LengthDependence
@@ -22,7 +22,8 @@ from wirebayes.model.replicate import readings as replicate
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
 
-_ROWS = 100  # replicates linearised at once
+_ROWS = 100  # replicates linearised at once, at most
+_NUMBERS = 4e6  # signatures of these, readings times probes: some copies of them have to fit into memory
 _FLEXIBLE = "unknown"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 # What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
@@ -171,11 +172,13 @@ def replicated(
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
     density, residuals = block.target.rowwise(y)
     found = climb(density, z, residuals, iterations=25, tolerance=1e-2, curvature_at_end=False)
-    shapes = forms(block.target, block.modes.z[:1], trials)
+    shapes, smooth = forms(block.target, block.modes.z[:1], trials), plain_reference(problem)
+    at_once = int(np.clip(_NUMBERS / max(sum(shape.size for shape in shapes), 1), 1, _ROWS))
     parts = []
-    for begin in range(0, n, _ROWS):
-        rows = slice(begin, begin + _ROWS)
-        parts.append(scan(expand(block.target, found.z[rows], trials, [v[..., rows] for v in y], columns, shapes)))
+    for begin in range(0, n, at_once):
+        rows = slice(begin, begin + at_once)
+        own = [v[..., rows] for v in y]
+        parts.append(scan(expand(block.target, found.z[rows], trials, own, columns, shapes, smooth)))
     return Replicates(joined(parts), found.z, y)
 
 

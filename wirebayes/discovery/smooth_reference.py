@@ -1,5 +1,6 @@
 """The reference for something unknown: a smooth discrepancy over hold and time, as a few functions of the readings."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from wirebayes.wire.protocol import Protocol
 
 FUNCTIONS = 16  # they hold 99 % of the process's variance on the paper's protocols
 SHORT_FUNCTIONS = 40  # of the other processes; short lengths need more to hold 99 % of their variance
+_DECOMPOSED = 600  # readings, at most, whose covariance is decomposed: smooth functions of more follow from these
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,13 @@ class _Readings:
         place = protocol.displacement_mm[j] - protocol.displacement_mm.min()
         return _Readings(j, place, np.log1p(protocol.time_s[j, r] / (0.2 * typical)))
 
+    def rows(self, which: NDArray[np.int64]) -> "_Readings":
+        """Some of them."""
+        return _Readings(self.hold[which], self.place[which], self.time[which])
+
+
+_Covariance = Callable[[_Readings, _Readings], Array]
+
 
 def basis(protocol: Protocol, scale_N: float) -> Array:
     """(H, R, q) functions whose independent unit-normal combinations are the Gaussian process, N.
@@ -38,11 +47,16 @@ def basis(protocol: Protocol, scale_N: float) -> Array:
     displacement (which differ once the wire is unloaded), times over the time within the hold (constant, or smooth
     in its logarithm). Zero where there is no reading.
     """
-    at = _Readings.of(protocol)
-    order = at.hold / max(len(protocol.displacement_mm) - 1, 1)
-    place = at.place / (np.ptp(protocol.displacement_mm) or 1.0)
-    over_hold = 0.5 * _smooth(order, 0.3) + 0.5 * np.minimum(order[:, None], order[None]) + 0.5 * _smooth(place, 0.3)
-    return _functions(protocol, over_hold * (0.5 + 0.5 * _smooth(at.time, 0.7)), FUNCTIONS) * scale_N
+    holds = max(len(protocol.displacement_mm) - 1, 1)
+    reach = np.ptp(_Readings.of(protocol).place) or 1.0
+
+    def covariance(one: _Readings, other: _Readings) -> Array:
+        orders = one.hold / holds, other.hold / holds
+        over_hold = 0.5 * _smooth(*orders, 0.3) + 0.5 * np.minimum.outer(*orders)
+        over_hold += 0.5 * _smooth(one.place / reach, other.place / reach, 0.3)
+        return np.asarray(over_hold * (0.5 + 0.5 * _smooth(one.time, other.time, 0.7)))
+
+    return _functions(protocol, covariance, FUNCTIONS) * scale_N
 
 
 def family(protocol: Protocol) -> list[Array]:
@@ -51,19 +65,32 @@ def family(protocol: Protocol) -> list[Array]:
     Nobody knows which of them something unknown resembles, so its evidence is the mean of theirs. By `basis` alone a
     deviation of a few holds, or early in each, was no remainder, and was given the name of an effect.
     """
-    at = _Readings.of(protocol)
-    kernels = [_smooth(at.hold, holds) * _smooth(at.time, times) for holds in HOLD_LENGTHS for times in TIME_LENGTHS]
+
+    def product(holds: float, times: float) -> _Covariance:
+        return lambda one, other: _smooth(one.hold, other.hold, holds) * _smooth(one.time, other.time, times)
+
+    kernels = [product(holds, times) for holds in HOLD_LENGTHS for times in TIME_LENGTHS]
     return [basis(protocol, 1.0), *(_functions(protocol, kernel, SHORT_FUNCTIONS) for kernel in kernels)]
 
 
-def _functions(protocol: Protocol, covariance: Array, most: int) -> Array:
-    """(H, R, q) functions that make up a covariance (N, N) of the readings; zero where there is no reading."""
-    values, vectors = np.linalg.eigh(covariance)
+def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
+    """(H, R, q) functions that make up a covariance of the readings; zero where there is no reading.
+
+    Of many readings the covariance of some is decomposed and its eigenvectors are extended to all (Nyström's method).
+    """
+    every = _Readings.of(protocol)
+    n = len(every.hold)
+    some = every.rows(np.unique(np.linspace(0, n - 1, min(n, _DECOMPOSED)).round().astype(np.int64)))
+    values, vectors = np.linalg.eigh(covariance(some, some))
     top = np.argsort(values)[::-1][:most]
+    size, vectors = np.sqrt(np.maximum(values[top], 0.0)), vectors[:, top]
     out = np.zeros((*protocol.mask.shape, len(top)))
-    out[np.nonzero(protocol.mask)] = vectors[:, top] * np.sqrt(np.maximum(values[top], 0.0))
+    if n > _DECOMPOSED:
+        out[np.nonzero(protocol.mask)] = covariance(every, some) @ (vectors / np.maximum(size, 1e-6 * size[0]))
+    else:
+        out[np.nonzero(protocol.mask)] = vectors * size
     return out
 
 
-def _smooth(x: Array | NDArray[np.int64], length: float) -> Array:
-    return np.asarray(np.exp(-0.5 * ((x[:, None] - x[None]) / length) ** 2))
+def _smooth(one: Array | NDArray[np.int64], other: Array | NDArray[np.int64], length: float) -> Array:
+    return np.asarray(np.exp(-0.5 * (np.subtract.outer(one, other) / length) ** 2))

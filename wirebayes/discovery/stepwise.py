@@ -269,4 +269,5 @@ def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Genera
 
 def _scanned(block: LaplaceFit, trials: Sequence[Probe]) -> Scan:
     """What further effects, and something smooth but unknown, local or global, would explain beside a block's."""
-    return scan(expand(block.target, block.modes.z[:1], trials, reference=smooth_reference.family))
+    family = [smooth_reference.family(sample.protocol) for sample in block.target.problem.samples]
+    return scan(expand(block.target, block.modes.z[:1], trials, reference=family))
