@@ -73,6 +73,7 @@ GOOD = {
     "time_s": [0.0, 30.0, 60.0, 0.0, 30.0],
     "tension_N": [2.1, 1.9, 1.8, 2.5, 2.3],
 }
+HIDDEN = np.ma.masked_greater([2.1, 999.0, 1.9, 2.0, 2.0], 100.0)  # a reading that is marked as invalid
 ABOUT = {"length_mm": 1200.0, "name": "wire", "material": "line"}
 
 
@@ -81,6 +82,7 @@ ABOUT = {"length_mm": 1200.0, "name": "wire", "material": "line"}
     [
         ("time_s", [0, 30, 30, 0, 30], r"row 2 .from 0., column time_s: found 30, expected a time after 30 s"),
         ("tension_N", [2, 1.9, np.nan, 2, 2], r"row 2 \(from 0\), column tension_N: found 'nan', expected a finite"),
+        ("tension_N", HIDDEN, r"row 1 \(from 0\), column tension_N: found 'nan', expected a finite"),
         ("hold", [1, 1, 1, 2.5, 2], r"row 3 \(from 0\), column hold: found '2.5', expected a whole number"),
         ("hold", [2, 2, 2, 1, 1], r"row 3 \(from 0\), column hold: found 1, expected a hold number above 2"),
         ("displacement_mm", [1, 1, 2, 2, 2], r"row 2 .from 0., column displacement_mm: found 2, expected 1 as before"),
@@ -139,6 +141,18 @@ def test_what_is_no_test_at_all_is_named():
         with pytest.raises(wb.InputError, match=f"--tests: found {tests}, expected a whole number, 1 or more"):
             wb.simulate_tests(tests=tests)
     assert len(wb.simulate_tests(tests=np.int64(2), seed=1).experiments) == 2
+    for times, found in ((-1, "-1"), ([None], "None"), ("a", "a")):
+        with pytest.raises(wb.InputError, match=f"--times: found .?{found}"):
+            wb.simulate_tests(times=times)
+    with pytest.raises(wb.InputError, match="output: found 3, expected a path"):
+        wb.check(wb.from_arrays(**GOOD, **ABOUT), output=3)
+
+
+def test_a_column_may_come_from_a_generator_and_no_unrecorded_hold_may_be_none():
+    made = wb.from_arrays(
+        **GOOD | {"tension_N": (value for value in GOOD["tension_N"])}, **ABOUT, unrecorded_holds=None
+    )
+    assert made.data_hash == wb.from_arrays(**GOOD, **ABOUT).data_hash
 
 
 SCRIPT = """

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,16 @@ def test_processes_know_a_users_own_effects() -> None:
     with workers(prepare=partial(catalogue, OWN)) as parallel_map:
         [columns] = parallel_map(known[name].columns, [known[name]()])
     assert columns == known[name]().columns()
+
+
+def _shared(pieces: int) -> list[tuple[int, int]]:
+    with workers(pieces) as parallel_map:
+        return list(parallel_map(divmod, range(pieces), [2] * pieces))
+
+
+def test_a_worker_of_a_pool_that_may_start_none_does_the_work_itself() -> None:
+    with get_context("spawn").Pool(1) as pool:
+        assert pool.apply(_shared, (5,)) == [divmod(i, 2) for i in range(5)]
 
 
 def test_an_error_in_a_process_arrives() -> None:

@@ -114,11 +114,18 @@ def workers(most: int | None = None, prepare: Callable[[], object] | None = None
 
 @contextmanager
 def processes(most: int | None = None, prepare: Callable[[], object] | None = None) -> Iterator["Executor"]:
-    """Processes of this machine, as many as there are cores and no more than `most`; `prepare` as for `workers`."""
-    # every command imports this module, few start processes
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
+    """Processes of this machine, as many as there are cores and no more than `most`; `prepare` as for `workers`.
 
+    A worker of `multiprocessing.Pool` may not start any: there one thread does the work.
+    """
+    # every command imports this module, few start processes
+    from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+    from multiprocessing import active_children, current_process, get_context
+
+    if current_process().daemon:
+        with ThreadPoolExecutor(1, initializer=prepare) as thread:
+            yield thread
+        return
     n = cores() if most is None else max(1, min(cores(), most))
     before = active_children()
     _prepared([])

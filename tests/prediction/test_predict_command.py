@@ -1,9 +1,12 @@
 """`wirebayes predict` from the command line: what it answers and what it refuses."""
 
 import csv
+import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -12,7 +15,9 @@ from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.problem import build
-from wirebayes.results.store import save
+from wirebayes.results.store import load, save
+from wirebayes.robot.mechanics.draws import warnings
+from wirebayes.workflows.wires import read_robot, wire_draws
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
 TRAINED = 8
@@ -192,3 +197,27 @@ def test_the_protocol_is_not_overwritten(
     assert cli.main(["predict", str(fits / "chain"), str(path), *name]) == 2
     assert "found the protocol itself, expected another file" in capsys.readouterr().err
     assert path.read_bytes() == before
+
+
+def test_what_speaks_against_the_fit_is_said_again(
+    fits: Path, protocol: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "fit"
+    shutil.copytree(fits / "chain" / "roc-line-1.71m", folder)
+    path, out = protocol([9]), tmp_path / "predicted.csv"
+    asked = ["predict", str(folder), str(path), "--output", str(out)]
+    assert cli.main(asked) == 0 and "warning" not in capsys.readouterr().err
+    summary = json.loads((folder / "summary.json").read_text())
+    (folder / "summary.json").write_text(json.dumps({"model_check": {"passed": True, "p": 0.3}} | summary))
+    assert cli.main(asked) == 0 and "warning" not in capsys.readouterr().err
+    (folder / "summary.json").write_text(json.dumps({"model_check": {"passed": False, "p": 0.0031}} | summary))
+    with h5py.File(folder / "posterior.nc", "r+") as file:
+        file["posterior"].attrs["converged"] = 0
+    assert cli.main(asked) == 0
+    shown = capsys.readouterr().err
+    assert "warning: the fit of roc-line-1.71m has not converged" in shown
+    assert "warning: the model fitted to roc-line-1.71m does not describe its readings (p = 0.0031)" in shown
+    line = wire_draws(load(folder), 10)
+    assert len(line.doubts) == 2
+    use = np.ones(7), 1.0, np.full(7, 1e-3 * line.length_mm)
+    assert warnings(read_robot("linear-7"), line, *use)[:2] == [*line.doubts]

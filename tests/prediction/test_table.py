@@ -1,6 +1,7 @@
 """The table of `predict` against the normal distribution that a single hold of a known wire has."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
 from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.prediction.table import HEADER, dataset, mixture_table, table
+from wirebayes.prediction.table import HEADER, beyond_tested, dataset, mixture_table, table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
@@ -33,6 +34,18 @@ def test_rows_as_a_dataset_have_names_and_units() -> None:
     }  # fmt: skip
     assert [found[name].attrs["units"] for name in HEADER[1:]] == ["1", "mm", "s", "N", "N", "N", "N", "N"]
     assert dataset(rows[:1], {}).attrs["experiment"] == "roc"
+
+
+@pytest.mark.parametrize(("tension", "time", "found"), [(6.0, 1200.0, []), (6.01, 5.0, ["N"]), (1.0, 1201.0, ["s"])])
+def test_what_is_far_beyond_the_tests_is_said(tension: float, time: float, found: list[str]) -> None:
+    """Twice the largest tension read, ten times the longest hold that was read: no padding, no unrecorded hold."""
+    mask = np.array([[True, True, True], [True, False, False], [False, False, False]])
+    readings = np.where(mask, 3.0, 99.0)[..., None]
+    protocol = SimpleNamespace(mask=mask, recorded=mask.any(axis=1), duration_s=np.array([120.0, 30.0, 9e9]))
+    stored: Any = SimpleNamespace(sample=SimpleNamespace(protocol=protocol, readings=readings))
+    rows = [["wire", 1, 2.0, 5.0, *np.ones(5)], ["wire", 2, 4.0, time, 9.0, 9.0, 9.0, tension, 9.0]]
+    sentences = beyond_tested(rows, stored)
+    assert [sentence.split(" ")[5] for sentence in sentences] == found
 
 
 def test_quantiles_are_those_of_the_known_normal() -> None:

@@ -120,7 +120,7 @@ def test_a_fits_posterior_is_the_guess(fitted, measured, plan_file, tmp_path):
     posterior = wb.load(fitted).draws()["k1"]
     planned = wb.plan(fitted, tests=4)
     guess = planned.summary()["guess"]
-    assert guess["source"] == f"the posterior of wire in {fitted.name}"
+    assert guess["source"].split("; ") == [f"the posterior of wire in {fitted.name}", *wb.load(fitted).stored().doubts]
     assert guess["parameters"]["k1"]["q50"] == pytest.approx(float(sorted(posterior)[len(posterior) // 2]), rel=0.05)
     head, _, rest = PLAN.partition("[guess]")
     text = f'{head}posterior = "{fitted}"\n[[protocol]]{rest.partition("[[protocol]]")[2]}'

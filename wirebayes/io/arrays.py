@@ -1,11 +1,12 @@
 """Tests and protocols that stand in memory: columns of numbers, checked as the reader of files checks its own."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, experiment_of
@@ -27,7 +28,7 @@ def from_arrays(
     material: str,
     temperature_C: Iterable[float] | None = None,
     resolution_N: float = 0.0,
-    unrecorded_holds: Sequence[Mapping[str, float]] = (),
+    unrecorded_holds: Sequence[Mapping[str, float]] | None = None,
 ) -> Experiment:
     """One test of one wire from columns in memory.
 
@@ -49,7 +50,7 @@ def from_arrays(
     temperature_C : (r,) array, optional
     resolution_N : float
         Step to which tensions were rounded; 0 where they were not.
-    unrecorded_holds : sequence of mapping
+    unrecorded_holds : sequence of mapping, optional
         Holds without readings: ``before_hold``, ``displacement_mm`` and ``duration_s`` each.
 
     Returns
@@ -85,7 +86,7 @@ def from_arrays(
     about = {"name": name, "material": material, "length_mm": length_mm}
     if resolution_N != 0:
         about["resolution_N"] = resolution_N
-    if len(unrecorded_holds):
+    if unrecorded_holds is not None and len(unrecorded_holds):
         about["unrecorded_holds"] = [dict(each) for each in unrecorded_holds]
     keys = _Arguments(SOURCE, "", None, _plain(about), name if isinstance(name, str) else "")
     return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL))
@@ -134,7 +135,7 @@ def table_of(
     header = [name for name in known if name in names]
     texts: list[list[str]] = []
     for name in header:
-        values = np.asarray(columns[name], dtype=object)
+        values = _objects(columns[name])
         if values.ndim != 1 or (texts and len(values) != len(texts[0])):
             found = f"an array of shape {values.shape}" if values.ndim != 1 else f"{len(values)} values"
             expected = f"{len(texts[0])} as in {header[0]}" if texts else "one value for each reading"
@@ -163,6 +164,13 @@ class _Arguments(Keys):
 
 def _names(columns: Any) -> list[Any]:
     return list(columns.columns) if hasattr(columns, "columns") else list(columns)
+
+
+def _objects(values: Any) -> NDArray[np.object_]:
+    """Values of a column, those that a mask hides as NaN."""
+    if np.ma.isMaskedArray(values):
+        values = np.ma.filled(values.astype(object), np.nan)
+    return np.asarray(list(values) if isinstance(values, Iterator) else values, dtype=object)
 
 
 def _plain(value: Any) -> Any:

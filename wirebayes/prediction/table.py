@@ -10,10 +10,12 @@ import xarray as xr
 from wirebayes.inference.fit import seed_of
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
+from wirebayes.results.store import Stored
 from wirebayes.typing import Floats
 
 HEADER = ("experiment", "hold", "displacement_mm", "time_s", "mean_N", "sd_N", "q05_N", "q50_N", "q95_N")
 FAR_OFF = 5.0  # standard deviations of a first reading: one in a million by chance, a wrong unit is at hundreds
+FAR_UP, FAR_ON = 2.0, 10.0  # times the largest tested tension, and the longest tested hold: nothing there was tested
 _FEW = 500  # draws, enough for a standard deviation
 DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
@@ -82,6 +84,28 @@ def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: in
                 f"deviations from the {mean:.4g} N expected there: check tension_N (in N?) and displacement_mm; what "
                 "follows from it is not to be relied on"
             )
+    return out
+
+
+def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[str]:
+    """A sentence where predicted tensions, and one where times, are far beyond what the posterior was learned from.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        Of a table.
+    stored : Stored
+        A posterior behind it.
+    """
+    protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
+    highest, longest = float(readings[protocol.mask].max()), float(protocol.duration_s[protocol.recorded].max())
+    tension = max(row[HEADER.index("q50_N")] for row in rows)
+    time = max(row[HEADER.index("time_s")] for row in rows)
+    out = []
+    if tension > FAR_UP * highest:
+        out.append(f"tensions of up to {tension:.4g} N are predicted; none above {highest:.4g} N was tested")
+    if time > FAR_ON * longest:
+        out.append(f"holds of up to {time:.4g} s are predicted; none longer than {longest:.4g} s was tested")
     return out
 
 

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +18,7 @@ from wirebayes import __version__
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
-from wirebayes.io.run_folder import stored_results, write_bytes, write_json
+from wirebayes.io.run_folder import read_json, stored_results, write_bytes, write_json
 from wirebayes.json_files.summary import Derived, Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.prior import Prior
@@ -109,12 +109,15 @@ class Stored:
     likelihood : {"chain", "hold"}
     length_exponent : (n,) array or None
         Where samples of two lengths were fitted together: creep grows as length to this power.
+    doubts : tuple of str
+        What the fit itself says against using it: that it has not converged, that its model failed the check.
     """
 
     draws: dict[str, Array]
     sample: Sample
     likelihood: str
     length_exponent: Array | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -174,7 +177,22 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
             raise InputError(f"{path}: holds {', '.join(names)}; say which with --experiment")
         if experiment is not None and experiment not in names:
             raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
-        return _stored(groups, path, names.index(experiment or names[0]), own_effects)
+        stored = _stored(groups, path, names.index(experiment or names[0]), own_effects)
+        return replace(stored, doubts=_doubts(groups, stored.sample.name, folder / "summary.json"))
+
+
+def _doubts(groups: Mapping[str, xr.Dataset], name: str, summary: Path) -> tuple[str, ...]:
+    """What a fit says against using it, and its check, which is in the summary beside it if there was one."""
+    out = []
+    if not groups["posterior"].attrs.get("converged", 1):
+        out.append(f"the fit of {name} has not converged: nothing that follows from it is to be relied on")
+    check = read_json(summary).get("model_check") if summary.is_file() else None
+    if check and check["passed"] is False:
+        out.append(
+            f"the model fitted to {name} does not describe its readings (p = {check['p']:.2g}): what follows from it "
+            "can be wrong by more than is said; wirebayes discover looks for what is missing"
+        )
+    return tuple(out)
 
 
 def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:

@@ -14,7 +14,7 @@ from wirebayes.units import nearest
 PathLike = str | os.PathLike[str]
 Source = PathLike | Experiment | Sequence[Experiment]
 Progress = Callable[[str, float, float], None]
-Numbers = str | Sequence[float]  # text is what the command line was given: it stands in the configuration
+Numbers = str | float | Sequence[float]  # text is what the command line was given: it stands in the configuration
 
 
 def silent(name: str, done: float, total: float) -> None:
@@ -112,7 +112,15 @@ def text_of(values: Numbers) -> str:
     """Numbers as the command line spells them."""
     if isinstance(values, str):
         return values
-    return ",".join(repr(float(value)).removesuffix(".0") for value in values)
+    return ",".join(map(_spelled, np.atleast_1d(np.asarray(values, dtype=object))))
+
+
+def _spelled(value: Any) -> str:
+    """A number as the command line has it; anything else as it shows itself, for the message that refuses it."""
+    try:
+        return repr(float(value)).removesuffix(".0")
+    except (TypeError, ValueError):
+        return str(value)
 
 
 def numbers(option: str, values: Numbers, count: int | None = None) -> Any:

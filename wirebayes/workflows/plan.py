@@ -256,7 +256,7 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
         message = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
         raise InputError(f"{folder}: {message}")
     sample = stored.sample
-    source = f"the posterior of {sample.name} in {folder.name}"
+    source = "; ".join([f"the posterior of {sample.name} in {folder.name}", *stored.doubts])
     guess = from_posterior(stored.draws, sample.protocol.length_mm, source, n)
     return guess, {"posterior": hash_of(guess.draws)}, sample
 

@@ -10,7 +10,7 @@ from wirebayes.io.arrays import is_table, protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.prediction.request import request_of
-from wirebayes.prediction.table import HEADER, dataset, mixture_table, unlikely_readings
+from wirebayes.prediction.table import HEADER, beyond_tested, dataset, mixture_table, unlikely_readings
 from wirebayes.results import store
 from wirebayes.results.mixture import members_of
 from wirebayes.results.store import Stored
@@ -60,7 +60,8 @@ def predict(
     xarray.Dataset
         Dimension ``reading``, a row of the protocol each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``,
         ``q95_N`` with units as attributes. The attribute ``prediction`` says which sample was predicted, given what;
-        ``warnings``, where there is one, which given readings are far from what was expected.
+        ``warnings``, where there is one, what speaks against the posterior, what lies far beyond the tested range, and
+        which given readings are far from what was expected.
 
     Raises
     ------
@@ -100,8 +101,9 @@ def predict(
         sentence += (
             f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
         )
-    unlikely = unlikely_readings(requests, seed)
-    return dataset(rows, {"prediction": sentence, "seed": seed} | ({"warnings": unlikely} if unlikely else {}))
+    warnings = [*dict.fromkeys(doubt for _, stored in members for doubt in stored.doubts)]
+    warnings += [*beyond_tested(rows, members[0][1]), *unlikely_readings(requests, seed)]
+    return dataset(rows, {"prediction": sentence, "seed": seed} | ({"warnings": warnings} if warnings else {}))
 
 
 def stored_posteriors(

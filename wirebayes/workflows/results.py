@@ -1,5 +1,6 @@
 """What the public functions return: views of folders of results, which say in short what they hold."""
 
+import os
 import shutil
 import weakref
 from collections.abc import Iterator, Mapping
@@ -56,6 +57,8 @@ class Place:
     def at(cls, output: PathLike | None) -> "Place":
         """The folder named, or a temporary one."""
         if output is not None:
+            if not isinstance(output, str | os.PathLike):
+                raise InputError(f"output: found {output!r}, expected a path")
             return cls(Path(output))
         place = cls(Path(mkdtemp(prefix="wirebayes-")))
         weakref.finalize(place, shutil.rmtree, place.path, ignore_errors=True)

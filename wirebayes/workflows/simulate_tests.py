@@ -103,7 +103,7 @@ def simulate_tests(
     path = _path(displacements, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(path, sizes, moments, gaps)
-    warmth = _numbers("--temperature", temperature) if len(temperature) else []
+    warmth = _numbers("--temperature", temperature) if text_of(temperature) else []
     benches = [
         Bench(_name(tests, sizes, i, length), f"line-{i + 1}", length, float(resolution), path, moments, gaps, warmth)
         for i in range(tests)

@@ -223,6 +223,7 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
         time_range_s=(float(time.min()), float(time.max())),
         spread=dict(zip(CORE, found.spread.T, strict=True)),
         specimens=len(ones),
+        doubts=tuple(doubt for one in ones for doubt in one.doubts),
     )
 
 
@@ -305,6 +306,7 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
         (float(readings.min()), float(readings.max())),
         (0.0, float(protocol.duration_s.max())),
         sample.model.tension_ref_N,
+        doubts=stored.doubts,
     )
 
 

@@ -52,6 +52,8 @@ class WireDraws:
         parameters are then the line's. Empty: a stated spread is used.
     specimens : int
         How many were tested.
+    doubts : tuple of str
+        What the fits say against using them.
     """
 
     parameters: Mapping[str, Floats]
@@ -66,6 +68,7 @@ class WireDraws:
     others: Mapping[str, "WireDraws"] = field(default_factory=dict)
     spread: Mapping[str, Floats] = field(default_factory=dict)
     specimens: int = 1
+    doubts: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:
@@ -293,7 +296,7 @@ def _specimens(line: WireDraws) -> Specimens:
 
 
 def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    """One sentence for each way in which a use leaves what was tested.
+    """One sentence for each doubt about a line's fit, and for each way in which a use leaves what was tested.
 
     Parameters
     ----------
@@ -322,7 +325,7 @@ def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, ze
 
 
 def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    out = []
+    out = list(line.doubts)
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:
         low, high = line.tension_range_N
