@@ -204,7 +204,23 @@ def with_more(
     rng: np.random.Generator,
     parallel_map: ParallelMap,
 ) -> list[Replicates]:
-    """What was simulated for each block, if anything was, with `n` data sets more (see `simulated_with_patterns`)."""
+    """What was simulated for each block, with more data sets (see `simulated_with_patterns`).
+
+    Parameters
+    ----------
+    simulated : sequence of Replicates
+        One a block; empty where nothing was simulated yet.
+    blocks, trials, rng
+        As for `simulated_with_patterns`; every block has a generator of its own.
+    n : int
+        How many more.
+    parallel_map : function
+        The built-in `map`, or one over processes.
+
+    Returns
+    -------
+    list of Replicates
+    """
     more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
     pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
     return [screening.joined_replicates(parts) for parts in pairs]
