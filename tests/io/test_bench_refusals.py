@@ -116,6 +116,23 @@ def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, message):
         read(tmp_path, text)
 
 
+@pytest.mark.parametrize("header", [HEADER, "hold," + HEADER, HEADER.replace("Zeit [s]", "Uhrzeit")])
+@pytest.mark.parametrize("of_test", [False, True])
+def test_rows_with_the_newest_first_are_refused(tmp_path, header, of_test):
+    """Each would be a hold of one reading."""
+    rows = []
+    for h in (1, 2, 3, 4):
+        for i in range(4):
+            s = 30 * i + 150 * (h - 1) * of_test
+            time = f"10:{s // 60:02d}:{s % 60:02d}" if "Uhrzeit" in header else s
+            rows.append(f"{f'{h},' * header.startswith('hold')}{h},{time},{2 * h - i / 10}\n")
+    assert len(read(tmp_path, header + "".join(rows)).experiment.holds) == 4
+    with pytest.raises(
+        wb.InputError, match=r"line 3, column \d \(.*\): found \d+ s after \d+ s, and times that fall in "
+    ):
+        read(tmp_path, header + "".join(reversed(rows)))
+
+
 def test_a_displacement_downwards_is_turned_and_one_upwards_from_below_zero_is_read(tmp_path):
     turned = read(tmp_path, DOWN, mapping=("Weg [mm]=displacement [-mm]",))
     assert [row[1] for row in turned.rows[::2]] == [1.0, 2.0, 3.0]

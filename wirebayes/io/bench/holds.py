@@ -26,6 +26,7 @@ ARRIVING = 2  # readings by which the end of a move is known: none of them count
 LONG = 10  # times as many readings: shorter holds have none to spare
 AFTER_MOVE = 0.1  # of a hold at most is left out after a slow move
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
+BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,10 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
     Raises
     ------
     InputError
-        The displacement never stays, or times fall within a hold; `Undecided` where times may count from the beginning
-        of each hold or of the test.
+        The displacement never stays, times fall within a hold, or the newest reading stands first; `Undecided` where
+        times may count from the beginning of each hold or of the test.
     """
+    _check_order(readings)
     x, time = readings.displacement_mm, readings.time_s
     if readings.of_day and time_since == "hold":
         raise InputError(f"--time-since hold: found moments of a day in {readings.time_name}, which restart nowhere")
@@ -115,6 +117,19 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
     if 2 * len(groups) <= len(x) and (usual < CONTINUOUS or no_moves):
         return _in_groups(readings, groups, time_since)
     return _by_plateaus(readings, "")
+
+
+def _check_order(readings: Readings) -> None:
+    """Refuse rows whose newest reading stands first: each would become a hold of its own."""
+    time = readings.time_s
+    steps = np.arange(1, len(time))
+    if readings.hold is not None:  # holds of one reading each may last ever shorter
+        steps = steps[np.diff(readings.hold) == 0]
+    falling = steps[time[steps] < time[steps - 1]]
+    if len(falling) > BACKWARDS * len(steps):
+        row = int(falling[0])
+        found = f"{time[row]:g} s after {time[row - 1]:g} s, and times that fall in {len(falling)} of {len(steps)} rows"
+        raise readings.complain(row, "time", found, "rows in the order of time, the oldest first; turn them round")
 
 
 def _groups(border: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
