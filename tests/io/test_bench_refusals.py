@@ -188,6 +188,58 @@ def test_moments_of_a_day_pass_midnight(tmp_path):
     assert [row[2] for row in found] == [0.0, 30.0, 0.0, 30.0, 60.5]
 
 
+@pytest.mark.parametrize(
+    "moments",
+    [
+        ("2026-06-14T23:59:00Z", "2026-06-14T23:59:30Z", "2026-06-15T00:00:10Z", "2026-06-15T00:00:40.5Z"),
+        ("2026-10-25T02:59:00+02:00", "2026-10-25T2:59:30+0200", "2026-10-25 2:00:10 +01:00", "2026-10-25 2:00:40.5+01"),
+        ("06/14/2026 11:59:00 PM", "06/14/2026 11:59:30 PM", "06/15/2026 12:00:10 AM", "06/15/2026 12:00:40.5 AM"),
+        ("11:59:00 am", "11:59:30 am", "12:00:10 p.m.", "12:00:40.5 p.m."),
+        ("11:59:00 PM", "11:59:30 PM", "12:00:10 AM", "12:00:40.5 AM"),
+        ("14-06-2026 10:00:00", "14-06-2026 10:00:30", "14-06-2026 10:01:10", "14-06-2026 10:01:40.5"),
+        ("05-06-2026 10:00:00", "05-06-2026 10:00:30", "05-06-2026 10:01:10", "05-06-2026 10:01:40.5"),
+        ("12/06/2026 23:59:00", "12/06/2026 23:59:30", "13/06/2026 0:00:10", "13/06/2026 0:00:40.5"),
+        ("31-Dec-2025 23:59:00", "31-Dec-2025 23:59:30", "1-Jan-2026 0:00:10", "1-Jan-26 0:00:40.5"),
+        ("30. Mai 2026 23:59:00", "30. Mai 2026 23:59:30", "31. Mai 2026 0:00:10", "31. Mai 2026 0:00:40,5"),
+        ("20260614 10:00:00", "20260614 10:00:30", "20260614 10:01:10", "20260614T10:01:40.5"),
+        ("2026/06/14 10:00:00", "2026/06/14 10:00:30", "2026/06/14 10:01:10", "2026/06/14 10:01:40.5"),
+    ],
+)  # fmt: skip
+def test_dates_of_many_countries_are_the_same_times(tmp_path, moments):
+    begin, *others, end = moments
+    times = (begin, *others, end, *others, end)
+    rows = "".join(f"{m};{h};{h};{2 * h}\n" for m, h in zip(times, (1, 1, 2, 2, 3, 4, 4), strict=True))
+    found = read(tmp_path, "Timestamp;Stufe;Weg [mm];Kraft [N]\n" + rows).rows
+    assert [row[2] for row in found] == [0.0, 30.0, 0.0, 30.5, 0.0, 0.0, 30.5]
+
+
+@pytest.mark.parametrize("moments", ["2026-06-14 9:59|2026-06-14 10:00", "11:59 AM|12:00 PM", "12:59 AM|1:00 AM"])
+def test_minutes_of_a_date_or_of_half_a_day_are_no_question(tmp_path, moments):
+    first, last = moments.split("|")
+    rows = f"{first};1;1;2\n{last};1;1;1.9\n{first};2;2;4\n{last};2;2;3.9\n{last};3;3;6\n"
+    found = read(tmp_path, "Timestamp;Stufe;Weg [mm];Kraft [N]\n" + rows, time_since="test").rows
+    assert [row[2] for row in found] == [0.0, 60.0, 0.0, 60.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "message"),
+    [
+        ("14 juin 2026 10:00:00", "14 juin 2026 10:00:30", "found '14 juin .*0', expected a time such as .*31-May"),
+        ("05/06/2026 10:00:00", "06/06/2026 10:00:30", "found '05/06/2026', which may begin with the day or"),
+        ("14/06/2026 10:00:00", "06/15/2026 10:00:30", "found '14/06/2026', expected a date such as 2024-05-31"),
+        ("14/14/2026 10:00:00", "14/14/2026 10:00:30", "found '14/14/2026', expected a date such as 2024-05-31"),
+        ("13:00:00 PM", "01:00:30 PM", "found '13:00:00 PM', expected a time such as 0:01:30 or 10:01:30 AM"),
+        ("2026-06-14 10:00:00", "10:00:30", "found '10:00:30', expected a time with a date, as in the lines"),
+        ("2026-06-14 10:00:00", "2026-06-14 10:00:30Z", "found .*30Z', expected a time without an offset from UTC, as"),
+        ("2026-06-14", "2026-06-14", "found '2026-06-14', expected a time such as"),
+    ],
+)  # fmt: skip
+def test_dates_that_are_not_clear_are_refused_with_those_that_are(tmp_path, first, last, message):
+    for header in ("Timestamp", "Timestamp [s]") if "juin" in first else ("Timestamp",):
+        with pytest.raises(wb.InputError, match=rf"line \d, column 1 \(Timestamp.*\): {message}"):
+            read(tmp_path, f"{header};Weg [mm];Kraft [N]\n{first};1;2\n{last};1;1.9\n{last};2;4\n{last};2;4.1\n")
+
+
 def test_what_is_harmless_is_done_and_said(tmp_path):
     text = "Stufe,Weg [mm],Zeit [s],Kraft [N]\n1,1,0,2.1\n,,30,2\n,,30,2\n,,60,1.9\n4,2,0,4\n,,30,3.9\nend of test\n"
     found = read(tmp_path, text)

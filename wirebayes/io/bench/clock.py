@@ -1,21 +1,30 @@
 """Times as seconds: plain numbers in a unit, clocks (m:ss, h:mm:ss), dates with clocks; midnight passes."""
 
 import re
+from collections.abc import Sequence
 from datetime import date
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import Unit
-from wirebayes.io.bench.sheet import is_moment
+from wirebayes.io.bench.sheet import MONTHS, is_moment, is_value, moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.readings import shown
 
-_CLOCK = re.compile(r"(\d{1,12}):(\d{1,2})(?::(\d{1,2}))?(?:[.,](\d+))?")
 _DAY = 86400.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
+_LAST_MONTH = 12  # a larger number in a date is a day
+UNDERSTOOD = (
+    "a time such as 0:01:30 or 10:01:30 AM, or with a date such as 2024-05-31 10:01:30, 2024-05-31T10:01:30+02:00, "
+    "20240531 10:01:30, 31.05.2024 10:01:30, 05/31/2024 10:01:30 AM or 31-May-2024 10:01:30"
+)
+
+
+def looks_like_a_moment(cell: str) -> bool:
+    """Whether a cell has the three numbers or more of a clock or a date, but is none that is understood."""
+    return not is_value(cell) and len(re.findall(r"\d+", cell)) > 2
 
 
 def has_moments(table: RawTable, column: int) -> bool:
@@ -44,32 +53,49 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     InputError
         A cell is no clock; `Undecided` where ``a:b`` may be minutes or hours.
     """
-    days, clocks = [], []
+    moments: list[re.Match[str]] = []
     for row in table.rows:
-        cell = row.cell(column)
-        day, _, clock = cell.replace("T", " ").rpartition(" ") if is_moment(cell) and len(cell) > 10 else ("", "", cell)
-        days.append(_day(table, row.line, column, day.strip()) if day else 0.0)
-        found = _CLOCK.fullmatch(clock)
-        if not found:
-            raise table.complain(row.line, column, shown(cell), "a time such as 0:01:30, as in the lines before")
-        clocks.append(found)
-    short = next((i for i, m in enumerate(clocks) if m[3] is None), None)
+        found = moment(row.cell(column))
+        if found is None or found["first"] is None or (found["half"] and not 1 <= int(found["first"]) <= 12):
+            raise table.complain(row.line, column, shown(row.cell(column)), UNDERSTOOD)
+        moments.append(found)
+        for part, called in (("date", "a date"), ("zone", "an offset from UTC")):
+            if (found[part] is None) != (moments[0][part] is None):
+                expected = f"a time with{'out' * (moments[0][part] is None)} {called}, as in the lines before"
+                raise table.complain(row.line, column, shown(row.cell(column)), expected)
+    # what follows a date or stands before AM is of the day, and leaves no doubt
+    of_clock = [m["date"] is None and m["half"] is None for m in moments]
+    short = next((i for i, m in enumerate(moments) if of_clock[i] and m["third"] is None), None)
     leading = 3600.0
     if short is not None:
-        leading = _leading(table, column, unit, short, any(m[4] for m in clocks if m[3] is None))
-    values = np.array([_value(m, leading) for m in clocks])
-    if any(days):
-        return np.array(days) + values - days[0], True
-    of_day = short is None and values[0] >= 3600.0
+        fractions = any(m["fraction"] for m, bare in zip(moments, of_clock, strict=True) if bare and m["third"] is None)
+        leading = _leading(table, column, unit, short, fractions)
+    values = np.array([_value(m, leading if bare else 3600.0) for m, bare in zip(moments, of_clock, strict=True)])
+    if moments[0]["date"] is not None:
+        days = _days(table, column, moments)
+        return (days - days[0]) + values, True
+    of_day = short is None and (not of_clock[0] or values[0] >= 3600.0)
     falls = np.concatenate([[False], np.diff(values) < -_MIDNIGHT])
     return values + _DAY * np.cumsum(falls), of_day
 
 
 def _value(found: re.Match[str], leading: float) -> float:
-    fraction = float(f"0.{found[4]}") if found[4] else 0.0
-    if found[3] is not None:
-        return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + int(found[3]) + fraction
-    return leading * int(found[1]) + leading / 60.0 * int(found[2]) + fraction
+    """Seconds since midnight in Greenwich, if the offset from UTC is given, or on the clock."""
+    fraction = float(f"0.{found['fraction']}") if found["fraction"] else 0.0
+    first, second = int(found["first"]), int(found["second"])
+    if found["half"]:  # 12 AM is midnight, 12 PM noon
+        first = first % 12 + 12 * (found["half"] in "pP")
+    if found["third"] is None:
+        return leading * first + leading / 60.0 * second + fraction - _offset(found["zone"])
+    return 3600.0 * first + 60.0 * second + int(found["third"]) + fraction - _offset(found["zone"])
+
+
+def _offset(zone: str | None) -> float:
+    """Seconds by which clocks of a zone are ahead of UTC."""
+    if zone is None or zone.upper() in ("Z", "UTC"):
+        return 0.0
+    digits = zone[1:].replace(":", "").ljust(4, "0")
+    return (1.0 if zone[0] == "+" else -1.0) * (3600.0 * int(digits[:2]) + 60.0 * int(digits[2:]))
 
 
 def _leading(table: RawTable, column: int, unit: Unit | None, row: int, fractions: bool) -> float:
@@ -87,18 +113,43 @@ def _leading(table: RawTable, column: int, unit: Unit | None, row: int, fraction
     )
 
 
-def _day(table: RawTable, line: int, column: int, text: str) -> float:
-    parts = [int(part) for part in re.split(r"[-./]", text)]
-    try:
-        if "-" in text:
-            return date(*parts).toordinal() * _DAY
-        if "/" in text and parts[0] <= 12 and parts[1] <= 12 and parts[0] != parts[1]:
-            days = {row.cell(column).partition(" ")[0] for row in table.rows}
-            if len(days) > 1:
-                raise table.complain(line, column, repr(text), "a date such as 2024-05-31, which has one reading only")
-        day, month = (parts[0], parts[1]) if "." in text or parts[0] > 12 else (parts[1], parts[0])
-        return date(parts[2] if parts[2] > 99 else 2000 + parts[2], month, day).toordinal() * _DAY
-    except InputError:
-        raise
-    except ValueError:
-        raise table.complain(line, column, repr(text), "a date such as 2024-05-31") from None
+def _days(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> NDArray[np.float64]:
+    """Seconds from the beginning of the calendar to each date."""
+    day_first = _day_first(table, column, moments)
+    days = []
+    for row, found in zip(table.rows, moments, strict=True):
+        text = found["date"]
+        parts = [text[:4], text[4:6], text[6:]] if found["compact"] else re.split(r"[-./ ]+", text)
+        if found["named"]:
+            parts[1] = str(MONTHS[parts[1][:3].lower()])
+        numbers = [int(part) for part in parts]
+        if found["named"] or (found["year_last"] and (day_first or "." in text)):
+            numbers = numbers[::-1]
+        elif found["year_last"]:
+            numbers = [numbers[2], numbers[0], numbers[1]]
+        year, month, day = numbers
+        try:
+            days.append(date(year if year > 99 else 2000 + year, month, day).toordinal() * _DAY)
+        except ValueError:
+            raise table.complain(row.line, column, repr(text), "a date such as 2024-05-31") from None
+    return np.array(days)
+
+
+def _day_first(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> bool:
+    """Whether days stand before months between slashes or dashes: a number above 12 decides for the whole column.
+
+    Dates between points are written in countries that begin with the day. Where nothing decides and there are several
+    dates, the time between them is not known.
+    """
+    dates = {m["date"]: i for i, m in reversed([*enumerate(moments)]) if m["year_last"] and "." not in m["date"]}
+    parts = {text: [int(part) for part in re.split(r"[-/]", text)[:2]] for text in dates}
+    if any(second > _LAST_MONTH for _, second in parts.values()):
+        return False
+    if any(first > _LAST_MONTH for first, _ in parts.values()):
+        return True
+    unclear = [text for text, (first, second) in parts.items() if first != second]
+    if unclear and len(dates) > 1:
+        row = min(dates[text] for text in unclear)
+        found = f"{moments[row]['date']!r}, which may begin with the day or with the month"
+        raise table.complain(table.rows[row].line, column, found, "a date such as 2024-05-31, or readings of one day")
+    return True

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.clock import has_moments
+from wirebayes.io.bench.clock import UNDERSTOOD, has_moments, looks_like_a_moment
 from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, unit_of
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
+from wirebayes.io.readings import shown
 from wirebayes.sentences import listed
 from wirebayes.units import nearest
 
@@ -185,6 +186,9 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
                 table.header_line, index, f"the unit {bracket[2]!r}", f"one of {role}{_units(role)}; or --map "
                 f'"{header}={role} [{UNITS[role]}]" if that is what it means'
             )  # fmt: skip
+        first = table.rows[0]
+        if role == "time" and looks_like_a_moment(first.cell(index)):
+            raise table.complain(first.line, index, shown(first.cell(index)), UNDERSTOOD)
         raise Undecided(
             f"{table.sheet.path}, {table.place(table.header_line, index)}: found no unit",
             f"the unit of {role}",

@@ -224,6 +224,8 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
         if number is None:
             sign = "comma" if decimal == "comma" else "point"
             expected = f"a number (decimal {sign}, as elsewhere in the file)"
+            if column.role == "time" and clock.looks_like_a_moment(row.cell(column.index)):
+                expected = clock.UNDERSTOOD
             raise table.complain(row.line, column.index, shown(row.cell(column.index)), expected)
         out.append(number)
     return out

@@ -6,8 +6,22 @@ from pathlib import Path
 
 _SPACES = " \u00a0\u2009\u202f"
 _NUMBER = re.compile(rf"[+\-\u2212]?(\d{{1,3}}([.,'\u2019{_SPACES}]\d{{3}})+|\d*)([.,]\d*)?([eE][+-]?\d+)?")
-_CLOCK = r"\d+:\d{1,2}(:\d{1,2})?([.,]\d+)?"
-_MOMENT = re.compile(rf"(\d{{4}}-\d{{1,2}}-\d{{1,2}}|\d{{1,2}}[./]\d{{1,2}}[./]\d{{2,4}})([T ]+{_CLOCK})?|{_CLOCK}")
+# By the first three letters of their names in English and German.
+MONTHS = {
+    "jan": 1, "feb": 2, "mar": 3, "apr": 4, "may": 5, "jun": 6, "jul": 7, "aug": 8, "sep": 9, "oct": 10, "nov": 11,
+    "dec": 12, "mär": 3, "mrz": 3, "mai": 5, "okt": 10, "dez": 12,
+}  # fmt: skip
+_DATE = (
+    r"(?P<year_first>\d{4}(?P<sign>[-./])\d{1,2}(?P=sign)\d{1,2})|(?P<compact>\d{8}(?=[T ]+\d))"
+    r"|(?P<year_last>\d{1,2}[./]\d{1,2}[./]\d{2,4}|\d{1,2}-\d{1,2}-\d{4})"
+    rf"|(?P<named>\d{{1,2}}[-. /]{{1,2}}({'|'.join(MONTHS)})[^\W\d_]{{0,6}}[-. /]{{1,2}}(\d{{4}}|\d{{2}}))"
+)
+_CLOCK = (
+    r"(?P<first>\d{1,12}):(?P<second>\d{1,2})(:(?P<third>\d{1,2}))?([.,](?P<fraction>\d+))?"
+    r"( ?(?P<half>[ap])\.?m\.?)?(?(date) ?(?P<zone>Z|UTC|[+\-\u2212]\d{2}(:?\d{2})?)?)"
+)
+_MOMENT = re.compile(rf"(?P<date>{_DATE})([T ]+{_CLOCK})?", re.IGNORECASE)
+_BARE_CLOCK = re.compile(rf"(?P<date>(?!))?{_CLOCK}", re.IGNORECASE)  # the same groups, without a date
 
 
 @dataclass(frozen=True)
@@ -77,9 +91,14 @@ def is_number(cell: str) -> bool:
     return bool(_NUMBER.fullmatch(cell)) and any(c.isdigit() for c in cell.lower().partition("e")[0])
 
 
+def moment(cell: str) -> re.Match[str] | None:
+    """The parts of a cell that is a clock, a date, or both: the groups of the patterns above; None where it is none."""
+    return _BARE_CLOCK.fullmatch(cell) or _MOMENT.fullmatch(cell)
+
+
 def is_moment(cell: str) -> bool:
     """Whether a cell looks like a date or a clock."""
-    return bool(_MOMENT.fullmatch(cell))
+    return moment(cell) is not None
 
 
 def is_value(cell: str) -> bool:
