@@ -18,6 +18,7 @@ CLOCK = "Weg [mm],Zeit,Kraft [N]\n" + "".join(
     f"{h},{h - 1}:{t:02d},{h}.{9 - t // 10}\n" for h in range(1, 5) for t in (0, 20, 50)
 )
 DOWN = "Weg [mm],Zeit [s],Kraft [N]\n-1,0,2.2\n-1,30,2.1\n-2,0,4.1\n-2,30,3.9\n-3,0,6.2\n-3,30,6.0\n"
+BOTH_INVERTED = HEADER + "".join(f"{-h},{t},{-3 * h + t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
 PUSH = HEADER + "".join(f"{h},{t},{-2 * h + t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
 TWO_HOLDS = "hold," + HEADER + "1,1,0,2\n1,1,30,1.9\n2,2,60,4\n2,2,90,3.9\n2,2,120,3.8\n"
 POSITION = HEADER + "".join(f"{520 + h},{t},{2 * h - t / 300}\n" for h in range(1, 6) for t in (0, 30, 60))
@@ -102,6 +103,11 @@ def test_each_answer_means_what_it_says(tmp_path):
         (HEADER.replace("[N]", "[V]") + BODY, r"line 1, column 3 \(Kraft .V.\): found the unit 'V', expected one of"),
         (HEADER.replace("Zeit [s]", "Kanal 7") + BODY, "line 1: found no column of time among Weg"),
         (PUSH, r"line 14, column 3 .*expected a pull .*with --map \"Kraft \[N\]=tension \[-N\]\""),
+        (
+            BOTH_INVERTED,
+            r"line 14, column 3 .*found -15.0, expected a pull counted positive: change the signs with "
+            r"--map \"Weg \[mm\]=displacement \[-mm\]\" --map \"Kraft \[N\]=tension \[-N\]\" \(a slack wire",
+        ),
         (DOWN, r"line 2, column 1 .*down to -3 mm, .*with --map \"Weg \[mm\]=displacement \[-mm\]\""),
         (HEADER + "1,0,2\n1,30,1.9\n2,0,4\n2,30,3.9\n", "raw.csv: found 2 holds with 4 readings, expected at least 2"),
         (
@@ -114,6 +120,11 @@ def test_each_answer_means_what_it_says(tmp_path):
 def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, message):
     with pytest.raises(wb.InputError, match=message):
         read(tmp_path, text)
+
+
+def test_compression_counted_positive_is_turned_as_the_message_says(tmp_path):
+    turned = read(tmp_path, BOTH_INVERTED, mapping=("Weg [mm]=displacement [-mm]", "Kraft [N]=tension [-N]"))
+    assert [turned.rows[i][1:] for i in (0, -1)] == [[1.0, 0.0, 3.0], [5.0, 60.0, 14.8]]
 
 
 @pytest.mark.parametrize("header", [HEADER, "hold," + HEADER, HEADER.replace("Zeit [s]", "Uhrzeit")])
@@ -192,7 +203,7 @@ def test_moments_of_a_day_pass_midnight(tmp_path):
     "moments",
     [
         ("2026-06-14T23:59:00Z", "2026-06-14T23:59:30Z", "2026-06-15T00:00:10Z", "2026-06-15T00:00:40.5Z"),
-        ("2026-10-25T02:59:00+02:00", "2026-10-25T2:59:30+0200", "2026-10-25 2:00:10 +01:00", "2026-10-25 2:00:40.5+01"),
+        ("2026-10-25T2:59:00+02:00", "2026-10-25T2:59:30+0200", "2026-10-25 2:00:10 +01:00", "2026-10-25 2:00:40.5+01"),
         ("06/14/2026 11:59:00 PM", "06/14/2026 11:59:30 PM", "06/15/2026 12:00:10 AM", "06/15/2026 12:00:40.5 AM"),
         ("11:59:00 am", "11:59:30 am", "12:00:10 p.m.", "12:00:40.5 p.m."),
         ("11:59:00 PM", "11:59:30 PM", "12:00:10 AM", "12:00:40.5 AM"),

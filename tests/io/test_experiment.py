@@ -339,6 +339,14 @@ def test_tensions_with_the_sign_flipped_are_refused(tmp_path):
     zeroed = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: h - 4.2 - 0.001 * t)
     with pytest.raises(InputError, match=r"line 4, column 4 \(tension_N\): found -3.260, expected .* undo the zeroing"):
         read_readings(zeroed, 1000.0)
+    pressed = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: -h + 0.001 * t)
+    header, *rows = pressed.read_text().splitlines()
+    place = header.split(",").index("displacement_mm")
+    cells = [row.split(",") for row in rows]
+    turned = [",".join([*row[:place], f"-{row[place]}", *row[place + 1 :]]) for row in cells]
+    pressed.write_text("\n".join([header, *turned]) + "\n")
+    with pytest.raises(InputError, match="counted positive: change the signs of displacement_mm and of tension_N"):
+        read_readings(pressed, 1000.0)
 
 
 @pytest.mark.parametrize(

@@ -330,8 +330,10 @@ def _check_sign(table: Table, holds: Sequence[Hold]) -> None:
     follows = float(np.corrcoef(place, means)[0, 1])
     if abs(follows) > FOLLOWS and np.ptp(means) > PUSH * within:
         row = int(tension.argmin())
-        change = "change the sign" if follows < 0 else "undo the zeroing"
-        expected = f"a pull counted positive: {change} of tension_N (a slack wire reads 0 N)"
+        change = "change the sign of tension_N" if follows < 0 else "undo the zeroing of tension_N"
+        if follows > 0 and place.max() <= 0:  # a machine that counts compression positive
+            change = "change the signs of displacement_mm and of tension_N"
+        expected = f"a pull counted positive: {change} (a slack wire reads 0 N)"
         raise table.complain(row, "tension_N", table.cell(row, "tension_N"), expected)
 
 

@@ -251,12 +251,15 @@ def _check_direction(table: RawTable, column: Column, experiment: Experiment) ->
     place, pull = (np.array(v) for v in zip(*((h.displacement_mm, h.tension_N.mean()) for h in holds), strict=True))
     if place.max() > 0 or not falls(place, pull):
         return
-    unit = column.unit.text if column.unit else "mm"
     found = f"displacements down to {place.min():g} mm, the further down the more tension"
-    expected = (
-        f'what lengthens the wire counted up; change the sign with --map "{column.header}=displacement [-{unit}]"'
-    )
+    expected = f"what lengthens the wire counted up; change the sign with {_turned(column)}"
     raise table.complain(table.rows[0].line, column.index, found, expected)
+
+
+def _turned(column: Column) -> str:
+    """The option that turns the sign of a column."""
+    unit = column.unit.text if column.unit else UNITS[column.role]
+    return f'--map "{column.header}={column.role} [{unit[1:] if unit[0] in "-−" else f"-{unit}"}]"'
 
 
 def _from_zero(table: RawTable, column: Column, x: Floats, about: About, zero_mm: float | None) -> Floats:
@@ -351,9 +354,11 @@ class _RawReadings(Table):
     origin: list[int]
 
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
-        tension = self.columns["tension"]
-        turn = f'change the sign with --map "{tension.header}=tension [-{tension.unit.text if tension.unit else "N"}]"'
-        return super().complain(row, column, found, expected.replace("change the sign of tension_N", turn))
+        tension, displacement = (_turned(self.columns[role]) for role in ("tension", "displacement"))
+        both = f"the signs with {displacement} {tension}"
+        expected = expected.replace("the signs of displacement_mm and of tension_N", both)
+        expected = expected.replace("the sign of tension_N", f"the sign with {tension}")
+        return super().complain(row, column, found, expected)
 
     def place(self, row: int, column: str) -> str:
         role = _COLUMN_ROLES[column]
