@@ -144,6 +144,71 @@ def test_rows_with_the_newest_first_are_refused(tmp_path, header, of_test):
         read(tmp_path, header + "".join(reversed(rows)))
 
 
+def specimens(header, labels, holds=(1, 2, 3, 4), of_test=False, extra=""):
+    """A test for each label, one below the other; `extra` is filled in from hold and reading."""
+    rows = []
+    for k, label in enumerate(labels):
+        for j, h in enumerate(holds):
+            for i in range(4):
+                time = 30 * i + 150 * (j + len(holds) * k) * of_test
+                rows.append(f"{label}{extra.format(h=h, i=i)};{h};{time};{2 * h - i / 10}\n")
+    return f"{header};Weg [mm];Zeit [s];Kraft [N]\n" + "".join(rows)
+
+
+@pytest.mark.parametrize("of_test", [False, True])
+@pytest.mark.parametrize(
+    ("header", "labels"),
+    [("Probe", "AB"), ("Probe", "12"), ("Sample ID", "ABC"), ("Name", ("Draht 1", "Draht 2")), ("Éprouvette n°", "12")],
+)
+def test_several_specimens_in_a_file_are_refused_not_merged(tmp_path, header, labels, of_test):
+    text = specimens(header, labels, of_test=of_test)
+    message = rf"line 18, column 1 \({header}\): found '{labels[1]}' after '{labels[0]}' where the displacement begins"
+    with pytest.raises(
+        wb.InputError, match=f'{message} again, expected one .*; split .* "{header}=ignore" if'
+    ) as refused:
+        read(tmp_path, text)
+    assert "\n" not in str(refused.value)
+    assert len(read(tmp_path, text, mapping=(f"{header}=ignore",)).experiment.holds) == 4 * len(labels)
+
+
+def test_words_beside_times_that_begin_again_may_be_specimens_too(tmp_path):
+    with pytest.raises(wb.InputError, match=r"line 18, column 1 \(Bezeichnung\): found 'blue' after 'red'"):
+        read(tmp_path, specimens("Bezeichnung", ("red", "blue")))
+    merged = specimens("Bezeichnung", ("red", "blue")).splitlines()
+    merged = [row if i in (0, 1, 17) else ";" + row.partition(";")[2] for i, row in enumerate(merged)]
+    with pytest.raises(wb.InputError, match=r"line 18, column 1 \(Bezeichnung\): found 'blue' after 'red'"):
+        read(tmp_path, "\n".join(merged))
+    assert read(tmp_path, specimens("Bezeichnung", ("red", "blue"), of_test=True)).rows
+
+
+@pytest.mark.parametrize(
+    ("header", "labels", "holds", "extra"),
+    [
+        ("Zyklus", "12", (1, 2, 3, 4), ""),
+        ("Zyklus", ("Zyklus 1", "Zyklus 2"), (1, 2, 3, 4), ""),
+        ("Kommentar", ("", ""), (1, 2, 3, 4), "at {h} mm"),
+        ("Kommentar", ("first", "second"), (1, 2, 3, 4), " at {h} mm"),
+        ("Sample", ("", ""), (1, 2, 3, 4), "{h}{i}"),
+        ("Probe", "AA", (1, 2, 3, 4), ""),
+        ("Phase", ("up", "down"), (1, 2, 3, 4, 3, 2), ""),
+        ("Phase", ("up", "down", "up", "down"), (1, 2, 3), ""),
+    ],
+)
+def test_a_column_of_cycles_comments_or_counts_is_named_and_no_more(tmp_path, header, labels, holds, extra):
+    text = specimens(header, labels, holds, extra=extra)
+    if header == "Phase" and len(labels) == 2:  # one test that goes up and down again, not two
+        rows = text.splitlines()[:25]
+        text = "\n".join([*rows[:17], *(row.replace("up", "down") for row in rows[17:])])
+    assert f"not read: '{header}'" in read(tmp_path, text).notes
+
+
+def test_columns_that_are_not_read_are_named_in_the_files(tmp_path):
+    raw = tmp_path / "raw.csv"
+    raw.write_text(HEADER.replace("\n", ",Note,Level [V],Empty\n") + BODY.replace("\n", ",good,7,\n"))
+    wb.import_bench(raw, length_mm=1000, output=tmp_path / "out")
+    assert "# Not read: 'Note' and 'Level [V]'.\n" in (tmp_path / "out" / "raw.toml").read_text()
+
+
 def test_a_displacement_downwards_is_turned_and_one_upwards_from_below_zero_is_read(tmp_path):
     turned = read(tmp_path, DOWN, mapping=("Weg [mm]=displacement [-mm]",))
     assert [row[1] for row in turned.rows[::2]] == [1.0, 2.0, 3.0]

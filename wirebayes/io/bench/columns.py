@@ -130,6 +130,11 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     return header, None
 
 
+def ignored(table: RawTable, mapping: Sequence[str]) -> set[int]:
+    """The columns that the user leaves out."""
+    return {index for index, role, _ in _mapped(table, mapping) if role == IGNORE}
+
+
 def _mapped(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]:
     """Column, role and unit of each thing the user says; what is said later of a column stands."""
     out: dict[int, tuple[int, str, str]] = {}
@@ -217,12 +222,12 @@ def _may_be(table: RawTable, index: int, role: Role) -> bool:
         return False
     if not units and any(_speaks_of(header, other) for other in ROLES if other != role) and role != "time":
         return _best(header) == role
-    return _speaks_of(name, role) or (role in units and _plain(name) in _LETTERS.get(role, ()))
+    return _speaks_of(name, role) or (role in units and plain(name) in _LETTERS.get(role, ()))
 
 
 def _best(header: str) -> Role | None:
     """Of a header that speaks of several quantities the one named last, as languages put it: step time, load time."""
-    words = re.findall(r"[^\W\d_]+", _plain(header))
+    words = re.findall(r"[^\W\d_]+", plain(header))
     for word in reversed(words):
         for role in ROLES:
             if _is_word(word, role):
@@ -231,7 +236,7 @@ def _best(header: str) -> Role | None:
 
 
 def _speaks_of(text: str, role: Role) -> bool:
-    return any(_is_word(word, role) for word in re.findall(r"[^\W\d_]+", _plain(text)))
+    return any(_is_word(word, role) for word in re.findall(r"[^\W\d_]+", plain(text)))
 
 
 def _is_word(word: str, role: Role) -> bool:
@@ -245,7 +250,7 @@ def _is_word(word: str, role: Role) -> bool:
     )
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Small letters without accents."""
     apart = unicodedata.normalize("NFKD", text.casefold().replace("ß", "ss"))
     joined = "".join(c for c in apart if not unicodedata.combining(c) or c == "\u3099")

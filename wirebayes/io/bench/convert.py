@@ -23,6 +23,7 @@ from wirebayes.io.bench.sheet import Sheet, is_number, is_value
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.thinning import MOST, thinned
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
+from wirebayes.io.bench.unread import unread
 from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment, experiment_of
 from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
@@ -123,6 +124,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
         values["time"], of_day = clock.seconds(table, columns["time"].index, columns["time"].unit)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
+    notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
 
     def complain(row: int, role: str, found: str, expected: str) -> InputError:
         return table.complain(table.rows[row].line, columns[role].index, found, expected)  # type: ignore[index]
