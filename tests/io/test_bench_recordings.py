@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from analyses.recordings import Drive, imported
 from analyses.recordings import record as recorded
 from wirebayes.io.bench.convert import About, convert
@@ -144,6 +145,27 @@ def test_a_hold_that_is_reached_between_two_readings_begins_between_them(tmp_pat
 
     assert starts(1.0) == [0.0, 0.5, 0.5, 0.5]
     assert starts(8.0) == [0.0, 0.0, 0.0, 0.0]  # the recording paused, and began again when the wire was there
+
+
+@pytest.mark.parametrize(
+    ("counts", "line", "passed"),
+    [
+        ((100, 3900), 102, "from here on; the 100 readings before"),
+        ((3900, 100), 3902, "up to here; the 100 readings after"),
+    ],
+)
+def test_a_hold_that_is_short_beside_the_only_other_one_is_refused_where_it_ends(tmp_path, counts, line, passed):
+    path = tmp_path / "raw.csv"
+    x = np.repeat([0.5, 3.0], counts)
+    rows = [f"{j + 1},{i / 10:.1f},{x[i]},{2.0 * x[i] - 1e-5 * i:.5f}\n" for j, n in enumerate(counts)
+            for i in range(j * counts[0], j * counts[0] + n)]  # fmt: skip
+    path.write_text("Number,Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
+    with pytest.raises(
+        wb.InputError, match=rf"line {line}, column 3 .*: found one displacement .*, {passed} were taken"
+    ):
+        convert(path, About("wire", "line", 1000.0), Choices())
+    made = convert(path, About("wire", "line", 1000.0), Choices(mapping=("Number=hold",)))  # as the message advises
+    assert [hold.displacement_mm for hold in made.experiment.holds] == [0.5, 3.0]
 
 
 @pytest.mark.parametrize("count", [1, 2, MOST, MOST + 1, 100, 5000])

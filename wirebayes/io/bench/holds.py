@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.plateaus import Plateau, noise_of, plateaus
+from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 from wirebayes.typing import Floats
@@ -223,11 +223,7 @@ def _by_plateaus(readings: Readings, note: str) -> Cut:
     found_holds = plateaus(x, time, readings.displacement_step_mm)
     kept = sum(p.end - p.begin for p in found_holds)
     if len(found_holds) < 2 or kept < COVERED * len(x):
-        row = found_holds[0].end if found_holds and found_holds[0].end < len(x) else 0
-        share = f"{100.0 * kept / len(x):.0f} % of the readings"
-        found = f"a displacement that stays in {share}, {len(found_holds)} time{'s' * (len(found_holds) != 1)}"
-        expected = "at least two displacements that are held while tension is read (or a column of hold numbers)"
-        raise readings.complain(row, "displacement", found, expected)
+        raise _too_few(readings, found_holds, kept)
     lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
     moves = [float(time[p.begin] - time[left]) for p, left in zip(found_holds, lefts, strict=True)]
     zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
@@ -244,6 +240,25 @@ def _by_plateaus(readings: Readings, note: str) -> Cut:
     )
     since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
     return Cut(rows, list(range(1, len(rows) + 1)), [_level(x[r]) for r in rows], since, True, notes)
+
+
+def _too_few(readings: Readings, found_holds: Sequence[Plateau], kept: int) -> InputError:
+    """The error of a recording without two holds; a stretch that is short beside the only one passes for a move."""
+    rows = len(readings.time_s)
+    expected = "at least two displacements that are held while tension is read"
+    if len(found_holds) == 1 and kept >= COVERED * rows:
+        hold = found_holds[0]
+        before, after = hold.begin, rows - hold.left
+        if max(before, after) >= FEWEST:
+            row, where = (hold.begin, "from here on") if before >= after else (hold.left, "up to here")
+            passed = f"{before} readings before" if before >= after else f"{after} readings after"
+            found = f"one displacement that is held, {where}; the {passed} were taken for a move"
+            expected += "; if those are a hold, number the holds in a column, without the readings of the move"
+            return readings.complain(row, "displacement", found, expected)
+    share = f"{100.0 * kept / rows:.0f} % of the readings"
+    found = f"a displacement that stays in {share}, {len(found_holds)} time{'s' * (len(found_holds) != 1)}"
+    row = found_holds[0].end if found_holds and found_holds[0].end < rows else 0
+    return readings.complain(row, "displacement", found, f"{expected} (or a column of hold numbers)")
 
 
 def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:
