@@ -147,6 +147,74 @@ def test_a_hold_that_is_reached_between_two_readings_begins_between_them(tmp_pat
     assert starts(8.0) == [0.0, 0.0, 0.0, 0.0]  # the recording paused, and began again when the wire was there
 
 
+def stamped(path, rate, tick, *, clock=False, channel="", columns="Time (s),Displacement (mm),Force (N)"):
+    """A recording whose times are cut down to whole ticks; tensions agree with those before them now and then."""
+    x, time, _ = record(Pull(rate=rate, holds=4, noise=0.0), np.random.default_rng(2))
+    tension = 2.0 * x - 0.02 * np.log1p(time % 61.0)
+    stamps = np.floor((time + 0.37) / tick + 1e-9) * tick
+    rows = []
+    for i, (t, a, f) in enumerate(zip(stamps, x, tension, strict=True)):
+        stamp = f"10:{int(t) // 60:02d}:{int(t) % 60:02d}" if clock else f"{t:.2f}"
+        rows.append(f"{stamp},{a:.3f},{f:.2f}{channel.format(i % round(rate * tick))}\n")
+    path.write_text(columns + "\n" + "".join(rows))
+    return x, time, tension
+
+
+@pytest.mark.parametrize(
+    ("rate", "tick", "clock"), [(10.0, 1.0, False), (10.0, 1.0, True), (3.3, 1.0, False), (100.0, 0.1, False)]
+)
+def test_readings_of_a_clock_too_coarse_for_its_rate_are_spread_over_its_ticks(tmp_path, rate, tick, clock):
+    path = tmp_path / "raw.csv"
+    header = "Uhrzeit,Displacement (mm),Force (N)" if clock else "Time (s),Displacement (mm),Force (N)"
+    _, time, _ = stamped(path, rate, tick, clock=clock, columns=header)
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    assert any(f"of {tick:g} s, is that of {rate * tick:.2g} readings" in note for note in made.notes)
+    assert made.recording is not None
+    assert made.recording.time_s == pytest.approx(time, abs=1.01 * tick)  # no row is lost
+    assert np.diff(made.recording.time_s).min() > 0.0
+    middle = np.diff(made.recording.time_s)[len(time) // 4 : -len(time) // 4]
+    assert middle == pytest.approx(1.0 / rate, abs=0.4 / rate)
+    assert len(made.experiment.holds) == 4
+
+
+def test_coarse_stamps_that_begin_again_with_each_hold_are_spread_too(tmp_path):
+    path = tmp_path / "raw.csv"
+    rows = [f"{i // 10},{h},{2 * h - i // 7 / 100:.2f}\n" for h in (1, 2, 3) for i in range(50)]
+    path.write_text("Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    for hold in made.experiment.holds:
+        assert hold.time_s == pytest.approx(np.arange(50) / 10.0)
+
+
+def test_stamps_that_repeat_for_another_reason_are_refused(tmp_path):
+    path = tmp_path / "raw.csv"
+
+    def refused(match):
+        with pytest.raises(wb.InputError, match=f"raw.csv, line .*{match}"):
+            convert(path, About("wire", "line", 1000.0), Choices())
+
+    header = "Time (s),Displacement (mm),Force (N)"
+    stamped(path, 2.0, 1.0, channel=",wire {}", columns=f"{header},Channel")  # two wires in turn
+    refused("times that rise")
+    stamped(path, 10.0, 1000.0)
+    refused("times that rise")
+    rows = [f"{30 * (i // 2)},{1 + i // 12},{2 + i // 12 - i / 100:.2f}\n" for i in range(48)]  # no tick of a clock
+    path.write_text(header + "\n" + "".join(rows))
+    refused("times that rise")
+    rows = [f"{i + (i % 20 == 7)},{1 + i // 12},{2 + i // 12 - i / 100:.2f}\n" for i in range(48)]  # now and then
+    path.write_text(header + "\n" + "".join(rows))
+    refused("times that rise")
+
+
+def test_rows_that_are_written_twice_are_left_out_as_before(tmp_path):
+    path = tmp_path / "raw.csv"
+    rows = [f"{i},{1 + i // 12},{2 + i // 12 - i / 100:.2f}\n" * 2 for i in range(48)]
+    path.write_text("Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    assert len(made.rows) == 48
+    assert "rows that repeat the row above left out: 48" in made.notes
+
+
 @pytest.mark.parametrize(
     ("counts", "line", "passed"),
     [

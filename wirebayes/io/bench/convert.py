@@ -20,6 +20,7 @@ from wirebayes.io.bench.numerals import decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet, is_number, is_value
+from wirebayes.io.bench.stamps import is_coarse, spread
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.thinning import MOST, thinned
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
@@ -119,9 +120,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     texts = {role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
              and not (role == "time" and clock.has_moments(table, column.index))}  # fmt: skip
     values = {role: _converted(columns[role], text) for role, text in texts.items()}
-    of_day = False
-    if "time" not in values:
-        values["time"], of_day = clock.seconds(table, columns["time"].index, columns["time"].unit)
+    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
     notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
@@ -197,6 +196,10 @@ def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, l
     if gaps:
         notes.append(f"{gaps} empty cells of hold or displacement filled with the value above them")
     kept = [row for i, row in enumerate(filled) if not i or row.cells != filled[i - 1].cells]
+    times = [row.cells[columns["time"].index] for row in kept]
+    repeating = any(a == b for a, b in zip(times, times[1:], strict=False))
+    if repeating and is_coarse(replace(table, rows=tuple(filled)), columns["time"].index):
+        kept = filled  # readings that agree, not copies
     if len(kept) < len(filled):
         notes.append(f"rows that repeat the row above left out: {len(filled) - len(kept)}")
     for row in kept:
@@ -236,6 +239,15 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
 def _converted(column: Column, texts: list[str]) -> Floats:
     assert column.unit is not None
     return column.unit.convert(np.array([float(text) for text in texts]))
+
+
+def _times(table: RawTable, column: Column, numbers: Floats | None, notes: list[str]) -> tuple[Floats, bool]:
+    """Times in s, of numbers or of clocks, and whether they are moments of a day; what was done joins the notes."""
+    time, of_day = (numbers, False) if numbers is not None else clock.seconds(table, column.index, column.unit)
+    if is_coarse(table, column.index):
+        time, spreading = spread(time)
+        notes += spreading
+    return time, of_day
 
 
 def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[Any, Floats]) -> None:

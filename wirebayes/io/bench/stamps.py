@@ -1,0 +1,68 @@
+"""Clocks too coarse for their rate: readings that share a time stamp are spread over the time to the next one."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.io.bench.table import RawTable
+from wirebayes.typing import Floats
+
+TICKS_S = (0.001, 0.01, 0.1, 1.0, 60.0)  # what clocks count; rarer stamps are a person's, or a test's own steps
+FEWEST = 10  # stamps between the first and the last that show a habit
+OFTEN = 1.5  # readings of the usual stamp: fewer repeat now and then, by mistake
+ALIKE, ALIKE_SHARE = 0.2, 0.9  # stamps have as many readings to a fifth, or to one, but where a recording pauses
+RISING_SHARE = 0.9  # of the stamps that rise do so by one tick, for the same reason
+IN_TURN = 0.5  # of the pairs of stamps with the same cells in the same order: by chance there are few
+
+
+def is_coarse(table: RawTable, column: int) -> bool:
+    """Whether the stamps of a column repeat regularly.
+
+    Not where cells of another column come back in the same order under each stamp: then channels take turns, or the
+    column counts what the stamps leave out.
+    """
+    cells = table.column(column)
+    begins = _runs(np.array([i > 0 and cell != cells[i - 1] for i, cell in enumerate(cells)], dtype=bool))
+    counts = np.diff(begins)[1:]  # the first and the last may be cut off
+    if len(counts) < FEWEST:
+        return False
+    usual = float(counts.mean())
+    alike = np.abs(counts - usual) <= max(1.0, ALIKE * usual)
+    if usual < OFTEN or alike.mean() < ALIKE_SHARE:
+        return False
+    others = [table.column(i) for i in range(len(table.header)) if i != column]
+    return not any(_takes_turns(other, begins) for other in others)
+
+
+def _runs(changes: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.flatnonzero(changes)])
+
+
+def _takes_turns(cells: list[str], begins: NDArray[np.int64]) -> bool:
+    under = [cells[begin:end] for begin, end in zip(begins[1:-1], begins[2:], strict=True)]
+    same = sum(a == b and len(set(a)) > 1 for a, b in zip(under, under[1:], strict=False))
+    return same > IN_TURN * (len(under) - 1)
+
+
+def spread(time_s: Floats) -> tuple[Floats, list[str]]:
+    """Times of readings whose stamps repeat: those of one stamp evenly from it to the next, one tick later.
+
+    Returns
+    -------
+    time_s : (r,) array
+        As it was where stamps do not mostly follow each other by a clock's tick.
+    notes : list of str
+    """
+    begins = _runs(np.concatenate([[False], np.diff(time_s) != 0]))
+    counts = np.diff(np.append(begins, len(time_s)))
+    steps = np.diff(time_s[begins])
+    rising = steps[steps > 0]  # it falls where a hold begins at 0 again
+    tick = next((t for t in TICKS_S if np.isclose(rising, t, rtol=1e-4).sum() >= RISING_SHARE * len(rising)), None)
+    if tick is None:
+        return time_s, []
+    usual = float(np.mean(counts[1:-1]))
+    followed = np.append(np.isclose(steps, tick, rtol=1e-4), False)
+    # a stamp after which the recording pauses or ends may lack readings at its end
+    places = np.where(followed, counts, np.maximum(counts, round(usual)))
+    within = np.arange(len(time_s)) - np.repeat(begins, counts)
+    note = f"each time stamp, of {tick:g} s, is that of {usual:.2g} readings: they are spread evenly up to the next one"
+    return time_s + tick * within / np.repeat(places, counts), [note]
