@@ -209,6 +209,19 @@ def test_columns_that_are_not_read_are_named_in_the_files(tmp_path):
     assert "# Not read: 'Note' and 'Level [V]'.\n" in (tmp_path / "out" / "raw.toml").read_text()
 
 
+@pytest.mark.parametrize("cell", ["", "NaN", "-", "n/a", "#N/A"])
+def test_a_missing_reading_is_refused_and_its_row_may_be_deleted(tmp_path, cell):
+    with pytest.raises(
+        wb.InputError, match=r"line 6, column 3 .*, expected a number.*; where .* missing, delete its row"
+    ):
+        read(tmp_path, HEADER + BODY.replace("4.05", cell))
+    assert len(read(tmp_path, HEADER + BODY.replace("2,30,4.05\n", "")).rows) == 5
+    with pytest.raises(
+        wb.InputError, match=r"found '4.0S', expected a number \(decimal point, as elsewhere in the file\)$"
+    ):
+        read(tmp_path, HEADER + BODY.replace("4.05", "4.0S"))
+
+
 def test_a_displacement_downwards_is_turned_and_one_upwards_from_below_zero_is_read(tmp_path):
     turned = read(tmp_path, DOWN, mapping=("Weg [mm]=displacement [-mm]",))
     assert [row[1] for row in turned.rows[::2]] == [1.0, 2.0, 3.0]

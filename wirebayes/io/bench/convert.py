@@ -38,6 +38,7 @@ _COLUMN_ROLES: dict[str, Role] = {
 }  # fmt: skip
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
 FAR_STEPS = 2.0  # and this many times the range of the test
+_MISSING = "; where a reading is missing, delete its row"
 MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
 
 
@@ -205,7 +206,7 @@ def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, l
     for row in kept:
         for index in indices:
             if not row.cells[index]:
-                missing = "a number" if index in measured else "a value here or in a line above"
+                missing = f"a number{_MISSING}" if index in measured else "a value here or in a line above"
                 raise table.complain(row.line, index, "an empty cell", missing)
     return replace(table, rows=tuple(kept)), notes
 
@@ -229,6 +230,8 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
         if number is None:
             sign = "comma" if decimal == "comma" else "point"
             expected = f"a number (decimal {sign}, as elsewhere in the file)"
+            if not any(c.isdigit() for c in row.cell(column.index)):  # NaN, n/a, #N/A, a dash
+                expected += _MISSING
             if column.role == "time" and clock.looks_like_a_moment(row.cell(column.index)):
                 expected = clock.UNDERSTOOD
             raise table.complain(row.line, column.index, shown(row.cell(column.index)), expected)
