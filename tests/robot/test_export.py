@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -146,3 +147,22 @@ def test_firmware_says_that_it_leaves_out_pulleys():
         assert "Left out: the pulleys at the anchors (radii 0, " in text
     assert "Left out" not in files.klipper(schema.read("hangprinter-4"), line)
     assert "pulleys do not swivel" in files.mujoco(robot, line)
+
+
+def _five(tmp_path):
+    """A Hangprinter with a fifth anchor."""
+    text = (Path(schema.__file__).parents[2] / "data" / "robots" / "hangprinter-4.toml").read_text()
+    path = tmp_path / "five.toml"
+    path.write_text(text + "\n[[leg]]\nexit_point_m = [1.5, -1.0, 2.0]\nplatform_point_m = [0, 0, 0]\n")
+    return schema.read(str(path))
+
+
+def test_a_fifth_anchor_has_the_letter_and_the_number_that_the_firmware_reads(tmp_path):
+    robot, line = _five(tmp_path), _line("hooke", None, {})
+    anchors = next(row for row in files.reprapfirmware(robot, line).splitlines() if row.startswith("M669"))
+    words = anchors.split(" ; ")[0].split()
+    assert words[:3] == ["M669", "K6", "N5"]
+    assert [word[0] for word in words[3:]] == ["A", "B", "C", "D", "I"]
+    assert words[-1] == "I1500.00:-1000.00:2000.00"
+    assert "[stepper_e]\nanchor_x: 1500.00\n" in files.klipper(robot, line)
+    assert " N" not in files.reprapfirmware(schema.read("hangprinter-4"), line).split("M669")[1].split(";")[0]

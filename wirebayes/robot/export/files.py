@@ -23,7 +23,9 @@ from wirebayes.robot.motion import inverse
 from wirebayes.typing import Floats
 from wirebayes.wire.fresh import FreshSample
 
-LETTERS = "ABCDEFGHI"
+ANCHORS = "ABCDI"  # as M669 of RepRapFirmware names them, at most five: its E is an extruder
+ANCHORS_UNLESS_SAID = 4  # what that firmware assumes without N
+STEPPERS = "abcde"  # Klipper's winches
 TABLE = ("tension_N", "time_s", "mean_mm_per_m", "sd_mm_per_m", "q05_mm_per_m", "q50_mm_per_m", "q95_mm_per_m")
 
 
@@ -34,10 +36,11 @@ def is_hangprinter(robot: Robot) -> bool:
 
 def reprapfirmware(robot: Robot, line: WireDraws) -> str:
     """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
-    anchors = " ".join(f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(LETTERS, robot.exit_m, strict=False))
+    count = "" if robot.legs == ANCHORS_UNLESS_SAID else f"N{robot.legs} "
+    anchors = " ".join(f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(ANCHORS, robot.exit_m, strict=False))
     spring = working_spring(robot, line)
     rows = [
-        (f"M669 K6 {anchors}", "anchors, mm"),
+        (f"M669 K6 {count}{anchors}", "anchors, mm"),
         (f"M666 U{_joined(robot.lines, '.0f')}", "mechanical advantages"),
         (f"M666 W{robot.mass_kg:g}", "mover, kg"),
         (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.band}"),
@@ -68,11 +71,9 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         f"winch_min_force: {_joined(np.full(robot.legs, robot.rule.lowest_N), 'g', ', ')}  # N\n"
         f"winch_max_force: {_joined(np.full(robot.legs, robot.rule.highest_N), 'g', ', ')}  # N\n"
     )
-    for letter, anchor in zip(LETTERS.lower(), 1e3 * robot.exit_m, strict=False):
-        x, y, z = anchor
+    for leg, (letter, (x, y, z)) in enumerate(zip(STEPPERS, 1e3 * robot.exit_m, strict=False)):
         text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
         if robot.drums is not None and robot.drums.radius_m.all():
-            leg = LETTERS.lower().index(letter)
             turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][leg]
             text += f"rotation_distance: {turn:.4f}  # mm of wire a turn, at the origin; a buildup is left out\n"
             text += f"gear_ratio: {robot.drums.gear[leg]:g}:1\n"
