@@ -120,3 +120,33 @@ def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:
     assert answer.next_step(stored(Pose, tmp_path, "pose.json", found)).startswith("another pose or payload")
     held = stored(Pose, tmp_path, "pose.json", found | {"feasible": True})
     assert answer.next_step(held).startswith("wirebayes calibrate")
+
+
+def test_lengths_that_did_not_converge_are_not_for_the_controller(tmp_path: Path) -> None:
+    known = {"converged": False, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
+    bad = stored(Calibration, tmp_path, "calibrate.json", {"robot": "r", "with_creep_model": known})
+    assert answer.next_step(bad).startswith("wirebayes calibrate with more poses")
+    known = known | {"converged": True}
+    good = stored(Calibration, tmp_path, "calibrate.json", {"robot": "r", "with_creep_model": known})
+    assert answer.next_step(good) == f"set the lengths of {tmp_path / 'calibrate.json'} in the controller"
+
+
+@pytest.mark.parametrize(
+    ("end", "change", "begins"),
+    [
+        (1.0, "0.5", "give the controller the joint values of"),
+        (1.0, "", "other commanded poses"),
+        (None, "0.5", "check joint values or poses"),
+    ],
+)
+def test_corrections_are_offered_only_where_there_are_some(
+    tmp_path: Path, end: float | None, change: str, begins: str
+) -> None:
+    (tmp_path / "corrections.csv").write_text(f"time_s,joint_1_m,change_1_mm\n0.0,,\n60.0,,{change}\n")
+    band = {"q05": [0.0, end], "q50": [0.0, end], "q95": [0.0, end]}
+    drift = {"distance_mm": band, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
+    found = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}}
+    assert answer.next_step(stored(Pose, tmp_path, "pose.json", found)).startswith(begins)
+    (tmp_path / "corrections.csv").unlink()
+    alone = answer.next_step(stored(Pose, tmp_path, "pose.json", found))
+    assert alone.startswith("wirebayes calibrate" if end else "another pose or payload")

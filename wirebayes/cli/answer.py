@@ -1,7 +1,9 @@
 """What a command says at its end: the answer in a few lines, where the results lie, and what to do next."""
 
+import csv
 import json
 from collections import Counter
+from pathlib import Path
 from textwrap import wrap
 from typing import Any, cast
 
@@ -13,7 +15,7 @@ from wirebayes.json_files.comparison import ComparedModels
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.imported import ImportedExperiment
 from wirebayes.json_files.plan import JudgedProtocol
-from wirebayes.json_files.pose import PoseJson
+from wirebayes.json_files.pose import Drift, PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Quantiles
@@ -115,12 +117,10 @@ def next_step(result: Result[Any]) -> str:
     if isinstance(result, Comparison):
         return "wirebayes fit FILE.toml with the options of the best model, or wirebayes discover FILE.toml"
     if isinstance(result, Pose):
-        if (folder / "corrections.csv").is_file():
-            return f"give the controller the joint values of {folder / 'corrections.csv'}"
-        if not result.summary().get("feasible", True):
-            return "another pose or payload, or other bounds of the tension in the robot's file"
-        return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
+        return _after_pose(result.summary(), folder)
     if isinstance(result, Calibration):
+        if not result.summary()["with_creep_model"]["converged"]:
+            return "wirebayes calibrate with more poses, or once readings, --tension-sd and --reference-sd are checked"
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"
     if isinstance(result, Check):
         return "wirebayes fit FILE.toml --output DIR" + (
@@ -131,6 +131,35 @@ def next_step(result: Result[Any]) -> str:
         file = names[0] if len(names) == 1 else "experiments"
         return f"look at {folder / names[0]}.svg, then wirebayes check {folder / file}.toml"
     return f"read {folder}"
+
+
+def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path) -> str:
+    """What to do with a pose, or where there is none."""
+    lost = "drift" in found and not any(_known_at_the_end(drift) for drift in found["drift"])
+    corrections = folder / "corrections.csv"
+    if corrections.is_file():
+        if lost:
+            where = f"the column held of {folder / 'poses.csv'} says where the platform is lost"
+            return f"check joint values or poses, their units and the payload; {where}"
+        if not _has_corrections(corrections):
+            return (
+                "other commanded poses, or other bounds of the tension in the robot's file: nothing holds these poses"
+            )
+        return f"give the controller the joint values of {corrections}"
+    if lost or not found.get("feasible", True):
+        return "another pose or payload, or other bounds of the tension in the robot's file"
+    return "wirebayes calibrate ROBOT.toml READINGS.csv --wires DIR, once the drift is more than you allow"
+
+
+def _known_at_the_end(drift: Drift) -> bool:
+    middle = drift["distance_mm"]["q50"]
+    return middle is not None and middle[-1] is not None
+
+
+def _has_corrections(path: Path) -> bool:
+    """Whether any row has one: none has where no tensions hold the poses to which they should lead."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return any(row["change_1_mm"] for row in csv.DictReader(file))
 
 
 def _posterior(summary: SummaryJson) -> list[str]:
@@ -275,7 +304,7 @@ def _pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     moved = "is away from where it is meant to be" if measured else "has drifted"
     for drift in found["drift"]:
         far, time = drift["distance_mm"], drift["times_s"][-1]
-        if far["q50"] is not None and far["q50"][-1] is not None:
+        if _known_at_the_end(drift):
             lines.append(
                 f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
                 f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
