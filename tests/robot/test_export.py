@@ -13,6 +13,7 @@ from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import inverse
 
@@ -166,3 +167,65 @@ def test_a_fifth_anchor_has_the_letter_and_the_number_that_the_firmware_reads(tm
     assert words[-1] == "I1500.00:-1000.00:2000.00"
     assert "[stepper_e]\nanchor_x: 1500.00\n" in files.klipper(robot, line)
     assert " N" not in files.reprapfirmware(schema.read("hangprinter-4"), line).split("M669")[1].split(";")[0]
+
+
+def _two_lines(given=None):
+    """A Hangprinter whose third and fourth leg hang on a thick line, and both lines."""
+    robot = schema.read("hangprinter-4")
+    robot = replace(robot, wire=("default", "default", "thick", "thick"), given=given or {})
+    stiff = replace(_line("hooke", None, {}), name="thick", tension_range_N=(1.0, 9.0))
+    stiff = replace(stiff, parameters=dict(stiff.parameters) | {"k1": 5.0 * stiff.parameters["k1"]}, length_mm=2000.0)
+    thin = replace(_line("hooke", None, {}), tension_range_N=(0.0, 5.0))
+    return robot, thin if given else replace(thin, others={"thick": stiff})
+
+
+def test_firmware_and_simulators_say_to_which_line_each_number_belongs():
+    robot, line = _two_lines()
+    thin, thick = (one.parameters["k1"] for one in line.each.values())
+    bands = [
+        f"90 % interval {low:.0f} to {high:.0f}" for low, high in (np.quantile(k, [0.05, 0.95]) for k in (thin, thick))
+    ]
+    code, config = files.reprapfirmware(robot, line), files.klipper(robot, line)
+    for text in (code, config):
+        assert "wire default in legs 1, 2; wire thick in legs 3, 4." in text
+        assert (
+            f"default: fitted at 1000 mm, tested from 0 to 5 N; spring constant {thin.mean():.0f} N, {bands[0]}."
+            in text
+        )
+        assert (
+            f"thick: fitted at 2000 mm, tested from 1 to 9 N; spring constant {thick.mean():.0f} N, {bands[1]}." in text
+        )
+        assert "takes one spring constant for all wires: here that of wire default." in text
+    assert f"M666 S{thin.mean():.0f} ; spring constant per unit length, N: of wire default, {bands[0]}\n" in code
+    assert f"winch_spring_constant: {thin.mean():.0f}  # N per unit strain: of wire default, {bands[0]}\n" in config
+    for text in files.simulators(robot, line).values():
+        assert "<!-- wire default in legs 1, 2; wire thick in legs 3, 4 -->" in text
+        ElementTree.fromstring(text)
+    odd = replace(robot, wire=("a--b", "a--b", "thick", "thick"))
+    for text in files.simulators(odd, replace(line, name="a--b")).values():
+        ElementTree.fromstring(text)
+
+
+def test_each_line_has_its_own_rows_of_creep():
+    robot, line = _two_lines()
+    header, rows = files.creep_tables(robot, line, [2.0], [60.0, 600.0])
+    assert header == ("wire", *files.TABLE)
+    for name, one in line.each.items():
+        own = [row[1:] for row in rows if row[0] == name]
+        assert own == files.creep_table(schema.read("hangprinter-4"), replace(one, others={}), [2.0], [60.0, 600.0])
+    alone = schema.read("hangprinter-4")
+    header, rows = files.creep_tables(alone, _line("hooke", None, {}), [2.0], [60.0])
+    assert header == files.TABLE
+    assert len(rows) == 1 and len(rows[0]) == len(files.TABLE)
+
+
+def test_what_is_known_of_a_fit_is_not_said_of_a_given_wire():
+    given = {"thick": GivenWire(CORE | {"k1": 5000.0}, 1000.0)}
+    robot, line = _two_lines(given)
+    code = files.reprapfirmware(robot, line)
+    assert "Wire thick: as the robot's file gives it; spring constant 5000 N, as the robot's file gives it.\n" in code
+    robot = replace(robot, wire=("thick",) * 4)
+    for text in (files.reprapfirmware(robot, line), files.klipper(robot, line)):
+        assert "line as the robot's file gives it.\n" in text
+        assert "N: as the robot's file gives it" in text or "strain: as the robot's file gives it" in text
+        assert "fitted" not in text and "tested" not in text and "interval" not in text

@@ -16,6 +16,7 @@ from wirebayes.io.run_folder import plain
 from wirebayes.model.prior import wire_defaults
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, schema
+from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import drift
 from wirebayes.robot.self_calibration.session import Prior
@@ -92,6 +93,18 @@ def test_the_tested_ranges_are_each_lines_own():
     assert message == ["wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N"]
 
 
+def test_only_lines_that_legs_hang_on_warn():
+    one = GivenWire({"k1": 800.0, "B": 0.3, "U": 1.0, "k2": 0.03, "N": 0.6}, 1000.0)
+    robot = replace(_mixed(schema.read("linear-6"), range(6)), given={THICK: one})
+    line = replace(_line(2), tension_range_N=(0.0, 9.0), time_range_s=(0.0, 30.0))
+    tau = np.array([[20.0, 5.0, 5.0, 5.0, 5.0, 5.0]])
+    assert draws.warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
+    robot = replace(robot, wire=(THICK, *robot.wire[1:-1], "default"))
+    assert draws.warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
+        "60 s is longer than the longest tested hold, 30 s"
+    ]
+
+
 DECLARED = "[wires.thick]\nfitted = true\nmass_kg_m = 0.02\n[wires.default]\nmass_kg_m = 0.0001\n"
 FIRST = '[[leg]]\nwire = "thick"\n'
 
@@ -122,6 +135,20 @@ def test_commands_take_a_posterior_for_each_name(fitted, tmp_path, capsys):  # n
     assert "--wires: found thin, expected one of the legs' wires: default, thick" in capsys.readouterr().err
     assert main([*arguments, "--wires", f"thick={fitted}", "--wires", str(fitted)]) == 2
     assert "expected NAME=FOLDER for each" in capsys.readouterr().err
+
+
+def test_the_exported_creep_is_by_line_on_the_page_and_in_the_summary(fitted, tmp_path):  # noqa: F811
+    import wirebayes as wb
+
+    out = tmp_path / "out"
+    exported = wb.export(_file(tmp_path), {"default": fitted, "thick": fitted}, draws=10, output=out)
+    table = exported.summary()["creep_table"]
+    assert [row["wire"] for row in table] == ["thick"] * 16 + ["default"] * 16
+    assert table[0]["tension_N"] == 1.0
+    assert "thick" in exported._repr_html_()
+    wb.write_report(out)
+    page = (out / "report.html").read_text()
+    assert "Growth of new wire thick" in page and "Growth of new wire default" in page
 
 
 def test_names_and_folders_are_read(tmp_path):

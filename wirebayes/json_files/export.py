@@ -4,7 +4,7 @@ from typing import TypedDict
 
 
 class ExportSummary(TypedDict):
-    """Names of the files, and the creep table's rows by its header."""
+    """Names of the files, and the creep table's rows by its header, `wire` where there are several."""
 
     files: list[str]
-    creep_table: list[dict[str, float]]
+    creep_table: list[dict[str, float | str]]

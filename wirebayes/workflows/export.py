@@ -71,13 +71,13 @@ def export(
         contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
         contents["klipper.cfg"] = files.klipper(machine, line)
     contents |= files.simulators(machine, line)
-    table = files.creep_table(machine, line, loads, moments)
+    header, table = files.creep_tables(machine, line, loads, moments)
     place = Place.at(output)
     options = (experiment, text_of(tensions), text_of(times))
     posterior = posterior_of(wires, experiment)
     with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, *options)) as run:
         if run.state != "done":
-            write_csv(run.directory / "creep-table.csv", files.TABLE, table)
+            write_csv(run.directory / "creep-table.csv", header, table)
             for name, text in contents.items():
                 write_text(run.directory / name, text)
             run.finish()

@@ -1,5 +1,6 @@
 """What the public functions return: views of folders of results, which say in short what they hold."""
 
+import csv
 import os
 import shutil
 import weakref
@@ -612,9 +613,8 @@ class Export(Result[ExportSummary]):
 
     def summary(self) -> ExportSummary:
         """Names of the files, and the rows of the creep table."""
-        header, *rows = self.files["creep-table.csv"].splitlines()
-        names = header.split(",")
-        table = [dict(zip(names, map(float, row.split(",")), strict=True)) for row in rows]
+        rows = csv.DictReader(self.files["creep-table.csv"].splitlines())
+        table = [{key: value if key == "wire" else float(value) for key, value in row.items()} for row in rows]
         return {"files": list(self.files), "creep_table": table}
 
     @property
@@ -631,8 +631,9 @@ class Export(Result[ExportSummary]):
         return list(self.files)
 
     def _repr_html_(self) -> str:
-        rows = [[_figure(value) for value in row.values()] for row in self.summary()["creep_table"]]
-        return html_table(repr(self), list(self.summary()["creep_table"][0]), rows, self.messages)
+        table = self.summary()["creep_table"]
+        rows = [[value if isinstance(value, str) else _figure(value) for value in row.values()] for row in table]
+        return html_table(repr(self), list(table[0]), rows, self.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

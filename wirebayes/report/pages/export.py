@@ -24,26 +24,28 @@ _FILES = (
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``creep-table.csv`` and links to what lies beside it."""
     with (folder / "creep-table.csv").open(encoding="utf-8", newline="") as file:
-        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+        rows = list(csv.DictReader(file))
+    wires = list(dict.fromkeys(row.get("wire") for row in rows))  # None, once, where all legs hang on one line
     lines = [
         [
-            number(r["tension_N"]),
-            f"{r['time_s']:g}",
-            number(r["q50_mm_per_m"]),
-            span(r["q05_mm_per_m"], r["q95_mm_per_m"]),
+            *([] if row.get("wire") is None else [row["wire"]]),
+            number(float(row["tension_N"])),
+            f"{float(row['time_s']):g}",
+            number(float(row["q50_mm_per_m"])),
+            span(float(row["q05_mm_per_m"]), float(row["q95_mm_per_m"])),
         ]
-        for r in rows
+        for row in rows
     ]
     caption = "Growth of a new line under a tension held constant, in mm per metre of line."
     words = Text(
         "Firmware and simulators know springs but no creep. The files give them the line's spring constant; this table "
         "says how much longer each metre of line will be after a time, which has to be corrected for by other means."
     )
-    alt = "Growth of a new line against time at each tension."
-    picture = Picture(drawn(growth(rows)), alt, "Median and 90 % interval of the growth, a colour a tension.")
+    pictures = [_growth(wire, [row for row in rows if row.get("wire") == wire]) for wire in wires]
+    header = _HEADER if wires == [None] else ("wire", *_HEADER)
     sections = [
         Section("Files", [files_beside(folder, _FILES)]),
-        Section("Creep of the line", [words, Pictures([picture]), Table(_HEADER, lines, caption)]),
+        Section("Creep of the line", [words, Pictures(pictures), Table(header, lines, caption)]),
         meaning(("90 % interval",), model=False),
     ]
     lead = "A fitted line as settings for firmware and simulators."
@@ -51,3 +53,12 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 
 _HEADER = ("tension, N", "after, s", "growth, mm per m", "90 % interval")
+
+
+def _growth(wire: str | None, rows: list[dict[str, str]]) -> Picture:
+    """The picture of one line's growth."""
+    of = "a new line" if wire is None else f"new wire {wire}"
+    numbers = [{key: float(value) for key, value in row.items() if key != "wire"} for row in rows]
+    caption = "Median and 90 % interval of the growth, a colour a tension."
+    caption = caption if wire is None else f"Wire {wire}: {caption[0].lower()}{caption[1:]}"
+    return Picture(drawn(growth(numbers)), f"Growth of {of} against time at each tension.", caption)

@@ -2,7 +2,8 @@
 
 Hangprinter firmware models a line as a spring of ``constant / length`` with the length in mm, so its constant is k1 in
 newtons. It ignores creep: the table beside it says how much each line will have grown. Where the line's stiffness
-changes with its tension, firmware and simulator get the tangent at the tensions at which the robot works.
+changes with its tension, firmware and simulator get the tangent at the tensions at which the robot works. Of legs that
+hang on several lines, firmware gets the one constant it takes, with those of the others in comments.
 """
 
 from collections.abc import Sequence
@@ -12,10 +13,10 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.robot.export.mujoco_model import mjcf
-from wirebayes.robot.export.robot_models import sdf, urdf
+from wirebayes.robot.export.robot_models import cut_from, sdf, urdf
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Drums, Robot
-from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot, lines_of
 from wirebayes.robot.mechanics.drums import motor_angle, paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
@@ -43,7 +44,7 @@ def reprapfirmware(robot: Robot, line: WireDraws) -> str:
         (f"M669 K6 {count}{anchors}", "anchors, mm"),
         (f"M666 U{_joined(robot.lines, '.0f')}", "mechanical advantages"),
         (f"M666 W{robot.mass_kg:g}", "mover, kg"),
-        (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.band}"),
+        (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.described}"),
         (f"M666 Y{_joined(1e3 * robot.beyond_m, '.0f')}", "wire beyond each anchor, mm"),
         (f"M666 I{_joined(np.full(robot.legs, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
         (f"M666 X{_joined(np.full(robot.legs, robot.rule.highest_N), 'g')}", "largest planned force, N"),
@@ -65,7 +66,7 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         "[printer]\nkinematics: winch\n"
         "# The next options are those of the Hangprinter branch of Klipper; upstream does not know them.\n"
         f"winch_mover_weight: {robot.mass_kg:g}  # kg\n"
-        f"winch_spring_constant: {spring.mean_N:.0f}  # N per unit strain: {spring.band}\n"
+        f"winch_spring_constant: {spring.mean_N:.0f}  # N per unit strain: {spring.described}\n"
         f"winch_mechanical_advantage: {_joined(robot.lines, '.0f', ', ')}\n"
         f"winch_guy_wire_lengths: {_joined(1e3 * robot.beyond_m, '.0f', ', ')}  # mm\n"
         f"winch_min_force: {_joined(np.full(robot.legs, robot.rule.lowest_N), 'g', ', ')}  # N\n"
@@ -93,7 +94,7 @@ def _spools(robot: Robot, drums: Drums) -> tuple[Floats, Floats]:
 
 
 def creep_table(
-    robot: Robot, line: WireDraws, tensions_N: Sequence[float], times_s: Sequence[float]
+    robot: Robot, line: WireDraws, tensions_N: Sequence[float], times_s: Sequence[float], wire: str | None = None
 ) -> list[tuple[float, ...]]:
     """Growth of a new line under constant tension, rows of `TABLE`: mm per metre of line with a 90 % interval.
 
@@ -103,6 +104,8 @@ def creep_table(
         Which of its wires' law and length are used.
     line : WireDraws
     tensions_N, times_s : sequence of float
+    wire : str, optional
+        Of which of the legs' wires; default: the first that is fitted.
 
     Returns
     -------
@@ -110,7 +113,7 @@ def creep_table(
         Tension, N; time, s; mean, standard deviation and 5, 50 and 95 % quantiles of the growth, mm/m.
     """
     rows: list[tuple[float, ...]] = []
-    sample = _sample(robot, for_robot(robot, line))
+    sample = _sample(robot, for_robot(robot, line), wire or _first(robot))
     for load in tensions_N:
         for time, creep in zip(times_s, sample.creep_mm(load, np.asarray(times_s, float)), strict=True):
             growth = 1e3 * creep / sample.length_mm
@@ -119,9 +122,27 @@ def creep_table(
     return rows
 
 
+def creep_tables(
+    robot: Robot, line: WireDraws, tensions_N: Sequence[float], times_s: Sequence[float]
+) -> tuple[tuple[str, ...], list[tuple[float | str, ...]]]:
+    """Header and rows of ``creep-table.csv``: `creep_table`, with the wire's name first where the legs have several.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    tensions_N, times_s : sequence of float
+    """
+    names = list(dict.fromkeys(robot.wire))
+    if len(names) == 1:
+        return TABLE, list(creep_table(robot, line, tensions_N, times_s))
+    of_each = {name: creep_table(robot, line, tensions_N, times_s, name) for name in names}
+    return ("wire", *TABLE), [(name, *row) for name, rows in of_each.items() for row in rows]
+
+
 @dataclass(frozen=True)
 class WorkingSpring:
-    """The line as a spring about the tension it works at.
+    """A line as a spring about the tension it works at.
 
     Attributes
     ----------
@@ -129,10 +150,16 @@ class WorkingSpring:
         Tangent stiffness, N per unit strain.
     remark : str
         At which tension, in words; empty where the stiffness is the same at all.
+    fitted : bool
+        False where the robot's file gives the wire's parameters, which then have no interval.
+    of : str
+        The wire's name, where the legs have several.
     """
 
     stiffness_N: Floats
     remark: str
+    fitted: bool = True
+    of: str = ""
 
     @property
     def mean_N(self) -> float:
@@ -141,37 +168,55 @@ class WorkingSpring:
 
     @property
     def band(self) -> str:
-        """Its 90 % interval in words."""
+        """Its 90 % interval in words, or where it comes from."""
+        if not self.fitted:
+            return "as the robot's file gives it"
         low, high = np.quantile(self.stiffness_N, [0.05, 0.95])
         return f"90 % interval {low:.0f} to {high:.0f}"
 
+    @property
+    def described(self) -> str:
+        """The same, with the wire's name where there are several."""
+        return f"of wire {self.of}, {self.band}" if self.of else self.band
 
-def working_spring(robot: Robot, line: WireDraws) -> WorkingSpring:
-    """Stiffness of the line at its mean tension at the home pose; a middle tested tension where none holds that pose.
+
+def working_spring(robot: Robot, line: WireDraws, wire: str | None = None) -> WorkingSpring:
+    """Stiffness of a line at its mean tension at the home pose; a middle tested tension where none holds that pose.
 
     Draws that cannot carry the tension are left out, and the remark says how many.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    wire : str, optional
+        Which of the legs' wires; default: the first that is fitted.
 
     Raises
     ------
     InputError
         No draw of the line can carry that tension.
     """
+    wire = wire or _first(robot)
     wires = for_robot(robot, line)
     tau = inverse.tensions(robot, robot.home_m[None], matrix(robot.home_rotation_rad)[None])[0]
-    fitted = np.array([name not in robot.given for name in robot.wire])
     held = bool(np.isfinite(tau).all())
-    where = float(tau[fitted if fitted.any() else slice(None)].mean()) if held else line.tension_ref_N
-    stiffness = _sample(robot, wires).stiffness_N(where)
+    where = (
+        float(tau[[name == wire for name in robot.wire]].mean()) if held else line.each.get(wire, line).tension_ref_N
+    )
+    stiffness = _sample(robot, wires, wire).stiffness_N(where)
     good = np.isfinite(stiffness)
+    fitted, of = wire not in robot.given, wire if len({*robot.wire}) > 1 else ""
     if not good.any():
-        raise InputError(f"{robot.name}: the fitted line cannot carry {where:.3g} N, so no spring constant is known")
+        which = f"the wire {of}" if of else "the fitted line" if fitted else f"the wire {wire}"
+        raise InputError(f"{robot.name}: {which} cannot carry {where:.3g} N, so no spring constant is known")
     if wires.law == "hooke" and not wires.at("strain"):
-        return WorkingSpring(stiffness, "")
+        return WorkingSpring(stiffness, "", fitted, of)
     point = "the mean tension of the lines at the home pose" if held else "a middle tension of the test"
     remark = f"The spring constant depends on the tension: it is the tangent at {where:.4g} N, {point}."
     if not good.all():
         remark += f" {100 * np.mean(~good):.2g} % of the draws cannot carry that tension and are left out."
-    return WorkingSpring(stiffness[good], remark)
+    return WorkingSpring(stiffness[good], remark, fitted, of)
 
 
 def simulators(robot: Robot, line: WireDraws) -> dict[str, str]:
@@ -205,30 +250,55 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
         return None
     zero, tau = commands.zero_m.T, commands.tension_N.T
     k1 = np.broadcast_to(wires.theta["k1"], zero.shape)
+    which = cut_from(robot)
     if wires.law == "hooke" and not wires.at("strain"):
-        return mjcf(robot, k1[:, 0], zero[:, 0], commands.offset_m[0])
+        return mjcf(robot, k1[:, 0], zero[:, 0], commands.offset_m[0], remark=which)
     stretched = stretched_length(wires, zero, tau)
     slope = tension(wires, stretched, zero)[1]
     rest = stretched - tau / slope
     pulls = ", ".join(f"{value:.4g}" for value in tau[:, 0])
     remark = f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
+    remark += f"; {which}" if which else ""
     return mjcf(robot, (slope * rest)[:, 0], rest[:, 0], commands.offset_m[0], remark=remark)
 
 
-def _sample(robot: Robot, wires: Wires) -> FreshSample:
-    """A fresh sample of the fitted line, as long as the first leg that hangs on it."""
-    legs = [i for i, name in enumerate(robot.wire) if name not in robot.given]
-    return wires.sample(legs[0] if legs else 0)
+def _first(robot: Robot) -> str:
+    """The first leg's wire that is fitted; the first leg's where the robot's file gives them all."""
+    return next((name for name in robot.wire if name not in robot.given), robot.wire[0])
+
+
+def _sample(robot: Robot, wires: Wires, wire: str) -> FreshSample:
+    """A fresh sample of a line, as long as the first leg that hangs on it."""
+    return wires.sample(robot.wire.index(wire))
 
 
 def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> str:
+    """What the numbers belong to, as comments."""
+    of_leg = lines_of(robot, line)
+    names = list(dict.fromkeys(robot.wire))
+    about = {name: _origin(name in robot.given, of_leg[robot.wire.index(name)]) for name in names}
+    lines = [f"{robot.name}: line {about[names[0]]}."]
+    if len(names) > 1:
+        lines = [f"{robot.name}: {cut_from(robot)}."]
+        for name in names:
+            own = working_spring(robot, line, name)
+            constant = f"spring constant {own.mean_N:.0f} N, {own.band}"
+            lines.append(" ".join([f"Wire {name}: {about[name]}; {constant}.", own.remark]).strip())
+        lines.append(f"The firmware takes one spring constant for all wires: here that of wire {spring.of}.")
+    else:
+        lines += [spring.remark] if spring.remark else []
+    lines.insert(1, "The firmware knows no creep; creep-table.csv says how much a line grows under load.")
+    return "".join(f"{mark} {text}\n" for text in (*lines, _pulleys_left_out(robot)) if text)
+
+
+def _origin(is_given: bool, line: WireDraws) -> str:
+    """Where a line's numbers come from; only a fit has tests."""
+    if is_given:
+        return "as the robot's file gives it"
     tested = ""
     if line.tension_range_N is not None:
         tested = f", tested from {line.tension_range_N[0]:g} to {line.tension_range_N[1]:g} N"
-    return (
-        f"{mark} {robot.name}: line fitted at {line.length_mm:g} mm{tested}.\n"
-        f"{mark} The firmware knows no creep; creep-table.csv says how much a line grows under load.\n"
-    ) + "".join(f"{mark} {remark}\n" for remark in (spring.remark, _pulleys_left_out(robot)) if remark)
+    return f"fitted at {line.length_mm:g} mm{tested}"
 
 
 def _pulleys_left_out(robot: Robot) -> str:

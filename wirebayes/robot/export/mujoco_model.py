@@ -66,7 +66,7 @@ def mjcf(
         f'<site site="exit{i}"/>{_wrapped(i) if radius[i, 0] else ""}<site site="point{i}"/></spatial>'
         for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
     )
-    comment = "".join(f"<!-- {text} -->" for text in (remark, _STILL if pulleys else "") if text)
+    comment = "".join(f"<!-- {text.replace('--', '- -')} -->" for text in (remark, _STILL if pulleys else "") if text)
     inertia = _row(np.full(3, m * arm2))
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '

@@ -83,6 +83,16 @@ def sdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
     ])  # fmt: skip
 
 
+def cut_from(robot: Robot) -> str:
+    """Which legs hang on which wire of the robot's file, in words; nothing where all hang on one."""
+    legs: dict[str, list[str]] = {}
+    for i, name in enumerate(robot.wire, 1):
+        legs.setdefault(name, []).append(str(i))
+    if len(legs) < 2:
+        return ""
+    return "; ".join(f"wire {name} in leg{'s' * (len(own) > 1)} {', '.join(own)}" for name, own in legs.items())
+
+
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -95,6 +105,7 @@ def _inertia(robot: Robot) -> tuple[float, ...]:
 def _left_out(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> list[str]:
     """Comments, without the double hyphens that XML forbids in them."""
     lines = ["The wires are left out: this format knows none. They pull from exit_i to point_i, and only when longer."]
+    lines += [text for text in (cut_from(robot),) if text]
     for i, (lines_i, beyond, k, zero) in enumerate(
         zip(robot.lines, robot.beyond_m, stiffness_N, zero_m, strict=True), 1
     ):
