@@ -229,3 +229,42 @@ def test_what_is_known_of_a_fit_is_not_said_of_a_given_wire():
         assert "line as the robot's file gives it.\n" in text
         assert "N: as the robot's file gives it" in text or "strain: as the robot's file gives it" in text
         assert "fitted" not in text and "tested" not in text and "interval" not in text
+
+
+@pytest.mark.parametrize("name", ["linear-7", "hangprinter-4", "cogiro-desk"])
+@pytest.mark.parametrize("with_pulleys", [False, True])
+def test_the_mujoco_model_starts_balanced_at_its_home_pose(name, with_pulleys):
+    mujoco = pytest.importorskip("mujoco")
+    robot, line = schema.read(name), _line("hooke", None, {})
+    turn = np.array([0.02, -0.03, 0.05]) * (robot.degrees == 6)
+    # the first anchor at the world's origin, where an empty start would put the platform
+    shift = robot.exit_m[0]
+    robot = replace(robot, exit_m=robot.exit_m - shift, home_m=robot.home_m - shift, home_rotation_rad=turn)
+    if with_pulleys:
+        robot = cases.with_pulleys(robot, np.random.default_rng(0))
+    model = mujoco.MjModel.from_xml_string(files.mujoco(robot, line))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert np.abs(data.qacc).max() < 1e-6
+    assert data.ten_length.min() > 0.1
+    np.testing.assert_allclose(data.qpos[:3], robot.home_m, atol=1e-12)
+    np.testing.assert_allclose(data.body(1).xpos, robot.home_m, atol=1e-12)
+    np.testing.assert_allclose(data.body(1).xmat.reshape(3, 3), rotation.matrix(turn), atol=1e-12)
+    data.qpos[0] += 0.01  # along the world's axis, whatever the platform's orientation
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.body(1).xpos, robot.home_m + [0.01, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_platform_settles_at_a_turned_home():
+    pytest.importorskip("mujoco")
+    from wirebayes.robot.export.mujoco_model import settle
+
+    turn = np.array([0.02, -0.03, 0.05])
+    robot, line = replace(schema.read("linear-7"), home_rotation_rad=turn), _line("hooke", None, {}).centre()
+    x, R, tau = _home(robot)
+    commands = inverse.commands(robot, draws.for_robot(robot, line), x, R, tau)
+    lengths = np.full(robot.legs, line.parameters["k1"][0]), commands.zero_m[0], commands.offset_m[0]
+    found, rotated, rested = settle(robot, *lengths, x[0] + 1e-3, np.eye(3), softest_N_m=10.0)
+    assert rested
+    np.testing.assert_allclose(found, x[0], atol=1e-6)
+    np.testing.assert_allclose(rotated, R[0], atol=1e-6)

@@ -30,7 +30,9 @@ def mjcf(
     remark: str = "",
     towards_m: Floats | None = None,
 ) -> str:
-    """MuJoCo model (MJCF) of a robot with given lengths.
+    """MuJoCo model (MJCF) of a robot with given lengths, which starts at its home pose.
+
+    The first three coordinates are the position in the world, the others the rotation from the home orientation.
 
     Parameters
     ----------
@@ -48,12 +50,14 @@ def mjcf(
     m, arm2 = robot.mass_kg, robot.size_m**2
     stiffness = k1_N * robot.lines**2 / zero_m
     rest = np.maximum((zero_m - offset_m) / robot.lines, 0.0)
-    slides = "".join(
-        f'<joint type="slide" axis="{axis}" damping="{damping_N_s_m!r}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
+    turn = matrix(robot.home_rotation_rad)
+    slides = "".join(  # axes are written in the body's frame: the rows of its rotation are the world's
+        f'<joint type="slide" axis="{_row(axis)}" ref="{float(at)!r}" damping="{damping_N_s_m!r}"/>'
+        for axis, at in zip(turn, robot.home_m, strict=True)
     )
     ball = f'<joint type="ball" damping="{damping_N_s_m * arm2!r}"/>' if robot.degrees == 6 else ""
     if towards_m is None:
-        towards_m = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+        towards_m = robot.home_m + robot.platform_m @ turn.T
     radius, axis = wheels(robot)
     exits = "".join(f'<site name="exit{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_m - radius * axis))
     pulleys = "".join(
@@ -70,7 +74,8 @@ def mjcf(
     inertia = _row(np.full(3, m * arm2))
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
-        f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}<body>{slides}{ball}'
+        f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}'
+        f'<body pos="{_row(robot.home_m)}" quat="{_row(_quaternion(robot.home_rotation_rad))}">{slides}{ball}'
         f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
@@ -94,6 +99,12 @@ def _rim(i: int, exit_m: Floats, radius: float, axis: Floats, towards_m: Floats)
         f'<geom name="rim{i}" type="cylinder" size="{radius!r} {0.2 * radius!r}" pos="{radius!r} 0 0" '
         f'zaxis="0 1 0" contype="0" conaffinity="0"/><site name="side{i}" pos="{radius!r} 0 {2 * radius!r}"/></body>'
     )
+
+
+def _quaternion(rotation_vector_rad: Floats) -> Floats:
+    """As MuJoCo writes them: the real part first."""
+    angle = float(np.linalg.norm(rotation_vector_rad))
+    return np.concatenate([[np.cos(angle / 2)], 0.5 * np.sinc(angle / (2 * np.pi)) * rotation_vector_rad])
 
 
 def _wrapped(i: int) -> str:
@@ -143,10 +154,9 @@ def settle(
     model: Any = mujoco.MjModel.from_xml_string(text)
     data: Any = mujoco.MjData(model)
     data.qpos[:3] = start_m
+    home = matrix(robot.home_rotation_rad)
     if robot.degrees == 6:
-        v = vector(start_rotation[None])[0]
-        angle = float(np.linalg.norm(v))
-        mujoco.mju_axisAngle2Quat(data.qpos[3:7], v / angle if angle > 0 else np.array([1.0, 0, 0]), angle)
+        data.qpos[3:7] = _quaternion(vector((home.T @ start_rotation)[None])[0])
     rested, calm = False, 0
     for _ in range(0, max_steps, 50):
         mujoco.mj_step(model, data, 50)
@@ -159,5 +169,5 @@ def settle(
     if robot.degrees == 6:
         flat = np.zeros(9)
         mujoco.mju_quat2Mat(flat, data.qpos[3:7])
-        rotation = flat.reshape(3, 3)
+        rotation = home @ flat.reshape(3, 3)
     return np.array(data.qpos[:3]), rotation, rested
