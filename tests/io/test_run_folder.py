@@ -112,6 +112,38 @@ def test_another_configuration_is_refused_by_name(tmp_path, change, found):
     assert (tmp_path / "out" / "configuration.json").read_bytes() == before
 
 
+OPTIONS = {"--position": None, "--times": "0,60", "readings": "abc"}
+
+
+def test_options_are_refused_by_their_names_and_values(tmp_path):
+    opened(tmp_path / "out", {"command": "pose", "options": OPTIONS})
+    other = OPTIONS | {"--position": "0.1,0,0.3", "readings": "abd", "--map": "0.4"}
+    with pytest.raises(InputError) as caught:
+        opened(tmp_path / "out", {"command": "pose", "options": other, "history": {"of": "joints", "rows": 3}})
+    assert (
+        "configuration: --position is unset there, 0.1,0,0.3 here; options.readings is abc there, abd here; --map is "
+        "unset there, 0.4 here; and 2 more; expected"
+    ) in str(caught.value)
+    with pytest.raises(InputError, match="history.of is nothing there, joints here; expected"):
+        opened(tmp_path / "out", {"command": "pose", "options": OPTIONS, "history": {"of": "joints"}})
+
+
+def test_options_that_were_stored_without_names_are_still_known(tmp_path):
+    for folder, values in (
+        ("same", [None, "0,60", "abc"]),
+        ("other", [None, "0,10", "abc"]),
+        ("more", [None, 3, 2, 1]),
+    ):
+        opened(tmp_path / folder, {"command": "pose", "options": values})
+    assert opened(tmp_path / "same", {"command": "pose", "options": OPTIONS}).state == "resumed"
+    with pytest.raises(InputError, match=r"configuration: --times is 0,10 there, 0,60 here; expected"):
+        opened(tmp_path / "other", {"command": "pose", "options": OPTIONS})
+    with pytest.raises(
+        InputError, match="configuration: options are others there, stored without their names; expected"
+    ):
+        opened(tmp_path / "more", {"command": "pose", "options": OPTIONS})
+
+
 def test_a_key_that_is_gone_is_a_difference_too(tmp_path):
     opened(tmp_path / "out", CONFIGURATION)
     with pytest.raises(InputError, match="seed is 0 there, nothing here"):

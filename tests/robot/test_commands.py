@@ -371,6 +371,24 @@ def test_export_speaks_the_firmwares_units(fitted, tmp_path):
     assert first["q05_mm_per_m"] < first["q50_mm_per_m"] < first["q95_mm_per_m"]
 
 
+def test_a_folder_of_other_options_is_refused_by_their_names(fitted, tmp_path, capsys):
+    out = str(tmp_path / "out")
+    arguments = ["export", "hangprinter-4", "--wires", str(fitted), "--draws", "5", "--output", out]
+    assert main(arguments) == 0
+    assert main(arguments) == 0
+    assert main([*arguments, "--tensions", "1,2"]) == 2
+    assert "configuration: --tensions is 1,2,4,8 there, 1,2 here; expected" in capsys.readouterr().err
+    pose = ["pose", "linear-7", "--wires", str(fitted), "--draws", "5", "--times", "0,60", "--output", f"{out}-pose"]
+    way = tmp_path / "way.csv"
+    way.write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,0,0,.6\n")
+    assert main([*pose[:-4], "--trajectory", str(way), *pose[-2:]]) == 0
+    assert main([*pose[:-4], "--trajectory", str(way), "--payload", "0.1", "--reference-sd", "2", *pose[-2:]]) == 2
+    expected = "--payload is 0.0 there, 0.1 here; --reference-sd (m) is 0.0 there, 0.002 here; expected"
+    assert expected in capsys.readouterr().err
+    assert main(pose) == 2
+    assert "configuration: --times is unset there, 0,60 here; --tolerance is unset" in capsys.readouterr().err
+
+
 def test_the_exported_model_settles_at_home_in_mujoco(fitted, tmp_path):
     mujoco = pytest.importorskip("mujoco")
     out = tmp_path / "out"

@@ -309,18 +309,36 @@ def differences(found: Any, wanted: Any, key: str = "") -> list[str]:
     list of str
         Empty where they agree.
     """
+    if isinstance(found, list) and isinstance(wanted, dict):  # stored before options had names, in the order of now
+        if len(found) != len(wanted):
+            return [f"{key} are others there, stored without their names"]
+        found = dict(zip(wanted, found, strict=True))
+    if isinstance(found, dict) and found and wanted == _ABSENT:
+        wanted = {}
+    if isinstance(wanted, dict) and wanted and found == _ABSENT:
+        found = {}
     if isinstance(found, dict) and isinstance(wanted, dict):
         keys = [*wanted, *(name for name in found if name not in wanted)]
-        parts = [
-            differences(found.get(name, "nothing"), wanted.get(name, "nothing"), f"{key}.{name}" if key else name)
-            for name in keys
-        ]
+        parts = [differences(_value(found, name), _value(wanted, name), _below(key, name)) for name in keys]
         return [phrase for part in parts for phrase in part]
     if found == wanted:
         return []
     return [f"{key or 'content'} is {_short(found)} there, {_short(wanted)} here"]
 
 
+_ABSENT = "nothing"
+
+
+def _value(side: Mapping[str, Any], name: str) -> Any:
+    """A value of a configuration; an option that is absent is unset."""
+    return side.get(name, None if name.startswith("--") else _ABSENT)
+
+
+def _below(key: str, name: str) -> str:
+    """Where a value stands; the name of an option is enough."""
+    return f"{key}.{name}" if key and not name.startswith("--") else name
+
+
 def _short(value: Any, most: int = 40) -> str:
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    text = "unset" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
     return text if len(text) <= most else text[: most - 3] + "..."

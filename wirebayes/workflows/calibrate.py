@@ -115,9 +115,12 @@ def calibrate(
         session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, row_place, bias > 0)
         read = hash_of({"readings": text})
     line = draws_for(machine, wires, draws, experiment, own)
-    options = (experiment, tension_sd, tilt_sd, reference_sd, specimen_spread, read, *((bias,) if bias else ()))
+    options = {
+        "--experiment": experiment, "--tension-sd": tension_sd, "--tilt-sd": tilt_sd, "--reference-sd": reference_sd,
+        "--specimen-spread": specimen_spread, "readings": read, **({"--tension-bias": bias} if bias else {}),
+    }  # fmt: skip
     place = Place.at(output)
-    decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, *options)
+    decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
             prior = Prior(line, 1e-3 * reference_sd, typical_spread(line, specimen_spread), bias_sd_N=bias)

@@ -73,9 +73,9 @@ def export(
     contents |= files.simulators(machine, line)
     header, table = files.creep_tables(machine, line, loads, moments)
     place = Place.at(output)
-    options = (experiment, text_of(tensions), text_of(times))
+    options = {"--experiment": experiment, "--tensions": text_of(tensions), "--times": text_of(times)}
     posterior = posterior_of(wires, experiment)
-    with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, *options)) as run:
+    with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, options)) as run:
         if run.state != "done":
             write_csv(run.directory / "creep-table.csv", header, table)
             for name, text in contents.items():

@@ -1,8 +1,9 @@
 """A pose of a robot on creeping wires."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from wirebayes.robot.history.history import with_payload
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.answer import Answer, answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.workers import computing
@@ -169,40 +170,50 @@ def pose(
     tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
     specimen_spread = typical_spread(line, check_spread(specimen_spread, alike=False))
-    carried = (payload, None if payload_at is None else text_of(payload_at))
+    carried = {"--payload": payload, **_spelled({"--payload-at": payload_at})}
+    at = _spelled({"--position": position, "--rotation": rotation})
     if over_time:
         _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
         _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
         errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
-        decides = configuration(
-            "pose", robot, posterior_of(wires, experiment), draws, seed, own, experiment, *carried,
-            None if position is None else text_of(position), None if rotation is None else text_of(rotation),
-        )  # fmt: skip
+        options = {"--experiment": experiment, **carried, **at}
+        decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, options)
         return pose_history(machine, line, joints, trajectory, errors, (where, matrix(turn)), seed, decides,
                             Place.at(output), own, progress)  # fmt: skip
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
     request = PoseRequest(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread,
                           seed, slices)  # fmt: skip
-    at = (None if values is None else text_of(values) for values in (position, rotation))
-    other_draws = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
-    options = (experiment, *at, text_of(times), tolerance, tolerance_tilt, specimen_spread, other_draws, *carried)
-    mapped = () if slices is LEVEL else (plain(asdict(slices)),)
+    options = {
+        "--experiment": experiment, **at, "--times": text_of(times), "--tolerance": tolerance,
+        "--tolerance-tilt": tolerance_tilt, "--specimen-spread": specimen_spread,
+        "--other-fit": None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR), **carried,
+    }  # fmt: skip
+    if slices is not LEVEL:
+        options["--map-heights, --map-rotation"] = plain(asdict(slices))
     place, posterior = Place.at(output), posterior_of(wires, experiment)
-    decides = configuration("pose", robot, posterior, draws, seed, own, *options, *mapped)
+    decides = configuration("pose", robot, posterior, draws, seed, own, options)
     with open_run(place.path, decides) as run, computing():
         if run.state == "done":
             return Pose(place, own, computed=False)
-        found = answer(machine, line, request, other)
-        write_json(run.directory / "pose.json", found.content)
-        if found.maps:
-            write_csv(run.directory / "workspace.csv", TABLE, rows(found.maps))
-        from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
-
-        pictures.save_pose(run.directory, machine, request, found)
+        _write(run.directory, machine, request, answer(machine, line, request, other))
         run.finish()
     return Pose(place, own)
+
+
+def _write(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
+    write_json(folder / "pose.json", found.content)
+    if found.maps:
+        write_csv(folder / "workspace.csv", TABLE, rows(found.maps))
+    from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
+
+    pictures.save_pose(folder, robot, request, found)
+
+
+def _spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
+    """Options as the command line spells them; None where they were not given."""
+    return {name: None if values is None else text_of(values) for name, values in options.items()}
 
 
 def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:

@@ -147,9 +147,17 @@ def pose_history(
         text = as_csv(option[2:], given)
         history = table.parse(option[2:], text, robot, columns, row_place)
         read = hash_of({option: text})
-    spread = [errors.reference_m, errors.spread, errors.tension_N, errors.tilt_rad]
-    known = () if errors.calibrated is None else (hash_of(to_dict(errors.calibrated)),)
-    with open_run(place.path, decides | {"history": [option[2:], read, *spread, *known]}) as run:
+    lasting = {  # in a fixed order, as in `wires.configuration`
+        "of": option[2:],
+        "content": read,
+        "--reference-sd (m)": errors.reference_m,
+        "--specimen-spread": errors.spread,
+        "--tension-sd": errors.tension_N,
+        "--tilt-sd": errors.tilt_rad,
+    }
+    if errors.calibrated is not None:
+        lasting["--calibration"] = hash_of(to_dict(errors.calibrated))
+    with open_run(place.path, decides | {"history": lasting}) as run:
         if run.state == "done":
             return Pose(place, own_effects, computed=False)
         with computing(), np.errstate(all="ignore"):  # a draw whose platform falls has no numbers

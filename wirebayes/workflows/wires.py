@@ -311,7 +311,13 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
 
 
 def configuration(
-    command: str, robot: RobotLike, posterior: Path | str, draws: int, seed: int, own_effects: Path | None, *rest: Any
+    command: str,
+    robot: RobotLike,
+    posterior: Path | str,
+    draws: int,
+    seed: int,
+    own_effects: Path | None,
+    options: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Everything that decides the results; files by their content, not by where they lie.
 
@@ -323,8 +329,8 @@ def configuration(
         The file of the wires' draws.
     draws, seed : int
     own_effects : Path or None
-    *rest
-        The command's own options, in a fixed order.
+    options : mapping of name to value
+        The command's own. Their order is fixed: folders made before the names were stored have the values alone.
 
     Returns
     -------
@@ -339,7 +345,7 @@ def configuration(
         "own_effects": source_of(own_effects),
         "draws": draws,
         "seed": seed,
-        "options": list(rest),
+        "options": dict(options),
     }
 
 
