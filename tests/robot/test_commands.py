@@ -303,6 +303,30 @@ def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, ca
     assert not out.exists()
 
 
+def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(fitted, session_csv, tmp_path, capsys):
+    file, truth = session_csv
+    arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "20", "--output"]
+    assert main([*arguments, str(tmp_path / "good")]) == 0
+    assert "warning" not in capsys.readouterr().err
+    assert json.loads((tmp_path / "good" / "calibrate.json").read_text())["warnings"] == []
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    for k, cells in enumerate(lines[1:]):
+        cells[0] = str(10 * (k + 1))
+    lines[2][1] = "50"  # metres, in x
+    lines[4][6] = "2.5"  # radians, about z
+    file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
+    assert main([*arguments, str(tmp_path / "odd")]) == 0
+    shown = capsys.readouterr().err.splitlines()
+    warned = [line for line in shown if "warning" in line]
+    assert [line.split(":")[1] for line in warned] == [" hold 20", " hold 40"]
+    assert "the requested pose is 49.9 m and 0.0" in warned[0]
+    assert " m and 2.5 rad from the one that its joint values lead to" in warned[1]
+    found = json.loads((tmp_path / "odd" / "calibrate.json").read_text())
+    assert found["with_creep_model"]["converged"]
+    np.testing.assert_allclose(found["with_creep_model"]["length_m"]["mean"], truth, atol=1e-2)
+    assert "Hold 20: the requested pose is 49.9 m" in (tmp_path / "odd" / "report.html").read_text()
+
+
 def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitted, session_csv, tmp_path, capsys):
     file, _ = session_csv
     lines = [line.split(",") for line in file.read_text().splitlines()]

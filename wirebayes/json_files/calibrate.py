@@ -110,3 +110,4 @@ class CalibrateJson(CalibratedPoses, Observed):
     prior: CalibrationPrior
     with_creep_model: EstimatedLengths
     by_hooke_alone: EstimatedLengths
+    warnings: NotRequired[list[str]]

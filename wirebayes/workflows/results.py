@@ -572,13 +572,14 @@ class Calibration(Result[CalibrateJson]):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """That the lengths should not be used, if so."""
+        """That the lengths should not be used, if so, and holds whose readings contradict each other."""
         with stored_results(self.folder / self._content):
             found = self.summary()
             models = (("the creep model", found["with_creep_model"]), ("Hooke's law alone", found["by_hooke_alone"]))
             astray = [called for called, lengths in models if not lengths["converged"]]
         advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
-        return (f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}",) if astray else ()
+        unsure = [f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}"] if astray else []
+        return (*unsure, *(f"warning: {warning}" for warning in found.get("warnings", [])))
 
     def _short_form(self) -> list[str]:
         found = self.summary()

@@ -15,6 +15,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found: CalibrateJson = read_json(folder / "calibrate.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     first: list[Block] = [Columns([_done(found), _known(found), _unknown(creep, hooke)])]
+    first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in found.get("warnings", [])]
     if not creep["converged"]:
         first.insert(0, Text("Not converged: do not use any of these lengths.", strong=True))
     sections = [

@@ -32,6 +32,8 @@ class Calibration:
         Current zero-tension lengths with their standard errors; the creep strain in them.
     position_m, rotation : (m, 3), (m, 3, 3) arrays
         Where the robot is now, at the mode.
+    begun_m, begun_rotation : (m, p, 3), (m, p, 3, 3) arrays
+        Where it was at the beginning of every hold.
     misfit : (m,) array
         Mean squared standardised residual; well above one when the model cannot explain the readings.
     converged : (m,) bool array
@@ -44,6 +46,8 @@ class Calibration:
     creep: Floats
     position_m: Floats
     rotation: Floats
+    begun_m: Floats
+    begun_rotation: Floats
     misfit: Floats
     converged: NDArray[np.bool_]
 
@@ -108,7 +112,8 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
     misfit = ((readings - here.readings) ** 2).mean(1)
     return Calibration(
         mean + white @ root.T, root @ spread @ root.T, here.length_m, np.sqrt(variance), here.creep,
-        here.position_m[:, -1], here.rotation[:, -1], misfit, converged & here.solved,
+        here.position_m[:, -1], here.rotation[:, -1], here.begun_m, here.begun_rotation, misfit,
+        converged & here.solved,
     )  # fmt: skip
 
 

@@ -48,6 +48,8 @@ class Session:
     motion : (p, w) array, optional
         1 where a wire was pulled in last, -1 where it was let out, 0 where it did not move: the sign of its sensor's
         bias. Without it the bias is a constant.
+    number : (p,) array, optional
+        What the holds are called; without it they are counted from 1.
     """
 
     position_m: Floats
@@ -58,6 +60,7 @@ class Session:
     tension_sd_N: float
     tilt_sd_rad: float | None = None
     motion: Floats | None = None
+    number: Floats | None = None
 
     @property
     def bias_sign(self) -> Floats:

@@ -169,6 +169,7 @@ def parse(
         tension_sd_N,
         tilt_sd_rad if tilted else None,
         motion,
+        table[:, 0],
     )
     readings = [(tension[read_here] / tension_sd_N).ravel()]
     if tilted:
