@@ -177,7 +177,7 @@ class Tolerances(TypedDict):
 
 
 class TimeWithin(TypedDict):
-    """How long the pose stays within tolerance with a probability of 95 %."""
+    """How long the pose stays within tolerance with a probability of 95 %: the last such time of those evaluated."""
 
     longest_time_within_s: float
     still_within_at_the_end: bool
