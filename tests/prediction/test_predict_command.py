@@ -221,3 +221,7 @@ def test_what_speaks_against_the_fit_is_said_again(
     assert len(line.doubts) == 2
     use = np.ones(7), 1.0, np.full(7, 1e-3 * line.length_mm)
     assert warnings(read_robot("linear-7"), line, *use)[:2] == [*line.doubts]
+    written = tmp_path / "export"
+    assert cli.main(["export", "hangprinter-4", "--wires", str(folder), "--output", str(written)]) == 0
+    assert "warning: the fit of roc-line-1.71m has not converged" in capsys.readouterr().err
+    assert "# Beware: the fit of roc-line-1.71m has not converged" in (written / "klipper.cfg").read_text()

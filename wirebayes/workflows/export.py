@@ -3,6 +3,7 @@
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_text
 from wirebayes.robot.export import files
+from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, path_of, rising_times, text_of
 from wirebayes.workflows.results import Export, Place
 from wirebayes.workflows.wires import RobotLike, Wires, configuration, draws_for, posterior_of, robot_of
@@ -81,4 +82,4 @@ def export(
             for name, text in contents.items():
                 write_text(run.directory / name, text)
             run.finish()
-    return Export(place, own, computed=run.state != "done")
+    return Export(place, own, computed=run.state != "done", warnings=tuple(doubts(machine, line)))

@@ -599,11 +599,18 @@ class Calibration(Result[CalibrateJson]):
 class Export(Result[ExportSummary]):
     """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.
 
+    Attributes
+    ----------
+    warnings : tuple of str
+        What the fits say against using them; of results that were loaded the firmware's comments alone know.
+
     Examples
     --------
     >>> exported.files["klipper.cfg"].splitlines()[2]
     '[printer]'
     """
+
+    warnings: tuple[str, ...] = ()
 
     @property
     def files(self) -> dict[str, str]:
@@ -620,8 +627,8 @@ class Export(Result[ExportSummary]):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """What could not be exported."""
-        out = []
+        """What speaks against the fits, and what could not be exported."""
+        out = [f"warning: {warning}" for warning in self.warnings]
         if "klipper.cfg" not in self.files:
             out.append("no firmware settings: they exist for four or five drums with a position-only platform")
         if "robot.xml" not in self.files:

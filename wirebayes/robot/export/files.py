@@ -16,7 +16,7 @@ from wirebayes.robot.export.mujoco_model import mjcf
 from wirebayes.robot.export.robot_models import cut_from, sdf, urdf
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Drums, Robot
-from wirebayes.robot.mechanics.draws import WireDraws, for_robot, lines_of
+from wirebayes.robot.mechanics.draws import WireDraws, doubts, for_robot, lines_of
 from wirebayes.robot.mechanics.drums import motor_angle, paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
@@ -287,6 +287,7 @@ def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> st
         lines.append(f"The firmware takes one spring constant for all wires: here that of wire {spring.of}.")
     else:
         lines += [spring.remark] if spring.remark else []
+    lines[1:1] = [f"Beware: {doubt}." for doubt in doubts(robot, line)]
     lines.insert(1, "The firmware knows no creep; creep-table.csv says how much a line grows under load.")
     return "".join(f"{mark} {text}\n" for text in (*lines, _pulleys_left_out(robot)) if text)
 

@@ -295,6 +295,13 @@ def _specimens(line: WireDraws) -> Specimens:
     }
 
 
+def doubts(robot: Robot, line: WireDraws) -> list[str]:
+    """What the fits of the lines that legs hang on say against using them."""
+    of_leg = lines_of(robot, line)
+    used = {name: one for name, one in line.each.items() if any(leg is one for leg in of_leg)}
+    return [f"wire {name}: {text}" if line.others else text for name, one in used.items() for text in one.doubts]
+
+
 def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
     """One sentence for each doubt about a line's fit, and for each way in which a use leaves what was tested.
 
@@ -314,9 +321,10 @@ def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, ze
     -------
     list of str
     """
+    out = doubts(robot, line)
     if not line.others and not robot.given:
-        return _of_one(line, tension_N, time_s, zero_m)
-    of_leg, out = lines_of(robot, line), []
+        return out + _of_one(line, tension_N, time_s, zero_m)
+    of_leg = lines_of(robot, line)
     for name, one in line.each.items():
         own = np.array([leg is one for leg in of_leg])
         if own.any():  # a wire that the robot's file gives was not tested at all
@@ -326,7 +334,7 @@ def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, ze
 
 
 def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    out = list(line.doubts)
+    out = []
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:
         low, high = line.tension_range_N

@@ -8,6 +8,7 @@ from scipy.stats import norm
 from wirebayes.json_files.calibrate import CalibratedPoses, CalibrateJson, CalibrationPrior, EstimatedLengths, Observed
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
@@ -58,7 +59,7 @@ def answer(
         "by_hooke_alone": _lengths(robot, prior, plain),
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed)),
-        "warnings": _contradicted(robot, prior, session, known),
+        "warnings": [*doubts(robot, prior.line), *_contradicted(robot, prior, session, known)],
     }
     return content, calibrated(robot, prior, session, known)
 
