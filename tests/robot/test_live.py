@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from tests.robot.test_history import _joint_values_for, _line, _places
+from wirebayes.errors import InputError
 from wirebayes.robot.history.estimate import estimate
 from wirebayes.robot.history.follow import clock_starts, follow
 from wirebayes.robot.history.history import History
@@ -129,6 +131,94 @@ def test_time_goes_on_and_readings_are_asked_for():
         live.step(1.0, joint)
     with pytest.raises(ValueError, match="expected none"):
         live.step(2.0, joint, tension_N=np.ones(8))
+
+
+def _standing(reads=False, name="hangprinter-4"):
+    robot = schema.read(name)
+    live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=reads)
+    return live, _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+
+
+NAN4, INF4 = np.array([0, np.nan, 0, 0]), np.array([0, 0, np.inf, 0])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (lambda j: {"joint_m": j + NAN4}, "joint_m[1]: found nan; expected a finite length above 0"),
+        (lambda j: {"joint_m": j + INF4}, "joint_m[2]: found inf; expected a finite length above 0"),
+        (lambda j: {"joint_m": j * [1, 1, 1, 0]}, "joint_m[3]: found 0; expected a finite length above 0"),
+        (lambda j: {"joint_m": -1.5 * np.ones(4)}, "joint_m[0]: found -1.5; expected a finite length above 0"),
+        (lambda j: {"joint_m": 6.2}, "joint_m: found a single number; expected 4 numbers"),
+        (lambda j: {"joint_m": [6.2]}, "joint_m: found 1 in a list; expected 4 numbers"),
+        (lambda j: {"joint_m": j[:3]}, "joint_m: found 3 in a list; expected 4 numbers"),
+        (lambda j: {"joint_m": np.tile(j, (5, 1))}, "joint_m: found an array (5, 4); expected 4 numbers"),
+        (lambda j: {"joint_m": ["a"] * 4}, "joint_m: found what is not numbers; expected 4 numbers"),
+        (lambda j: {"nominal_m": 6.2}, "nominal_m: found a single number; expected 4 numbers"),
+        (lambda j: {"nominal_m": j + NAN4}, "nominal_m[1]: found nan; expected a finite length above 0"),
+        (lambda j: {"tension_N": 5.0}, "tension_N: found a single number; expected 4 numbers"),
+        (lambda j: {"tension_N": INF4}, "tension_N[2]: found inf; expected a finite number, or NaN where nothing was"),
+        (lambda j: {"tilt_rad": [0.1]}, "tilt_rad: found 1 in a list; expected 2 numbers"),
+        (lambda j: {"time_s": np.inf}, "time_s: found inf; expected a finite time"),
+        (lambda j: {"time_s": np.nan}, "time_s: found nan after 0, expected a later time"),
+        (lambda j: {"time_s": -1.0}, "time_s: found -1 after 0, expected a later time"),
+        (lambda j: {"time_s": "now"}, "time_s: found 'now'; expected a number"),
+    ],
+)
+def test_a_wrong_step_is_named_and_leaves_no_trace(given, message):
+    (live, joint), (other, _) = _standing(reads=True), _standing(reads=True)
+    tension = live.step(0.0, joint).tension_N
+    other.step(0.0, joint)
+    wrong = {"time_s": 1.0, "joint_m": joint} | given(joint)
+    with pytest.raises(InputError) as caught:
+        live.step(**wrong)
+    assert str(caught.value).startswith(message)
+    after, same = (one.step(2.0, joint, tension_N=tension) for one in (live, other))
+    assert after.held == 1
+    np.testing.assert_array_equal(after.joint_m, same.joint_m)
+    np.testing.assert_array_equal(after.low_m, same.low_m)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ((-5,), "mass_kg: found -5; expected kilograms, 0 or more"),
+        ((np.nan,), "mass_kg: found nan; expected kilograms, 0 or more"),
+        ((np.inf,), "mass_kg: found inf; expected kilograms, 0 or more"),
+        ((1.0, [1, 2]), "centre_m: found 2 in a list; expected 3 numbers"),
+        ((1.0, [1, 2, np.nan]), "centre_m[2]: found nan; expected a finite number"),
+    ],
+)
+def test_a_load_that_cannot_be_is_refused_and_changes_nothing(given, message):
+    live, joint = _standing()
+    before = live.robot
+    with pytest.raises(InputError) as caught:
+        live.load(*given)
+    assert str(caught.value) == message
+    assert live.robot is before
+
+
+def test_no_draws_are_refused():
+    with pytest.raises(InputError, match="^draws: found 0, expected a whole number, 1 or more$"):
+        wb.live("hangprinter-4", "out/fit", draws=0)
+
+
+def test_a_linear_actuator_may_stand_at_zero_or_below():
+    live, joint = _standing(name="linear-7")
+    assert live.step(0.0, joint).held == 1
+    shift = np.where(np.arange(7) == 0, joint, 0.0)
+    assert np.isfinite(live._joints("joint_m", joint - 2 * shift)).all()
+    with pytest.raises(InputError, match=r"joint_m\[0\]: found nan; expected a finite number$"):
+        live.step(1.0, joint + np.where(shift > 0, np.nan, 0.0))
+
+
+def test_a_platform_that_falls_is_an_answer_without_noise():
+    live, joint = _standing(name="cogiro-desk")
+    live.step(0.0, joint)
+    live.load(1e300)  # NumPy's warnings are errors here
+    fallen = live.step(1.0, joint)
+    assert fallen.held == 0
+    assert np.isnan(fallen.position_m).all()
 
 
 def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):

@@ -2,7 +2,7 @@
 
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.workflows.options import Numbers, PathLike, check_seed, check_spread, numbers, path_of
+from wirebayes.workflows.options import Numbers, PathLike, check_seed, check_spread, check_whole, numbers, path_of
 from wirebayes.workflows.pose_history import calibrated_errors, checked_errors
 from wirebayes.workflows.results import Calibration
 from wirebayes.workflows.wires import RobotLike, Wires, draws_for, robot_of
@@ -71,6 +71,7 @@ def live(
     where = machine.home_m if position is None else numbers("position", position, 3)
     turn = machine.home_rotation_rad if rotation is None else numbers("rotation", rotation, 3)
     errors = checked_errors(reference_sd, check_spread(specimen_spread), tension_sd, tilt_sd)
+    draws = check_whole("draws", draws, 1)
     line = draws_for(machine, wires, draws, experiment, path_of(own_effects))
     errors = calibrated_errors(errors, calibration, machine, line, wires, experiment)
     return LiveEstimator(machine, line, errors, (where, matrix(turn)), reads, check_seed(seed))

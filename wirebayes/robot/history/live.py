@@ -10,8 +10,9 @@ passes.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from wirebayes.errors import InputError
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, sensors, weight
@@ -131,7 +132,7 @@ class LiveEstimator:
         self._live = np.ones(self._columns, bool)
         self._joint = np.empty((self._columns, robot.legs))
 
-    def load(self, mass_kg: float, centre_m: Floats | None = None) -> None:
+    def load(self, mass_kg: float, centre_m: ArrayLike | None = None) -> None:
         """Set what the platform carries from now on beside its own mass.
 
         Parameters
@@ -139,16 +140,27 @@ class LiveEstimator:
         mass_kg : float
         centre_m : (3,) array, optional
             Its centre of mass in the platform's frame; the platform's own when left out.
+
+        Raises
+        ------
+        InputError
+            A negative mass, or what is not finite; the load stays as it was.
         """
-        self.robot = with_payload(self._bare, mass_kg, self._bare.centre_of_mass_m if centre_m is None else centre_m)
+        mass, centre = _number("mass_kg", mass_kg), self._bare.centre_of_mass_m
+        if not 0 <= mass < np.inf:
+            raise InputError(f"mass_kg: found {mass:g}; expected kilograms, 0 or more")
+        if centre_m is not None:
+            centre = _vector("centre_m", centre_m, 3)
+            _check("centre_m", centre, np.isfinite(centre), "a finite number")
+        self.robot = with_payload(self._bare, mass, centre)
 
     def step(
         self,
         time_s: float,
-        joint_m: Floats,
-        tension_N: Floats | None = None,
-        tilt_rad: Floats | None = None,
-        nominal_m: Floats | None = None,
+        joint_m: ArrayLike,
+        tension_N: ArrayLike | None = None,
+        tilt_rad: ArrayLike | None = None,
+        nominal_m: ArrayLike | None = None,
     ) -> LivePose:
         """Take in what was measured at a time, and say where the platform is.
 
@@ -171,15 +183,34 @@ class LiveEstimator:
 
         Raises
         ------
-        ValueError
-            Time does not go on, or readings are given to an estimator that was made without them.
+        InputError
+            A ValueError: time does not go on, readings are given to an estimator that was made without them, or
+            something is not finite or of a wrong shape. Nothing is taken in then, and the next step goes on from the
+            last good one.
         """
-        if not time_s > self._last:
-            raise ValueError(f"time_s: found {time_s:g} after {self._last:g}, expected a later time")
+        time = _number("time_s", time_s)
+        if not time > self._last:
+            raise InputError(f"time_s: found {time:g} after {self._last:g}, expected a later time")
+        if time == np.inf:
+            raise InputError("time_s: found inf; expected a finite time")
         if (tension_N is not None or tilt_rad is not None) and not self._reads:
-            raise ValueError("readings: found some, expected none; make the estimator with reads=True")
-        joint = np.asarray(joint_m, float)
-        nominal = joint if nominal_m is None else np.asarray(nominal_m, float)
+            raise InputError("readings: found some, expected none; make the estimator with reads=True")
+        joint = self._joints("joint_m", joint_m)
+        nominal = joint if nominal_m is None else self._joints("nominal_m", nominal_m)
+        legs = self.robot.legs
+        readings = np.concatenate([_reading("tension_N", tension_N, legs), _reading("tilt_rad", tilt_rad, 2)])
+        with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
+            return self._step(time, joint, nominal, readings)
+
+    def _joints(self, name: str, values: ArrayLike) -> Floats:
+        """Joint values as they can be: a drum has paid out some length, a linear actuator may stand on either side."""
+        given, linear = _vector(name, values, self.robot.legs), self.robot.is_linear
+        _check(name, given, np.isfinite(given) | ~linear, "a finite number")
+        _check(name, given, (np.isfinite(given) & (given > 0)) | linear, "a finite length above 0")
+        return given
+
+    def _step(self, time_s: float, joint: Floats, nominal: Floats, readings: Floats) -> LivePose:
+        """A step with arguments that are right; of all sensors, ``(w + 2,)``, NaN where one was not read."""
         each: Floats = np.broadcast_to(joint, (self._columns, self.robot.legs)).copy()
         each[-1] = nominal
         if self._last == -np.inf:
@@ -191,8 +222,8 @@ class LiveEstimator:
                 share = (part - before) / (time_s - before)
                 self._advance(part, joints + share * (each - joints))
         self._joint = each
-        if tension_N is not None or tilt_rad is not None:
-            self._read(time_s, tension_N, tilt_rad)
+        if np.isfinite(readings).any():
+            self._read(time_s, readings)
         self._last = time_s
         return self._pose(time_s, nominal)
 
@@ -255,14 +286,9 @@ class LiveEstimator:
         self._x[good], self._R[good] = there.position_m[there.found], there.rotation[there.found]
         self._live[rows[~there.found]] = False
 
-    def _read(self, time_s: float, tension_N: Floats | None, tilt_rad: Floats | None) -> None:
+    def _read(self, time_s: float, y: Floats) -> None:
         """What the sensors say, added to what they said before."""
-        n, legs, of = self._n, self.robot.legs, self._of
-        y = np.full(legs + 2, np.nan)
-        if tension_N is not None:
-            y[:legs] = tension_N
-        if tilt_rad is not None:
-            y[legs:] = tilt_rad
+        n, of = self._n, self._of
         h = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
         counts = weight(None if self._last == -np.inf else time_s - self._last)
         noise = of.noise * self._rng.standard_normal((n, len(y))) / np.sqrt(counts)
@@ -304,6 +330,39 @@ class LiveEstimator:
             time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, sd[6 : 6 + w],
             joint - nominal, mean[6 + w :], float(live.mean()),
         )  # fmt: skip
+
+
+def _number(name: str, value: float) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: found {value!r:.60}; expected a number") from None
+
+
+def _vector(name: str, values: ArrayLike, count: int) -> Floats:
+    """So many numbers: one alone is not meant for all."""
+    try:
+        given = np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: found what is not numbers; expected {count} numbers") from None
+    if given.shape != (count,):
+        found = {0: "a single number", 1: f"{given.size} in a list"}.get(given.ndim, f"an array {given.shape}")
+        raise InputError(f"{name}: found {found}; expected {count} numbers")
+    return given
+
+
+def _reading(name: str, values: ArrayLike | None, count: int) -> Floats:
+    """What sensors read, NaN where one was not read."""
+    given = np.full(count, np.nan) if values is None else _vector(name, values, count)
+    _check(name, given, ~np.isinf(given), "a finite number, or NaN where nothing was read")
+    return given
+
+
+def _check(name: str, given: Floats, good: NDArray[np.bool_], expected: str) -> None:
+    """Refuse the first number that is not good."""
+    if not good.all():
+        i = int(np.argmin(good))
+        raise InputError(f"{name}[{i}]: found {given[i]:g}; expected {expected}")
 
 
 def _beside(first: Wires, other: Wires) -> Wires:
