@@ -20,6 +20,7 @@ from wirebayes.robot.history.history import History, roll_and_pitch, with_payloa
 from wirebayes.robot.history.readings import Information, Sensors
 from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
 from wirebayes.robot.mechanics import draws, rotation, schema
+from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import inverse
 
 CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
@@ -349,6 +350,12 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
             HEAD + ",payload_kg\n0,1,1,1,1,-1\n9,1,1,1,1,1\n",
             "line 2, column payload_kg: found '-1'; expected a number from 0 to 1e+09",
         ),
+        (HEAD + "\n0,1,1,1,1\n60,-1,1,1,1\n", "line 3, column joint_1_m: found '-1'; expected a length above 0"),
+        (HEAD + "\n0,1,1,0.0,1\n60,1,1,1,1\n", "line 2, column joint_3_m: found '0.0'; expected a length above 0"),
+        (
+            HEAD + "\n0,1,1,1,1\n60,1,1776,1,1\n",
+            "line 3, column joint_2_m: found '1776'; expected metres, at most 115, 10 times the robot's size",
+        ),
         (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5'; expected a whole number"),
     ],
 )
@@ -358,6 +365,26 @@ def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
         table.parse("log.csv", text, robot, table.measured)
     assert str(caught.value).startswith(f"log.csv: {message}")
     assert "\n" not in str(caught.value)
+
+
+def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
+    robot = schema.read("hangprinter-4")
+    zeros = np.zeros(4)
+    robot = replace(robot, drums=Drums(zeros + 0.05, zeros, zeros + np.inf, zeros, zeros, zeros - 1.0))
+    head = ",".join(["time_s", *(f"motor_{i}_rad" for i in range(1, 5))])
+    good = f"{head}\n0,-20,-20,-20,-40\n9,-20,-20,-20,-40\n"
+    assert table.parse("log.csv", good, robot, table.measured).joint_m[0, 3] == pytest.approx(2.0)
+    with pytest.raises(InputError) as caught:
+        table.parse("log.csv", good.replace("9,-20", "9,20"), robot, table.measured)
+    wrong = "line 3, column motor_1_rad: found '20', which pays out -1 m; expected a length above 0"
+    assert str(caught.value) == f"log.csv: {wrong}"
+
+
+def test_a_linear_actuator_may_stand_at_zero_or_below():
+    robot = schema.read("linear-7")
+    text = ",".join(["time_s", *(f"joint_{i}_m" for i in range(1, 8))])
+    text += "\n0,-0.1,0,0.1,0.1,0.1,0.1,0.1\n9,-0.1,0,0.1,0.1,0.1,0.1,0.1\n"
+    assert table.parse("log.csv", text, robot, table.measured).joint_m[0, :2].tolist() == [-0.1, 0.0]
 
 
 def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  # noqa: F811
