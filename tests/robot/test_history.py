@@ -13,6 +13,7 @@ from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
 from wirebayes.robot.history import commanded, conditioning, corrections, table
+from wirebayes.robot.history.answer import answer
 from wirebayes.robot.history.conditioning import Readings, predicted
 from wirebayes.robot.history.estimate import estimate
 from wirebayes.robot.history.follow import Track, clock_starts, follow, uncreeping
@@ -310,6 +311,60 @@ def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
     assert not unused.used
     np.testing.assert_array_equal(unused.track.position_m, blind.track.position_m)
     assert (used.track.position_m != blind.track.position_m).any()
+
+
+def _standing_still(places=None):
+    """Three rows of a robot that stands at home; its commanded poses."""
+    robot = schema.read("hangprinter-4")
+    history = _joint_values_for(robot, [0, 60, 120], [robot.home_m] * 3)
+    if places is not None:
+        history = replace(history, position_m=np.array(places), rotation=np.tile(np.eye(3), (3, 1, 1)))
+    return robot, history
+
+
+def _answered(robot, history):
+    with np.errstate(all="ignore"):
+        return answer(robot, _line(12), history, Uncertain(), (robot.home_m, np.eye(3)), 0)
+
+
+def test_a_row_that_some_or_all_draws_lose_takes_no_other_row_with_it(monkeypatch):
+    robot, history = _standing_still()
+    whole = _answered(robot, history).content
+
+    def falling(*given):
+        found = estimate(*given)
+        for values in (found.track.position_m, found.track.rotation, found.track.tension_N):
+            values[:5, 1], values[:, 2] = np.nan, np.nan
+        return found
+
+    monkeypatch.setattr("wirebayes.robot.history.answer.estimate", falling)
+    found = _answered(robot, history)
+    content = found.content
+    assert content["drift"][0]["held"].tolist() == [1.0, pytest.approx(7 / 12), 0.0]
+    (head, rows), (changes, wanted) = found.tables["poses.csv"], found.tables["corrections.csv"]
+    for label in ("mean", "sd", "q05", "q50", "q95"):
+        columns = [head.index(f"{axis}_{label}_m") for axis in "xyz"]
+        np.testing.assert_allclose(content["position_m"][label], [[row[i] for i in columns] for row in rows])
+        assert np.isfinite(content["position_m"][label][:2]).all()
+        assert np.isnan(content["position_m"][label][2]).all()
+        np.testing.assert_array_equal(content["position_m"][label][0], whole["position_m"][label][0])
+    columns = [changes.index(f"change_{i}_mm") for i in range(1, 5)]
+    change = content["corrections"]["change_mm"]["mean"]
+    np.testing.assert_allclose(change, [[row[i] for i in columns] for row in wanted])
+    assert np.isfinite(content["corrections"]["left_mm"]["q50"]).tolist() == [True, True, False]
+
+
+def test_commanded_poses_out_of_reach_are_named_and_take_no_other_row_with_them():
+    robot, history = _standing_still([schema.read("hangprinter-4").home_m, [9.0, 0.0, 9.0], [0.0, 0.0, 0.4]])
+    found = _answered(robot, history)
+    named = "no tensions within the bounds hold the platform at the pose commanded at 60 s: no corrections lead there"
+    assert found.content["warnings"][0] == named
+    assert np.isfinite(found.content["corrections"]["change_mm"]["mean"]).all(1).tolist() == [True, False, True]
+    far = np.tile([9.0, 0.0, 9.0], (3, 1))
+    beyond = _answered(*_standing_still(far))
+    assert "commanded at 0, 60, 120 s: no corrections" in beyond.content["warnings"][0]
+    within = _answered(*_standing_still())
+    assert not any("corrections" in warning for warning in within.content["warnings"])
 
 
 def test_an_inclinometer_reads_what_turned_the_platform():

@@ -138,7 +138,7 @@ def _answers(pose: PoseHistoryJson) -> list[Points]:
     if pose.get("rotation_vector_rad"):
         known.append(f"It has turned by {_last(drift['rotation_deg'])} degrees.")
     left = pose["corrections"]["left_mm"]
-    if left["q50"]:
+    if left["q50"] and left["q50"][-1] is not None:
         known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {_last(left)} mm.")
     unknown = [w[:1].upper() + w[1:] + "." for w in pose["warnings"] if not _is_urgent(w)]
     clock = pose["clock"]

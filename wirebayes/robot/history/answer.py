@@ -31,6 +31,7 @@ from wirebayes.typing import Floats
 _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
+_NAMED = 6  # times in a warning: as many as a line holds
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
 
 
@@ -116,12 +117,12 @@ def answer(
     content |= {
         "history": content["history"] | {"holds": int(found.track.hold[-1]) + 1},
         "drift": [_drift(course, to, rows, errors.spread)],
-        "position_m": band(course.position_m),
-        "rotation_vector_rad": band(turning.vector(course.rotation)) if robot.degrees == 6 else None,
+        "position_m": _bands(course.position_m),
+        "rotation_vector_rad": _bands(_turn(course.rotation)) if robot.degrees == 6 else None,
         "corrections": {
             "times_s": course.times_s,
-            "change_mm": band(1e3 * change[:, rows]),
-            "left_mm": band(1e3 * corrections.left(robot, history, found, to, best, rows)),
+            "change_mm": _bands(1e3 * change[:, rows]),
+            "left_mm": _bands(1e3 * corrections.left(robot, history, found, to, best, rows)),
         },
         "clock": _clock(line, again),
     }
@@ -131,6 +132,8 @@ def answer(
             "used": found.used,
         }  # fmt: skip
     content["warnings"] = _warnings(robot, line, history, found, joint, content)
+    if history.position_m is not None:
+        content["warnings"] = _unreached(history.times_s, found, to, change) + content["warnings"]
     tables = {
         "poses.csv": _pose_table(robot, history, found, to),
         "corrections.csv": _correction_table(robot, history, _mean(joint) if joint.ndim == 3 else joint, change),
@@ -222,6 +225,12 @@ def _bands(values: Floats) -> Band:
             "q95": over_time("q95")}  # fmt: skip
 
 
+def _turn(rotation: Floats) -> Floats:
+    """Rotation vectors; NaN where the platform has fallen."""
+    held = np.asarray(np.isfinite(rotation).all((-2, -1), keepdims=True))
+    return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
+
+
 def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> Clock:
     """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
@@ -229,6 +238,24 @@ def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> Clock:
     apart = np.linalg.norm(anew.position_m - once.position_m, axis=-1)
     middle = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in apart.T])
     return {"largest_mm": 1e3 * float(np.nanmax(middle)), "at_the_end_mm": 1e3 * float(middle[-1])}
+
+
+def _unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -> list[str]:
+    """Which commanded poses no corrections ``(n, t, w)`` lead to, though the platform still hangs then."""
+    never = found.track.held.any(0) & ~np.isfinite(change_m).all(-1).any(0)
+    unheld = ~np.isfinite(to.tension_N).all(-1)
+    reasons = {
+        "no tensions within the bounds hold the platform at the pose": unheld,
+        "no draw's wires can pull as hard as it takes at the pose": ~unheld,
+    }
+    out = []
+    for reason, why in reasons.items():
+        rows = np.flatnonzero(never & why)
+        if rows.size:
+            times = ", ".join(f"{times_s[k]:.10g}" for k in rows[:_NAMED])
+            more = f" s and {rows.size - _NAMED} times more" if rows.size > _NAMED else " s"
+            out.append(f"{reason} commanded at {times}{more}: no corrections lead there")
+    return out
 
 
 def _warnings(
@@ -276,9 +303,7 @@ def _pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> 
     track = found.track
     parts = {f"{axis}_m": track.position_m[..., i] for i, axis in enumerate("xyz")}
     if robot.degrees == 6:
-        turn = turning.vector(np.where(track.held[..., None, None], track.rotation, np.eye(3)))
-        turn = np.where(track.held[..., None], turn, np.nan)
-        parts |= {f"r{axis}_rad": turn[..., i] for i, axis in enumerate("xyz")}
+        parts |= {f"r{axis}_rad": _turn(track.rotation)[..., i] for i, axis in enumerate("xyz")}
     parts["distance_mm"] = 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1)
     columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
     for name, values in parts.items():
