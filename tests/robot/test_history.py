@@ -19,7 +19,7 @@ from wirebayes.robot.history.estimate import estimate
 from wirebayes.robot.history.follow import Track, clock_starts, follow, uncreeping
 from wirebayes.robot.history.history import History, roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, Sensors
-from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
+from wirebayes.robot.history.unknowns import Uncertain, Unknowns, even_normals, unknowns
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import inverse
@@ -109,8 +109,10 @@ def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
     robot = schema.read(name)
     payload = 0.1 * robot.mass_kg * np.array([0, 0, 0, 1, 1, 0.0])
     history = _joint_values_for(robot, TIMES, _places(robot), HOLDS, payload)
-    known = unknowns(robot, _line(2), Uncertain(2e-3, 0.05), np.random.default_rng(1))
-    wires, error = known.columns(known.draws)
+    known = unknowns(robot, _line(2), Uncertain(2e-3, 0.05), np.random.default_rng(0))
+    rng, legs = np.random.default_rng(1), robot.legs
+    own, reference = rng.standard_normal((2, 3 * legs)), rng.standard_normal((2, legs))
+    wires, error = known.columns(np.concatenate([reference, known.draws[:, legs : -3 * legs], own], 1))
     starts = clock_starts(history, np.ones((6, robot.legs)))
     track = follow(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), starts, error)
     assert track.hold.tolist() == [0, 0, 1, 1, 2, 2]
@@ -211,6 +213,39 @@ def test_commanded_poses_need_no_rows_between():
         assert np.abs(found.track.position_m[:, 0] - robot.home_m).max() < 1e-9
     assert np.linalg.norm(drifts["few"], axis=1).min() > 2e-4
     np.testing.assert_allclose(drifts["few"], drifts["many"], atol=0.02 * np.abs(drifts["few"]).max())
+
+
+@pytest.mark.parametrize("n", [1, 2, 17, 64, 201])
+def test_deviations_are_standard_normal_and_even(n):
+    seeds = range(4000 // n)
+    drawn = np.array([even_normals(n, 3, np.random.default_rng(seed)) for seed in seeds])
+    every = drawn.reshape(-1, 3)
+    np.testing.assert_allclose(every.mean(0), 0.0, atol=0.05)
+    np.testing.assert_allclose(every.std(0), 1.0, atol=0.04)
+    np.testing.assert_allclose(np.quantile(every, [0.05, 0.95], axis=0).T, [[-1.645, 1.645]] * 3, atol=0.09)
+    np.testing.assert_allclose(np.corrcoef(every.T), np.eye(3), atol=0.06)
+    one = drawn[:, n // 2]  # whichever draw it is, it knows nothing of its place
+    assert np.abs(one.mean(0)).max() < 4.5 / np.sqrt(len(one))
+    assert np.abs(drawn.mean(1)).max() < 6 / n  # independent ones are off by up to 4 / sqrt(n)
+    np.testing.assert_array_equal(drawn[0], even_normals(n, 3, np.random.default_rng(0)))
+
+
+@pytest.mark.parametrize("n", [63, 64])
+def test_specimens_have_the_stated_spread_and_nothing_to_do_with_the_line(n):
+    robot, line = schema.read("hangprinter-4"), _line(n)
+    together, spread = [], []
+    for seed in range(20):
+        known = unknowns(robot, line, Uncertain(2e-3, 0.05), np.random.default_rng(seed))
+        wires, error = known.columns(known.draws)
+        ratio = np.log(wires.theta["k1"] / line.parameters["k1"])
+        together.append([np.corrcoef(np.log(line.parameters["k1"]), own)[0, 1] for own in ratio])
+        np.testing.assert_allclose(ratio.mean(1), 0.0, atol=1e-3)
+        spread.append([ratio.std(1) / 0.05, error.std(0) / 2e-3])
+        np.testing.assert_allclose(error.mean(0), 0.0, atol=4e-5)
+    np.testing.assert_allclose(np.mean(spread, 0), 1.0, rtol=0.03)
+    assert np.std(spread) < 0.05  # of independent draws 0.09
+    assert abs(np.mean(together)) < 4 / np.sqrt(n * np.size(together))
+    assert np.std(together) == pytest.approx(1 / np.sqrt(n), rel=0.3)
 
 
 def test_readings_move_draws_to_the_posterior_of_a_linear_problem():

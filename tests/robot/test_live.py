@@ -107,6 +107,19 @@ def test_a_long_step_is_as_good_as_short_ones():
     assert np.linalg.norm(ends[0] - ends[1]) < 0.005 * drift
 
 
+def test_before_anything_has_crept_corrections_do_not_depend_on_the_seed():
+    robot, line = schema.read("hangprinter-4"), _line(64)
+    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    for errors in (Uncertain(), Uncertain(2e-3)):
+        ends = []
+        for seed in range(10):
+            live = LiveEstimator(robot, line, errors, (robot.home_m, np.eye(3)), reads=False, seed=seed)
+            ends.append([(now.correction_m, now.joint_sd_m) for now in (live.step(0.0, joint), live.step(60.0, joint))])
+        correction, sd = np.moveaxis(ends, 2, 0)
+        standard_error = sd.mean(0) / np.sqrt(line.count)  # of independent draws
+        assert (correction.std(0) < 0.25 * standard_error).all()
+
+
 def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
     robot = schema.read("cogiro-desk")
     live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)

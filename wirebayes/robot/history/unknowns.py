@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.special import ndtri
 
 from wirebayes.robot.history.follow import uncreeping
 from wirebayes.robot.mechanics.description import Robot
@@ -109,16 +110,46 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     """
     known = errors.calibrated
     if known is not None:
-        draws = rng.standard_normal((line.count, len(known.mean)))
+        draws = even_normals(line.count, len(known.mean), rng)
         return Unknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
     prior = Prior(line, max(errors.reference_m, _EXACT_M), errors.spread)
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
-    legs, n = robot.legs, line.count
-    own = rng.standard_normal((n, len(prior.own) * legs)) * prior.own_sd
-    values = np.concatenate([rng.standard_normal((n, legs)) * prior.reference_sd_m, prior.fitted.T, own], 1)
+    legs = robot.legs
+    drawn = even_normals(line.count, len(prior.own) * legs + legs, rng)
+    own, reference = drawn[:, legs:] * prior.own_sd, drawn[:, :legs] * prior.reference_sd_m
+    values = np.concatenate([reference, prior.fitted.T, own], 1)
     white = solve_triangular(root, (values - mean).T, lower=True).T
     return Unknowns(robot, prior, mean, root, np.asarray(white))
+
+
+def even_normals(n: int, m: int, rng: np.random.Generator) -> Floats:
+    """Independent columns of standard normal draws, one in each n-th part of the probability and symmetric about zero.
+
+    Each draw is standard normal, but the mean over all of what is nearly a sum of functions of single columns has next
+    to no noise. Without that, corrections of wires that have not crept were the mean deviation of a few specimens.
+
+    Parameters
+    ----------
+    n : int
+        Draws, any number.
+    m : int
+        Columns, each in a random order of its own.
+    rng : numpy Generator
+
+    Returns
+    -------
+    (n, m) array
+
+    References
+    ----------
+    M. D. McKay, R. J. Beckman and W. J. Conover, A comparison of three methods for selecting values of input variables
+    in the analysis of output from a computer code, Technometrics 21(2), 1979 (Latin hypercube sampling).
+    """
+    half = n // 2
+    below = ndtri((np.arange(half)[:, None] + 1.0 - rng.uniform(size=(half, m))) / n)
+    middle = ndtri((half + rng.uniform(size=(n % 2, m))) / n)
+    return np.asarray(rng.permuted(np.concatenate([below, middle, -below]), axis=0))
 
 
 def _root(covariance: Floats) -> Floats:
