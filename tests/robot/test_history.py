@@ -197,6 +197,28 @@ def test_when_clocks_start_does_not_depend_on_the_sampling():
     assert 6 < len(starts) < 12
 
 
+@pytest.mark.parametrize("name", ["cogiro-desk", "linear-7"])
+def test_an_even_motion_of_the_joints_needs_no_rows_between(name):
+    robot = schema.read(name)
+    a, b = robot.home_m, robot.home_m + 0.2 * robot.span_m * np.array([1.0, 0.3, 0.2])
+    few = _joint_values_for(robot, [0, 100, 110, 400], [a, a, b, b])
+    times = np.unique(np.concatenate([few.times_s, np.arange(100, 110, 0.1)]))
+    many = replace(
+        few, times_s=times, joint_m=np.stack([np.interp(times, few.times_s, c) for c in few.joint_m.T], 1),
+        payload_kg=np.zeros(len(times)), payload_m=np.zeros((len(times), 3)),
+    )  # fmt: skip
+    start, ends = (robot.home_m, np.eye(3)), {}
+    for kind, history in (("few", few), ("many", many)):
+        found = estimate(robot, _line(2), history, start, Uncertain(), np.random.default_rng(0))
+        assert found.plain.position_m.shape[1] == len(history.times_s)
+        rows = np.searchsorted(history.times_s, [110, 400])
+        ends[kind] = found, (found.track.position_m - found.plain.position_m)[:, rows]
+    (sparse, drift), (dense, right) = ends["few"], ends["many"]
+    assert len(sparse.starts_s) > 3
+    assert abs(len(sparse.starts_s) - len(dense.starts_s)) <= 1  # one more just before the stop
+    np.testing.assert_allclose(drift, right, atol=0.005 * np.linalg.norm(right, axis=-1).max())
+
+
 def test_commanded_poses_need_no_rows_between():
     robot = schema.read("cogiro-desk")
     ends = np.array([[0.0, *robot.home_m], [300.0, *(robot.home_m + [0.1, 0.05, 0.1])], [600.0, *robot.home_m]])

@@ -13,7 +13,7 @@ from wirebayes.json_files.values import Band, Statistic
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate, Progress, estimate
-from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
+from wirebayes.robot.history.follow import RESTART, Track, follow
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag
@@ -93,7 +93,7 @@ def answer(
 
         def again(few: WireDraws, restart: float) -> Track:
             known = unknowns(robot, few, alike, np.random.default_rng(seed))  # the same draws both times
-            starts = clock_starts(history, found.plain.tension_N[0], restart)
+            starts = found.starts_s if np.isfinite(restart) else found.starts_s[:1]
             wires, error = known.columns(known.draws)
             return follow(robot, wires, history, joint, start, starts, error, carried=known.carried(known.draws))
     else:

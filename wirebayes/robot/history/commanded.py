@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from wirebayes.robot.history.estimate import Estimate, Progress
 from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
-from wirebayes.robot.history.history import History
+from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -76,7 +76,7 @@ def drift(
     track = follow(robot, wires, fine, joint, start, starts, error,
                    lambda k: progress("poses", k + 1, rows), carried)  # fmt: skip
     plain = Track(fine.position_m[None], fine.rotation[None], tau[None], np.zeros((1, *tau.shape)), track.hold)
-    return Estimate(_at(track, kept), _at(plain, kept), wires, error), np.swapaxes(joint[kept], 0, 1)
+    return Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts), np.swapaxes(joint[kept], 0, 1)
 
 
 class Unheld(Exception):
@@ -101,26 +101,10 @@ def wanted_tensions(robot: Robot, history: History) -> Floats:
 
 def refined(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
     """The history with rows between distant poses, and where its own rows are among them."""
-    x, R, times = history.position_m, history.rotation, history.times_s
+    x, R = history.position_m, history.rotation
     assert x is not None and R is not None
     turned = Rotation.from_matrix(R)
     angle = (turned[:-1].inv() * turned[1:]).magnitude()
     far = np.maximum(np.linalg.norm(np.diff(x, axis=0), axis=1), robot.size_m * angle)
     pieces = np.maximum(np.ceil(far / (_STRAIGHT * robot.span_m)).astype(int), 1)
-    kept = np.concatenate([[0], np.cumsum(pieces)])
-    at = np.interp(np.arange(kept[-1] + 1), kept, np.arange(len(times)))
-    index = np.arange(len(times), dtype=float)
-    before = np.floor(at).astype(int)  # what stays until the next row
-    between = np.stack([np.interp(at, index, column) for column in x.T], 1)
-    fine = replace(
-        history, times_s=np.interp(at, index, times), position_m=between,
-        rotation=Slerp(index, turned)(at).as_matrix(), payload_kg=history.payload_kg[before],
-        payload_m=history.payload_m[before], hold=None if history.hold is None else history.hold[before],
-    )  # fmt: skip
-    return fine, kept
-
-
-def _at(track: Track, rows: NDArray[np.intp]) -> Track:
-    arrays = (track.position_m, track.rotation, track.tension_N, track.strain)
-    position, rotation, tension, strain = (v[:, rows] for v in arrays)
-    return Track(position, rotation, tension, strain, track.hold[rows])
+    return divided(history, pieces)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.history.conditioning import Readings, draw, find_mode, slack_wires
-from wirebayes.robot.history.follow import Track, clock_starts, follow
+from wirebayes.robot.history.follow import Track, clock_starts, follow, refined
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.readings import sensors, weight
 from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
@@ -35,6 +35,8 @@ class Estimate:
     wires : Wires
     error_m : (n, w) array
         Errors of the reference lengths.
+    starts_s : (s,) array
+        Times at which the wires' clocks start.
     misfit : float or None
         Mean squared standardised residual of the readings at the mode; well above one when no wire explains them.
     converged : bool
@@ -49,6 +51,7 @@ class Estimate:
     plain: Track
     wires: Wires
     error_m: Floats
+    starts_s: Floats
     misfit: float | None = None
     converged: bool = True
     effective: float | None = None
@@ -86,7 +89,7 @@ def estimate(
     Estimate
     """
     known = unknowns(robot, line, errors, rng)
-    way = _Way(known, history, start, plain_track(known, history, start, progress), progress)
+    way = _Way(known, history, start, *plain_track(known, history, start, progress), progress)
     if not history.read:
         return way.followed(known.draws)
     read = Readings(readings(history, robot.legs), weights(history.times_s), sensors(robot, errors))
@@ -98,7 +101,7 @@ def estimate(
     left = _mean(read.residual(out.track, np.zeros_like(out.white)))
     used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
     if used:
-        found = Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count]))
+        found = Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count]), way.starts_s)
     else:
         found = way.followed(known.draws)
     squares = (left / read.of.sd) ** 2
@@ -127,8 +130,12 @@ def weights(times_s: Floats) -> Floats:
     return np.array([weight(None)] + [weight(float(since)) for since in np.diff(times_s)])
 
 
-def plain_track(known: Unknowns, history: History, start: tuple[Floats, Floats], progress: Progress) -> Track:
-    """The mean wire, which never creeps, under measured joint values.
+def plain_track(
+    known: Unknowns, history: History, start: tuple[Floats, Floats], progress: Progress
+) -> tuple[Track, Floats]:
+    """The mean wire, which never creeps, under measured joint values; and when it makes the wires' clocks start.
+
+    Those times do not depend on how finely an even motion was sampled: it is divided where rows are far apart.
 
     Parameters
     ----------
@@ -145,12 +152,15 @@ def plain_track(known: Unknowns, history: History, start: tuple[Floats, Floats],
     -------
     Track
         One column.
+    starts_s : (s,) array
+        As of `clock_starts`.
     """
-    assert history.joint_m is not None
-    rows = len(history.times_s)
-    once = history.times_s[:1]
-    return follow(known.robot, known.plain, history, history.joint_m, start, once,
-                  progress=lambda row: progress("without creep", row + 1, rows))  # fmt: skip
+    fine, kept = refined(known.robot, history)
+    assert fine.joint_m is not None
+    rows = len(fine.times_s)
+    track = follow(known.robot, known.plain, fine, fine.joint_m, start, fine.times_s[:1],
+                   progress=lambda row: progress("without creep", row + 1, rows))  # fmt: skip
+    return track.at_rows(kept), clock_starts(fine, track.tension_N[0])
 
 
 @dataclass(frozen=True)
@@ -161,6 +171,7 @@ class _Way:
     history: History
     start: tuple[Floats, Floats]
     plain: Track
+    starts_s: Floats
     progress: Progress
 
     def track(self, wires: Wires, error_m: Floats, carried: CreepState, name: str) -> Track:
@@ -182,8 +193,7 @@ class _Way:
         """
         history, rows = self.history, len(self.history.times_s)
         assert history.joint_m is not None
-        starts = clock_starts(history, self.plain.tension_N[0])
-        return follow(self.known.robot, wires, history, history.joint_m, self.start, starts, error_m,
+        return follow(self.known.robot, wires, history, history.joint_m, self.start, self.starts_s, error_m,
                       lambda row: self.progress(name, row + 1, rows), carried)  # fmt: skip
 
     def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:
@@ -206,4 +216,6 @@ class _Way:
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""
         wires, error = self.known.columns(white)
-        return Estimate(self.track(wires, error, self.known.carried(white), "poses"), self.plain, wires, error)
+        return Estimate(
+            self.track(wires, error, self.known.carried(white), "poses"), self.plain, wires, error, self.starts_s
+        )

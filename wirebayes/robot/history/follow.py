@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.history.history import History
+from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
@@ -16,6 +16,7 @@ from wirebayes.typing import Floats
 # Share of the mean tension by which a command must change a wire's tension to restart the clocks. On the paper's
 # bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.
 RESTART = 0.1
+_EVEN = 0.005  # of the robot's span: over so short a way tensions change evenly, even of wires that pull at each other
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,11 @@ class Track:
             self, position_m=self.position_m[index], rotation=self.rotation[index],
             tension_N=self.tension_N[index], strain=self.strain[index],
         )  # fmt: skip
+
+    def at_rows(self, rows: NDArray[np.intp]) -> "Track":
+        """Some of the rows."""
+        position, rotation = self.position_m[:, rows], self.rotation[:, rows]
+        return Track(position, rotation, self.tension_N[:, rows], self.strain[:, rows], self.hold[rows])
 
     def with_columns(self, at: NDArray[np.bool_], other: "Track") -> "Track":
         """The columns of another in the places of some of its own."""
@@ -129,7 +135,8 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     """Times at which the wires' clocks start: the history's own holds, or where a command or a load changes tensions.
 
     A hold begins when a wire's tension has changed by a share of the mean tension since the one before. Between rows
-    tensions change evenly, so the answer does not depend on how finely a motion was sampled.
+    tensions are taken to change evenly, as they do where rows are as near as those of `refined`: along a long even
+    motion of the joints they do not, least of all in a redundant robot.
 
     Parameters
     ----------
@@ -162,6 +169,14 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
             out.append(float(times[k - 1] + reached * (times[k] - times[k - 1])))
             reference = before + reached * (after - before)
     return np.array(out)
+
+
+def refined(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
+    """A history of joint values with rows between distant ones, and where its own rows are among them."""
+    assert history.joint_m is not None
+    wire = np.where(robot.is_linear, robot.ratio, 1.0) / robot.lines  # paid out in each line, by the joint value
+    far = (np.abs(np.diff(history.joint_m, axis=0)) * wire).max(1)
+    return divided(history, np.maximum(np.ceil(far / (_EVEN * robot.span_m)).astype(int), 1))
 
 
 def _begin(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.typing import Floats
@@ -51,6 +52,38 @@ class History:
     def robot_at(self, robot: Robot, row: int) -> Robot:
         """The robot with what it carries from a row on."""
         return with_payload(robot, float(self.payload_kg[row]), self.payload_m[row])
+
+
+def divided(history: History, pieces: NDArray[np.intp]) -> tuple[History, NDArray[np.intp]]:
+    """The history with rows between its own, without readings.
+
+    Parameters
+    ----------
+    history : History
+    pieces : (t - 1,) int array
+        Into how many the time between two rows is divided, 1 or more.
+
+    Returns
+    -------
+    History
+    kept : (t,) int array
+        Where its own rows are among them.
+    """
+    kept = np.concatenate([[0], np.cumsum(pieces)])
+    index = np.arange(len(kept), dtype=float)
+    at = np.interp(np.arange(kept[-1] + 1), kept, index)
+    before = np.floor(at).astype(int)  # what stays until the next row
+
+    def between(values: Floats | None) -> Floats | None:
+        return None if values is None else np.stack([np.interp(at, index, column) for column in values.T], 1)
+
+    turned = None if history.rotation is None else Slerp(index, Rotation.from_matrix(history.rotation))(at).as_matrix()
+    fine = History(
+        np.interp(at, index, history.times_s), between(history.joint_m), between(history.position_m), turned,
+        history.payload_kg[before], history.payload_m[before],
+        None if history.hold is None else history.hold[before],
+    )  # fmt: skip
+    return fine, kept
 
 
 def with_payload(robot: Robot, mass_kg: float, centre_m: Floats) -> Robot:
