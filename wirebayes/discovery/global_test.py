@@ -144,7 +144,10 @@ def _next_total(made: int, simulations: int) -> int:
 
 
 def is_open(test: GlobalTest, alpha: float, by_larger: float, made: int, simulations: int) -> bool:
-    """Whether more simulations are to be made: while p is close to the level, or, until all are made, to `BY_LARGER`.
+    """Whether more simulations are to be made: where p is close to the level, or larger effects count, or nearly do.
+
+    How surprising a value along a path is, is read off the simulations' tail, which half of them may not have shown:
+    until all are made it decides nothing.
 
     Parameters
     ----------
@@ -159,7 +162,8 @@ def is_open(test: GlobalTest, alpha: float, by_larger: float, made: int, simulat
     if made >= MOST_TIMES * simulations:
         return False
     trials = len(test.null)
-    return is_close(test.p, alpha, trials) or (made < simulations and is_close(by_larger, BY_LARGER, trials))
+    may_count = by_larger <= BY_LARGER or is_close(by_larger, BY_LARGER, trials)
+    return is_close(test.p, alpha, trials) or (made < simulations and may_count)
 
 
 def is_close(p: float, alpha: float, simulations: int) -> bool:
