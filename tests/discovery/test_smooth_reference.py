@@ -40,6 +40,24 @@ def test_the_processes_are_products_of_one_over_holds_and_one_over_time() -> Non
         assert covariance(functions, mask) == pytest.approx(expected, abs=1e-9)
 
 
+def test_displacements_count_by_the_range_of_all_holds_read_or_not(tmp_path: Path) -> None:
+    """Few enough readings that no function is left out; the largest displacement belongs to a hold without one."""
+    write(tmp_path, [Bench(displacements_mm=(1, 2, 9, 3), times_s=(0, 60), unrecorded={3})], Truth(QUIET), seed=3)
+    protocol = read_experiments(tmp_path / "experiments.toml")[0].protocol()
+    mask = protocol.mask
+    assert mask.sum() <= smooth_reference.FUNCTIONS and protocol.displacement_mm.max() == 9.0
+    hold, reading = np.nonzero(mask)
+    order, place = hold / 3.0, (protocol.displacement_mm[hold] - 1.0) / 8.0
+    time = np.log1p(protocol.time_s[hold, reading] / (0.2 * 60.0))
+
+    def smooth(x: np.ndarray, length: float) -> np.ndarray:
+        return np.asarray(np.exp(-0.5 * (np.subtract.outer(x, x) / length) ** 2))
+
+    over_holds = 0.5 * smooth(order, 0.3) + 0.5 * np.minimum.outer(order, order) + 0.5 * smooth(place, 0.3)
+    expected = over_holds * (0.5 + 0.5 * smooth(time, 0.7))
+    assert covariance(smooth_reference.basis(protocol, 1.0), mask) == pytest.approx(expected, abs=1e-9)
+
+
 def test_of_many_readings_the_covariance_of_some_gives_nearly_the_best_functions(tmp_path: Path) -> None:
     """Twice as many readings as are decomposed: no functions at all hold more of the variance, these nearly as much."""
     displacements, times = [0.2 * k for k in range(1, 41)], [4.0 * k for k in range(30)]

@@ -13,6 +13,7 @@ from wirebayes.wire.protocol import Protocol
 FUNCTIONS = 16  # they hold 99 % of the process's variance on the paper's protocols
 SHORT_FUNCTIONS = 40  # of the other processes; short lengths need more to hold 99 % of their variance
 _DECOMPOSED = 600  # readings, at most, whose covariance is decomposed: smooth functions of more follow from these
+_LEAST = 1e-6  # of the largest function's size: smaller ones are rounding errors, and would be divided by themselves
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def basis(protocol: Protocol, scale_N: float) -> Array:
     in its logarithm). Zero where there is no reading.
     """
     holds = max(len(protocol.displacement_mm) - 1, 1)
-    reach = np.ptp(_Readings.of(protocol).place) or 1.0
+    reach = np.ptp(protocol.displacement_mm) or 1.0  # of unrecorded holds, too
 
     def covariance(one: _Readings, other: _Readings) -> Array:
         orders = one.hold / holds, other.hold / holds
@@ -86,7 +87,7 @@ def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
     size, vectors = np.sqrt(np.maximum(values[top], 0.0)), vectors[:, top]
     out = np.zeros((*protocol.mask.shape, len(top)))
     if n > _DECOMPOSED:
-        out[np.nonzero(protocol.mask)] = covariance(every, some) @ (vectors / np.maximum(size, 1e-6 * size[0]))
+        out[np.nonzero(protocol.mask)] = covariance(every, some) @ (vectors / np.maximum(size, _LEAST * size[0]))
     else:
         out[np.nonzero(protocol.mask)] = vectors * size
     return out
