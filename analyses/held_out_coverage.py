@@ -43,7 +43,7 @@ def one(job: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, bool]:
     experiment = next(e for e in experiments() if not any(not h.recorded for h in e.holds))
     truth = with_wires(build([experiment]))
     drawn = readings(truth, truth.prior.rvs(1, rng), truth.samples[0], rng)[..., 0]
-    holds = tuple(replace(h, tension_N=drawn[j, : len(h.time_s)]) for j, h in enumerate(experiment.holds))
+    holds = tuple(replace(h, readings=drawn[j, : len(h.time_s)]) for j, h in enumerate(experiment.holds))
     simulated = replace(experiment, holds=holds)
     fitted = fit(with_wires(build([simulated.train(TRAINED)])), int(rng.integers(2**32)), policy=POLICY)
     result = held_out(fitted, simulated, rng)

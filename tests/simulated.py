@@ -15,5 +15,5 @@ def simulated_tests(benches: Sequence[Bench], truth: Truth, seed: int) -> list[E
     for bench, sample in zip(benches, samples, strict=True):
         test = bench.experiment()
         rows = zip(test.holds, sample.readings[..., 0], sample.protocol.mask, strict=True)
-        out.append(replace(test, holds=tuple(replace(h, tension_N=frozen(y[kept].tolist())) for h, y, kept in rows)))
+        out.append(replace(test, holds=tuple(replace(h, readings=frozen(y[kept].tolist())) for h, y, kept in rows)))
     return out

@@ -26,8 +26,8 @@ USUAL = np.round(CLEAN + NOISE, 2)
 
 def reading(tension_N: np.ndarray, resolution_N: float = 0.01) -> Experiment:
     """The protocol of a wire of the paper with these readings."""
-    holds = [replace(h, tension_N=row[: h.time_s.size]) for h, row in zip(BASE.holds, tension_N, strict=True)]
-    return replace(BASE, holds=tuple(holds), resolution_N=resolution_N)
+    holds = [replace(h, readings=row[: h.time_s.size]) for h, row in zip(BASE.holds, tension_N, strict=True)]
+    return replace(BASE, holds=tuple(holds), resolution=resolution_N)
 
 
 def spiked() -> np.ndarray:

@@ -40,9 +40,9 @@ def staircase(holds, readings, name="made"):
     """An experiment of equal steps; the readings' values do not matter for the time."""
     times = np.linspace(0.0, 120.0, readings)
     return Experiment(
-        name=name, material="line", length_mm=1000.0, resolution_N=0.01, source=Path("made"),
-        holds=tuple(Hold(number=j + 1, displacement_mm=1.0 + 10.0 * j / holds, duration_s=120.0, time_s=times,
-                         tension_N=5.0 + 10.0 * j / holds + np.exp(-times / 30.0)) for j in range(holds)),
+        name=name, material="line", length_mm=1000.0, resolution=0.01, source=Path("made"),
+        holds=tuple(Hold(number=j + 1, setting=1.0 + 10.0 * j / holds, duration_s=120.0, time_s=times,
+                         readings=5.0 + 10.0 * j / holds + np.exp(-times / 30.0)) for j in range(holds)),
     )  # fmt: skip
 
 

@@ -154,7 +154,7 @@ def test_an_event_is_put_where_the_readings_say() -> None:
     rng = np.random.default_rng(4)
     tension = simulate(experiment.protocol(), {k: np.array([v]) for k, v in truth.items()}, problem.samples[0].model)
     tension = np.round(tension[..., 0] + 0.006 * rng.normal(size=tension.shape[:2]), 2)
-    holds = tuple(replace(h, tension_N=tension[j]) for j, h in enumerate(experiment.holds))
+    holds = tuple(replace(h, readings=tension[j]) for j, h in enumerate(experiment.holds))
     chosen = effects_of(one("grip_slip"), replace(experiment, holds=holds), CATALOGUE, 0)
     assert [e.key for e in chosen] == ["grip_slip@7"]
 

@@ -30,7 +30,7 @@ def moved(experiment: Experiment, deviations: float) -> Experiment:
     sd = np.sqrt(np.diag(covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]))
     nominal = experiment.tension()[TRAIN:].ravel() - r[~past]
     readings = (nominal + gain @ r[past] + deviations * sd).reshape(-1, experiment.tension().shape[1])
-    later = [replace(h, tension_N=row) for h, row in zip(experiment.holds[TRAIN:], readings, strict=True)]
+    later = [replace(h, readings=row) for h, row in zip(experiment.holds[TRAIN:], readings, strict=True)]
     return replace(experiment, holds=(*experiment.holds[:TRAIN], *later))
 
 

@@ -87,7 +87,7 @@ def test_a_gross_error_is_set_aside_and_reported(tmp_path: Path) -> None:
     hold = experiment.holds[3]
     tension = np.array(hold.tension_N)
     tension[2] += 0.5
-    wrong = replace(experiment, holds=(*experiment.holds[:3], replace(hold, tension_N=tension), *experiment.holds[4:]))
+    wrong = replace(experiment, holds=(*experiment.holds[:3], replace(hold, readings=tension), *experiment.holds[4:]))
     check = check_model(Job("", (wrong,)), simulations=19)
     assert [(g["hold"], g["reading"]) for g in check.gross_errors] == [(4, 2)]
     assert "Reading 3 of hold 4" in check.sentence and check.passed

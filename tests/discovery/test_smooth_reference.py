@@ -92,7 +92,7 @@ def disturbed(folder: Path, size_N: float) -> LaplaceFit:
     holds = list(clean.holds)
     for j, share in ((5, 0.6), (6, 1.0), (7, 0.6)):
         off = size_N * share * np.exp(-np.asarray(holds[j].time_s) / 40.0)
-        holds[j] = replace(holds[j], tension_N=np.asarray(holds[j].tension_N) + off)
+        holds[j] = replace(holds[j], readings=np.asarray(holds[j].tension_N) + off)
     return fitted([replace(clean, holds=tuple(holds))], (), "hooke", "saturating", np.random.default_rng(0))
 
 

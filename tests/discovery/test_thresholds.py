@@ -72,10 +72,10 @@ def test_bands_of_held_out_readings_hold_nine_in_ten(
     away: float, covered: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Readings of the last hold lie so many standard deviations from a known prediction; nine in ten are 1.645."""
-    one = replace(experiments()[2].train(4), resolution_N=0.0)
+    one = replace(experiments()[2].train(4), resolution=0.0)
     expected = simulate(one.protocol(), {name: np.array([value]) for name, value in WIRE.items()})[..., 0]
     last = len(one.holds) - 1
-    holds = [replace(h, tension_N=row[: h.time_s.size] + WIRE["sensor_sd"] * away * (j == last))
+    holds = [replace(h, readings=row[: h.time_s.size] + WIRE["sensor_sd"] * away * (j == last))
              for j, (h, row) in enumerate(zip(one.holds, expected, strict=True))]  # fmt: skip
     one = replace(one, holds=tuple(holds))
     problem = build([one.train(3)])

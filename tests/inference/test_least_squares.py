@@ -63,7 +63,7 @@ def made_up(variant: Variant, truth: dict[str, float]):
     tension = simulate(wire.protocol(), at(truth), Model(variant.law, variant.history))[..., 0]
     holds = []
     for hold, row in zip(wire.holds, tension, strict=True):
-        holds.append(replace(hold, tension_N=row[: len(hold.time_s)]))
+        holds.append(replace(hold, readings=row[: len(hold.time_s)]))
     return replace(wire, holds=tuple(holds))
 
 

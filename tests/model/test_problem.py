@@ -147,8 +147,8 @@ def test_a_prior_of_no_parameter_is_refused_with_its_place(lines: dict[str, int]
 def test_data_without_noise_have_a_floor() -> None:
     """The stated resolution, but no less than a hundred-thousandth of the largest tension in size."""
     for stated in (0.0, 1e-6, 0.5):
-        e = short(resolution_N=stated)
-        holds = tuple(replace(h, tension_N=-h.tension_N) for h in e.holds)
+        e = short(resolution=stated)
+        holds = tuple(replace(h, readings=-h.readings) for h in e.holds)
         largest = max(h.tension_N.max() for h in e.holds if h.recorded)
         for test in (e, replace(e, holds=holds)):
             assert build([test]).samples[0].resolution_N == max(stated, 1e-5 * largest)
@@ -228,7 +228,7 @@ def test_replicates_take_the_place_of_the_readings_row_by_row() -> None:
 def test_a_test_without_readings_has_the_resolution_that_is_stated() -> None:
     """As a plan has it, and a bench before it is simulated; nothing is known of its tensions."""
     empty = short()
-    nothing = tuple(replace(h, number=None, time_s=h.time_s[:0], tension_N=h.tension_N[:0]) for h in empty.holds)
+    nothing = tuple(replace(h, number=None, time_s=h.time_s[:0], readings=h.tension_N[:0]) for h in empty.holds)
     for stated in (0.0, 0.01):
-        sample = build([replace(empty, holds=nothing, resolution_N=stated)]).samples[0]
+        sample = build([replace(empty, holds=nothing, resolution=stated)]).samples[0]
         assert sample.resolution_N == stated and sample.model.tension_ref_N == 1.0

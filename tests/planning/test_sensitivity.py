@@ -69,7 +69,7 @@ def test_an_amplitude_said_to_be_seen_in_four_of_five_tests_is():
         (sample,) = draw([UP], truth, 100 + i).problem.samples
         test = UP.experiment()
         rows = zip(test.holds, sample.readings[..., 0], strict=True)
-        test = replace(test, holds=tuple(replace(h, tension_N=frozen(y.tolist())) for h, y in rows))
+        test = replace(test, holds=tuple(replace(h, readings=frozen(y.tolist())) for h, y in rows))
         rng = np.random.default_rng(i)
         gate = examine([fitted([test], (), "hooke", "saturating", rng)], KINDS, 199, rng)
         found += gate.test.p <= ALPHA

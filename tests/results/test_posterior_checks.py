@@ -86,7 +86,7 @@ def test_readings_without_noise_have_a_floor_and_say_so(simulated):
 
 
 def with_tensions(experiment, tension):
-    holds = [replace(h, tension_N=tension[j, : h.time_s.size]) for j, h in enumerate(experiment.holds)]
+    holds = [replace(h, readings=tension[j, : h.time_s.size]) for j, h in enumerate(experiment.holds)]
     return replace(experiment, holds=tuple(holds))
 
 

@@ -1,11 +1,14 @@
 """The staircase against plain Python, its limits, and what a cut, a slack wire or a missing reading may change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.wire.protocols import PLAIN, by_hand, columns, parameters, protocol, protocols
+from wirebayes.effects import named
 from wirebayes.wire import laws
 from wirebayes.wire.staircase import Model, linearise, simulate
 
@@ -181,3 +184,25 @@ def test_setting_errors_move_their_hold_and_the_creep_after_it():
     assert readings(p, PLAIN, setting=setting) == pytest.approx(
         np.array(by_hand(p, PLAIN, setting=[0.0, 0.3, 0.0])), rel=1e-12
     )
+
+
+@pytest.mark.parametrize("effect", ["", "memory", "steady_creep", "second_relaxation"])
+@pytest.mark.parametrize("compiled_kernel", [True, False])
+def test_a_hold_goes_on_creeping_after_its_last_reading(monkeypatch, effect, compiled_kernel):
+    """As if a reading had been taken at its end."""
+    if not compiled_kernel:
+        monkeypatch.setattr("wirebayes.wire.compiled.kernel", None)
+    effects = (named(effect),) if effect else ()
+    theta = columns(**PLAIN) | {c: np.array([0.05]) for e in effects for c in e.columns()}
+    times = ([0.0, 30.0, 60.0], [0.0, 60.0], [0.0, 30.0])
+    read = protocol([1, 2, 3], ([0.0, 30.0, 60.0, 100.0], [0.0, 60.0, 90.0], [0.0, 30.0]))
+    unread = replace(protocol([1, 2, 3], times), duration_s=np.array([100.0, 90.0, 30.0]))
+    model = Model(effects=effects)
+    expected, found = linearise(read, theta, model), linearise(unread, theta, model)
+    for j, t in enumerate(times):
+        np.testing.assert_array_equal(found.tension[j, : len(t)], expected.tension[j, : len(t)])
+    np.testing.assert_array_equal(found.creep, expected.creep)
+    np.testing.assert_array_equal(found.carry_by_setting, expected.carry_by_setting)
+    earlier = linearise(protocol([1, 2, 3], times), theta, model)
+    if not effect:
+        assert (earlier.creep[1:] < expected.creep[1:]).all()

@@ -59,7 +59,7 @@ def without(experiment: Experiment, hold: int, reading: int) -> Experiment:
         if h.number == hold:
             keep = np.arange(len(h.time_s)) != reading
             temperature = None if h.temperature_C is None else h.temperature_C[keep]
-            h = replace(h, time_s=h.time_s[keep], tension_N=h.tension_N[keep], temperature_C=temperature)
+            h = replace(h, time_s=h.time_s[keep], readings=h.tension_N[keep], temperature_C=temperature)
         holds.append(h)
     return replace(experiment, holds=tuple(holds))
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, experiment_of
-from wirebayes.io.readings import OPTIONAL, PROTOCOL, REQUIRED, Table, shown
+from wirebayes.io.readings import OPTIONAL, READ, REQUIRED, Table, protocol_columns, shown
 from wirebayes.io.toml_keys import Keys
 from wirebayes.units import nearest
+from wirebayes.wire.protocol import Control
 
 SOURCE = Path("from_arrays")  # stands where the file's name would: in errors and as an experiment's source
 
@@ -28,7 +29,10 @@ def from_arrays(
     material: str,
     temperature_C: Iterable[float] | None = None,
     resolution_N: float = 0.0,
+    resolution_mm: float = 0.0,
     unrecorded_holds: Sequence[Mapping[str, float]] | None = None,
+    control: Control = "displacement",
+    preload_mm: float | None = None,
 ) -> Experiment:
     """One test of one wire from columns in memory.
 
@@ -40,7 +44,8 @@ def from_arrays(
         Number of the hold of each reading; numbers rise and may skip. A table with the columns ``hold``,
         ``displacement_mm``, ``time_s``, ``tension_N`` and optionally ``temperature_C`` stands for all of them.
     displacement_mm, time_s, tension_N : (r,) array
-        One value a reading: position in mm, time since the hold began in s, tension in N.
+        One value a row: position in mm, time since the hold began in s, tension in N. NaN in what is read says that the
+        hold lasted until then and that nothing was read.
     length_mm : float
         Zero-tension length of the sample before the test.
     name : str
@@ -48,10 +53,16 @@ def from_arrays(
     material : str
         Samples of one material may be fitted together.
     temperature_C : (r,) array, optional
-    resolution_N : float
-        Step to which tensions were rounded; 0 where they were not.
+    resolution_N, resolution_mm : float
+        Step to which tensions, or displacements with ``control="force"``, were rounded; 0 where they were not.
     unrecorded_holds : sequence of mapping, optional
-        Holds without readings: ``before_hold``, ``displacement_mm`` and ``duration_s`` each.
+        Holds without readings: ``before_hold``, what was set (``displacement_mm`` or ``tension_N``) and ``duration_s``
+        each.
+    control : {"displacement", "force"}
+        What was set in each hold: the displacement, and tensions were read; or the tension (dead weights, force
+        control), and displacements were read.
+    preload_mm : float, optional
+        The stretch at displacement zero, where it is known.
 
     Returns
     -------
@@ -83,18 +94,19 @@ def from_arrays(
         raise InputError(f"{SOURCE}: found a table and single columns, expected one or the other")
     if temperature_C is not None:
         columns = {column: columns[column] for column in _names(columns)} | {"temperature_C": temperature_C}
-    about = {"name": name, "material": material, "length_mm": length_mm}
-    if resolution_N != 0:
-        about["resolution_N"] = resolution_N
+    about: dict[str, Any] = {"name": name, "material": material, "length_mm": length_mm, "control": control}
+    stated = {"resolution_N": resolution_N or None, "resolution_mm": resolution_mm or None, "preload_mm": preload_mm}
+    about |= {key: value for key, value in stated.items() if value is not None}
     if unrecorded_holds is not None and len(unrecorded_holds):
         about["unrecorded_holds"] = [dict(each) for each in unrecorded_holds]
     keys = _Arguments(SOURCE, "", None, _plain(about), name if isinstance(name, str) else "")
-    return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL))
+    empty = (READ.get(control, ""), "temperature_C")
+    return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL, may_be_empty=empty))
 
 
-def protocol_of_columns(columns: Any) -> Table:
-    """The table of a protocol from a DataFrame or a mapping of columns; NaN in ``tension_N`` is an empty cell."""
-    return table_of(columns, Path("protocol"), *PROTOCOL, may_be_empty=("tension_N",))
+def protocol_of_columns(columns: Any, control: Control = "displacement") -> Table:
+    """The table of a protocol from a DataFrame or a mapping of columns; NaN in what is read is an empty cell."""
+    return table_of(columns, Path("protocol"), *protocol_columns(control), may_be_empty=(READ[control],))
 
 
 def is_table(value: Any) -> bool:

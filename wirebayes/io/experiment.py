@@ -13,16 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.io.readings import LARGEST, STRETCH, Hold, Table, frozen, readings_of, readings_table, shown
+from wirebayes.io.readings import LARGEST, SET, STRETCH, Hold, Table, frozen, readings_of, readings_table, shown
 from wirebayes.io.toml_keys import Keys, read_toml
 from wirebayes.units import nearest
 from wirebayes.user_files import read_text
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.protocol import Control, Protocol
 
 __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
 
-_KEYS = ("name", "material", "length_mm", "resolution_N", "readings", "unrecorded_holds", "prior")
-_HOLD_KEYS = ("before_hold", "displacement_mm", "duration_s")
+_KEYS = (
+    "name", "material", "length_mm", "resolution_N", "resolution_mm", "readings", "control", "preload_mm",
+    "unrecorded_holds", "prior",
+)  # fmt: skip
+# The key of the resolution of what is read, its unit, and the largest value that the readings may have.
+_RESOLUTION: dict[Control, tuple[str, str, float]] = {
+    "displacement": ("resolution_N", "N", LARGEST["tension_N"]),
+    "force": ("resolution_mm", "mm", LARGEST["displacement_mm"]),
+}
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
 # a folder beside the results' own files
 _TAKEN = re.compile(r"\.{1,2}|\.(lock|computing|checkpoint)|.*\.(json|html|partial)", re.IGNORECASE)
@@ -37,8 +44,8 @@ class Experiment:
     name, material : str
     length_mm : float
         Zero-tension length before the test.
-    resolution_N : float
-        Step to which tensions were rounded; 0.0 when not stated.
+    resolution : float
+        Step to which readings were rounded, in N, or in mm where the tension is set; 0.0 when not stated.
     holds : tuple of Hold
         In order, the unrecorded ones at their place.
     source : Path
@@ -47,6 +54,10 @@ class Experiment:
         ``[prior]`` tables by parameter name, as written: the file's, then the experiment's own over them.
     prior_lines : dict
         The line in `source` on which each of them stands.
+    control : {"displacement", "force"}
+        What was set in each hold; the other was read.
+    preload_mm : float, optional
+        The stretch at displacement zero, where it is known.
 
     Examples
     --------
@@ -57,11 +68,18 @@ class Experiment:
     name: str
     material: str
     length_mm: float
-    resolution_N: float
+    resolution: float
     holds: tuple[Hold, ...]
     source: Path
     priors: dict[str, dict[str, Any]] = field(default_factory=dict)
     prior_lines: dict[str, int] = field(default_factory=dict)
+    control: Control = "displacement"
+    preload_mm: float | None = None
+
+    @property
+    def resolution_N(self) -> float:
+        """Step to which tensions were rounded; 0.0 where they were set."""
+        return self.resolution if self.control == "displacement" else 0.0
 
     @property
     def recorded_holds(self) -> tuple[Hold, ...]:
@@ -78,9 +96,16 @@ class Experiment:
         first = next((hold.temperature_C[0] for hold in self.holds if hold.temperature_C is not None), None)
         return protocol_of(self.holds, self.length_mm, first)
 
+    def readings(self) -> NDArray[np.float64]:
+        """What was read, (H, R), padded with 0 as `protocol` is: tensions in N, or displacements in mm."""
+        read = _padded([hold.readings for hold in self.holds])
+        return np.pad(read, [(0, 0), (0, self.protocol().mask.shape[1] - read.shape[1])])
+
     def tension(self) -> NDArray[np.float64]:
-        """Measured tensions, (H, R) in N, padded with 0 as `protocol` is."""
-        return _padded([hold.tension_N for hold in self.holds])
+        """Tensions, (H, R) in N, padded with 0 as `protocol` is: as read, or as set."""
+        if self.control == "displacement":
+            return self.readings()
+        return self.protocol().mask * np.array([hold.setting for hold in self.holds])[:, None]
 
     def train(self, holds: int) -> "Experiment":
         """The first `holds` recorded holds, and the unrecorded ones before the last of them.
@@ -121,9 +146,9 @@ class Experiment:
     @property
     def data_hash(self) -> str:
         """SHA-256 of everything measured (not of the priors, nor of how the files spell it)."""
-        content = [self.name, self.material, self.length_mm, self.resolution_N]
+        content = [self.name, self.material, self.length_mm, self.resolution, self.control]
         holds = [
-            [hold.number, hold.displacement_mm, hold.duration_s, hold.time_s.tolist(), hold.tension_N.tolist()]
+            [hold.number, hold.setting, hold.duration_s, hold.time_s.tolist(), hold.readings.tolist()]
             + ([] if hold.temperature_C is None else [hold.temperature_C.tolist()])
             for hold in self.holds
         ]
@@ -131,14 +156,13 @@ class Experiment:
 
 
 SHORTEST = 1e-3  # mm, below any specimen; strains of far shorter ones overflow
-LEAST_HOLDS, LEAST_READINGS = 2, 5  # stiffness needs a step; level, slope and creep over time need readings
-ENOUGH = f"at least {LEAST_HOLDS} recorded holds and {LEAST_READINGS} readings in all"
+LEAST_READINGS = 3  # level, slope and curvature of one relaxation
+ENOUGH = f"at least one recorded hold and {LEAST_READINGS} readings in all"
 
 
 def enough(holds: Sequence[Hold]) -> bool:
     """True where there are readings enough for a fit."""
-    recorded = [hold.time_s.size for hold in holds if hold.recorded]
-    return len(recorded) >= LEAST_HOLDS and sum(recorded) >= LEAST_READINGS
+    return sum(hold.time_s.size for hold in holds) >= LEAST_READINGS
 
 
 def counted(holds: Sequence[Hold]) -> str:
@@ -169,7 +193,7 @@ def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | 
         warming = _padded([empty if hold.temperature_C is None else hold.temperature_C - reference_C for hold in holds])
     return Protocol(
         length_mm=length_mm,
-        displacement_mm=np.array([hold.displacement_mm for hold in holds]),
+        displacement_mm=np.array([hold.setting for hold in holds]),
         time_s=_padded([hold.time_s for hold in holds]),
         mask=_padded([np.ones(hold.time_s.size) for hold in holds]) > 0,
         duration_s=np.array([hold.duration_s for hold in holds]),
@@ -292,17 +316,53 @@ def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
     largest = LARGEST["displacement_mm"]
     expected = f"a length above 0 mm, from {SHORTEST:.0e} to {largest:.0e} mm"
     length = keys.number("length_mm", expected, least=SHORTEST, most=largest)
-    resolution = 0.0
-    if "resolution_N" in keys.table:
-        most = LARGEST["tension_N"]
-        expected = f"a step above 0 N, at most {most:.0e} N, or no such key"
-        resolution = keys.number("resolution_N", expected, above=0.0, most=most)
+    control = _control(keys)
+    resolution = _resolution(keys, control)
+    priors = keys.priors()
+    preload = _preload(keys, priors, length)
     table = readings()
-    recorded = readings_of(table, length)
+    recorded = readings_of(table, length, control)
     if not enough(recorded):
         raise keys.complain("readings", f"{counted(recorded)} in {table.path.name}", ENOUGH)
-    holds = _with_unrecorded(keys, recorded, length)
-    return Experiment(name, material, length, resolution, holds, keys.source, keys.priors())
+    holds = _with_unrecorded(keys, recorded, length, control)
+    return Experiment(
+        name, material, length, resolution, holds, keys.source, priors, control=control, preload_mm=preload
+    )
+
+
+def _control(keys: Keys) -> Control:
+    """What the experiment sets; the displacement where it does not say."""
+    expected = '"displacement" (displacements are set, tensions are read) or "force" (the reverse)'
+    match keys.table.get("control", "displacement"):
+        case "displacement":
+            return "displacement"
+        case "force":
+            return "force"
+        case other:
+            raise keys.complain("control", shown(other), expected)
+
+
+def _resolution(keys: Keys, control: Control) -> float:
+    """The step to which readings were rounded; 0 where it is not stated."""
+    key, unit, most = _RESOLUTION[control]
+    for other, _, _ in _RESOLUTION.values():
+        if other != key and other in keys.table:
+            raise keys.complain(other, other, f"{key}, because the test has control = {shown(control)}")
+    if key not in keys.table:
+        return 0.0
+    return keys.number(key, f"a step above 0 {unit}, at most {most:.0e} {unit}, or no such key", above=0.0, most=most)
+
+
+def _preload(keys: Keys, priors: dict[str, dict[str, Any]], length_mm: float) -> float | None:
+    """The known stretch at displacement zero, which becomes the preload's prior."""
+    if "preload_mm" not in keys.table:
+        return None
+    if "preload" in priors:
+        raise keys.complain("preload_mm", "preload_mm beside prior.preload", "one of them")
+    expected = f"a stretch above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
+    preload = keys.number("preload_mm", expected, above=-length_mm, most=STRETCH * length_mm)
+    priors["preload"] = {"fixed": preload}
+    return preload
 
 
 def _readings_path(keys: Keys) -> Path:
@@ -320,34 +380,43 @@ def _readings_path(keys: Keys) -> Path:
     return folder / readings
 
 
-def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float) -> tuple[Hold, ...]:
+def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float, control: Control) -> tuple[Hold, ...]:
     """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
     entries = keys.value("unrecorded_holds", "") if "unrecorded_holds" in keys.table else []
-    expected = "a list of { before_hold, displacement_mm, duration_s }"
+    expected = f"a list of {{ before_hold, {SET[control]}, duration_s }}"
     if not isinstance(entries, list):
         raise keys.complain("unrecorded_holds", shown(entries), expected)
-    numbers = [hold.number for hold in holds if hold.number is not None]
+    recorded = [place for place, hold in enumerate(holds) if hold.number is not None]
+    numbers = [int(holds[place].number or 0) for place in recorded]
     placed: list[tuple[int, Hold]] = []
     for index, entry in enumerate(entries):
         if not isinstance(entry, dict):
             raise keys.complain(f"unrecorded_holds[{index}]", shown(entry), expected)
         inner = replace(keys, table=entry, prefix=f"unrecorded_holds[{index}].")
-        inner.only(_HOLD_KEYS)
+        inner.only(("before_hold", SET[control], "duration_s"))
         reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table.get('readings', 'the readings')}"
         before = inner.value("before_hold", reach)
         if isinstance(before, bool) or not isinstance(before, int) or not 0 <= before <= numbers[-1]:
             raise inner.complain("before_hold", shown(before), reach)
-        expected = f"a displacement above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
-        displacement = inner.number("displacement_mm", expected, above=-length_mm, most=STRETCH * length_mm)
+        setting = _unrecorded_setting(inner, length_mm, control)
         longest = LARGEST["time_s"]
         duration = inner.number(
             "duration_s", f"a duration of 0 s or more, at most {longest:.0e} s", least=0.0, most=longest
         )
         if index and entry == entries[index - 1]:
             raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
-        place = next(place for place, number in enumerate(numbers) if number >= before)
-        placed.append((place, Hold(None, displacement, duration, frozen([]), frozen([]))))
+        place = next(place for place, number in zip(recorded, numbers, strict=True) if number >= before)
+        placed.append((place, Hold(None, setting, duration, frozen([]), frozen([]), control=control)))
     ordered = []
     for place, hold in enumerate(holds):
         ordered += [unrecorded for at, unrecorded in placed if at == place] + [hold]
     return _in_sequence(tuple(ordered))
+
+
+def _unrecorded_setting(keys: Keys, length_mm: float, control: Control) -> float:
+    """The displacement or the tension of one unrecorded hold."""
+    if control == "force":
+        most = LARGEST["tension_N"]
+        return keys.number("tension_N", f"a tension above 0 N, at most {most:.0e} N", above=0.0, most=most)
+    expected = f"a displacement above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
+    return keys.number("displacement_mm", expected, above=-length_mm, most=STRETCH * length_mm)

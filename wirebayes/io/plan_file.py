@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.io.experiment import ENOUGH, LEAST_HOLDS, LEAST_READINGS, SHORTEST
+from wirebayes.io.experiment import ENOUGH, LEAST_READINGS, SHORTEST
 from wirebayes.io.readings import LARGEST, STRETCH, shown
 from wirebayes.io.toml_keys import Keys, read_toml
 from wirebayes.units import nearest
@@ -150,7 +150,7 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
         back = _whole(keys, "unload", expected, 0, len(path) - 1)
         path += path[-2 : -2 - back : -1]
     times = _times(keys)
-    if len(path) < LEAST_HOLDS or len(path) * len(times) < LEAST_READINGS:
+    if len(path) * len(times) < LEAST_READINGS:
         raise keys.complain(
             "times_s" if "times_s" in keys.table else "readings", f"{len(path)} holds of {len(times)}", ENOUGH
         )
@@ -178,7 +178,7 @@ def _displacements(keys: Keys, length: float) -> list[float]:
         step = keys.number("step_mm", "a step other than 0 mm, or displacements_mm")
         if step == 0:
             raise keys.complain("step_mm", "0", "a step other than 0 mm")
-        count = _whole(keys, "holds", "a whole number of holds, 2 or more", LEAST_HOLDS, MOST_READINGS)
+        count = _whole(keys, "holds", "a whole number of holds, 1 or more", 1, MOST_READINGS)
         path, key = [step * (i + 1) for i in range(count)], "step_mm"
     if not path or min(path) <= -length or max(path) > STRETCH * length:
         raise keys.complain(key, shown(keys.table[key]), expected)

@@ -2,14 +2,15 @@
 
 The format: UTF-8 (a byte-order mark is accepted), one header line with the columns in any order, one reading per line,
 fields separated by commas, plain decimal numbers with optional spaces around them, any line ending, blank lines only at
-the end. There are no comments, no quotes and no empty cells.
+the end. There are no comments and no quotes. A row whose read value is empty says that its hold lasted until then.
 """
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import lgamma
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,13 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.units import nearest
 from wirebayes.user_files import read_text
+from wirebayes.wire.protocol import Control
 
 REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
 OPTIONAL = ("temperature_C",)
-PROTOCOL = REQUIRED[:3], ("tension_N", *OPTIONAL)  # required and optional columns of a protocol to predict
+# the column that is one value a hold, and the one with a value a reading
+SET: dict[Control, str] = {"displacement": "displacement_mm", "force": "tension_N"}
+READ: dict[Control, str] = {"displacement": "tension_N", "force": "displacement_mm"}
 
 # No bench comes near these: beyond them numbers are typing mistakes, and soon their squares overflow.
 LARGEST = {
@@ -37,35 +41,49 @@ _NEWLINE = re.compile(r"\r\n|\n|\r")
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """One position held, with the readings taken there.
+    """One setting held, with the readings taken there.
 
     Attributes
     ----------
     number : int or None
         The hold's number in the readings' file; None when it was held but not recorded.
-    displacement_mm : float
+    setting : float
+        The displacement in mm, or the tension in N where the tension is set.
     duration_s : float
-        A recorded hold lasts until its last reading.
-    time_s, tension_N : (r,) array
-        Time since the hold began and the tension then; empty when unrecorded. A protocol without
-        measured tensions has NaN in `tension_N`.
+        Until the last row of the hold, which may be one without a reading.
+    time_s, readings : (r,) array
+        Time since the hold began and what was read then: tensions in N, or displacements in mm where the tension is
+        set. Empty when unrecorded. A protocol without measured values has NaN.
     temperature_C : (r,) array or None
     start_s : float
         Time elapsed before this hold since the first one began.
+    control : {"displacement", "force"}
+        What is set.
     """
 
     number: int | None
-    displacement_mm: float
+    setting: float
     duration_s: float
     time_s: NDArray[np.float64]
-    tension_N: NDArray[np.float64]
+    readings: NDArray[np.float64]
     temperature_C: NDArray[np.float64] | None = None
     start_s: float = 0.0
+    control: Control = "displacement"
 
     @property
     def recorded(self) -> bool:
         """True when the hold has readings."""
         return self.time_s.size > 0
+
+    @property
+    def displacement_mm(self) -> Any:
+        """The displacement that was set, or the (r,) ones that were read."""
+        return self.setting if self.control == "displacement" else self.readings
+
+    @property
+    def tension_N(self) -> Any:
+        """The (r,) tensions that were read, or the one that was set."""
+        return self.readings if self.control == "displacement" else self.setting
 
 
 def shown(value: object) -> str:
@@ -171,7 +189,7 @@ def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) ->
     return Table(path, header, rows)
 
 
-def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
+def read_readings(path: Path, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Read and check a readings' CSV.
 
     Parameters
@@ -179,6 +197,8 @@ def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
     path : Path
     length_mm : float
         Zero-tension length, so that a displacement that leaves no wire is found.
+    control : {"displacement", "force"}
+        What was set.
 
     Returns
     -------
@@ -190,7 +210,7 @@ def read_readings(path: Path, length_mm: float) -> tuple[Hold, ...]:
     InputError
         With the file, line, column, what was found and what was expected.
     """
-    return readings_of(readings_table(path), length_mm)
+    return readings_of(readings_table(path), length_mm, control)
 
 
 def readings_table(path: Path) -> Table:
@@ -198,66 +218,85 @@ def readings_table(path: Path) -> Table:
     return _read_table(path, REQUIRED, OPTIONAL)
 
 
-def readings_of(table: Table, length_mm: float) -> tuple[Hold, ...]:
+def readings_of(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Check a table of readings, as `read_readings` does."""
-    holds = _holds(table, length_mm, [table.number(row, "tension_N") for row in range(len(table.rows))])
-    _check_sign(table, holds)
+    column = READ[control]
+    values = [table.number(row, column) if table.cell(row, column) else np.nan for row in range(len(table.rows))]
+    if not np.isfinite(values).any():
+        raise table.complain(0, column, "no reading", "at least one")
+    holds = tuple(_without_empty(hold) for hold in _holds(table, length_mm, control, values))
+    if control == "displacement":
+        _check_sign(table, [hold for hold in holds if hold.recorded])
     return holds
 
 
-def protocol_table(path: Path) -> Table:
-    """The CSV of a protocol to predict, split into fields: the readings' columns, with tensions optional."""
-    return _read_table(path, *PROTOCOL)
+def _without_empty(hold: Hold) -> Hold:
+    """A hold without its rows of no reading; one without any reading is unrecorded."""
+    read = np.isfinite(hold.readings)
+    if read.all():
+        return hold
+    temperature = None if hold.temperature_C is None else frozen(hold.temperature_C[read])
+    return replace(
+        hold,
+        number=hold.number if read.any() else None,
+        time_s=frozen(hold.time_s[read]),
+        readings=frozen(hold.readings[read]),
+        temperature_C=temperature if read.any() else None,
+    )
 
 
-def protocol_holds(table: Table, length_mm: float) -> tuple[Hold, ...]:
+def protocol_columns(control: Control) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Required and optional columns of a protocol to predict."""
+    return ("hold", SET[control], "time_s"), (READ[control], *OPTIONAL)
+
+
+def protocol_table(path: Path, control: Control = "displacement") -> Table:
+    """The CSV of a protocol to predict, split into fields: the readings' columns, with what is read optional."""
+    return _read_table(path, *protocol_columns(control))
+
+
+def protocol_holds(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Check a protocol.
 
-    A column `tension_N`, when there is one, is filled at most at the first time of a hold; every other
+    The column of what is read, when there is one, is filled at most at the first time of a hold; every other
     reading has NaN.
 
     Raises
     ------
     InputError
-        As `read_readings`, and where a tension stands at a later time of its hold.
+        As `read_readings`, and where a value stands at a later time of its hold.
     """
-    tension = [np.nan] * len(table.rows)
-    if "tension_N" in table.header:
+    column = READ[control]
+    values = [np.nan] * len(table.rows)
+    if column in table.header:
         for row in range(len(table.rows)):
-            if not table.cell(row, "tension_N"):
+            if not table.cell(row, column):
                 continue
-            tension[row] = table.number(row, "tension_N")
+            values[row] = table.number(row, column)
             if row and table.cell(row, "hold") == table.cell(row - 1, "hold"):
-                found = table.cell(row, "tension_N")
-                raise table.complain(row, "tension_N", found, "an empty cell after the hold's first time")
-    return _holds(table, length_mm, tension)
+                raise table.complain(row, column, table.cell(row, column), "an empty cell after the hold's first time")
+    return _holds(table, length_mm, control, values)
 
 
-def _holds(table: Table, length_mm: float, tension: Sequence[float]) -> tuple[Hold, ...]:
+def _holds(table: Table, length_mm: float, control: Control, values: Sequence[float]) -> tuple[Hold, ...]:
     rows = range(len(table.rows))
+    set_column = SET[control]
     number = [table.whole(row, "hold") for row in rows]
-    displacement = [table.number(row, "displacement_mm") for row in rows]
+    setting = [table.number(row, set_column) for row in rows]
     time = [table.number(row, "time_s") for row in rows]
-    temperature = None
-    if "temperature_C" in table.header:
-        temperature = [table.number(row, "temperature_C") for row in rows]
-        for row in rows:
-            if temperature[row] < -273.15:
-                raise table.complain(row, "temperature_C", table.cell(row, "temperature_C"), "at least -273.15 °C")
+    temperature = _temperatures(table, values)
+    displacement = setting if control == "displacement" else values
     first = []
     for row in rows:
-        if length_mm + displacement[row] <= 0:
-            expected = f"a displacement above -{length_mm:g} mm, the wire's length"
-            raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
-        if displacement[row] > STRETCH * length_mm:
-            expected = f"at most {STRETCH:g} times the wire's length of {length_mm:g} mm (is length_mm in mm?)"
-            raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
+        _check_displacement(table, row, displacement[row], length_mm)
+        if control == "force" and not setting[row] > 0:
+            raise table.complain(row, set_column, table.cell(row, set_column), "a tension above 0 N")
         if time[row] < 0:
             raise table.complain(row, "time_s", table.cell(row, "time_s"), "0 s or later")
         if row and number[row] == number[row - 1]:
-            if displacement[row] != displacement[row - 1]:
-                expected = f"{table.cell(row - 1, 'displacement_mm')} as before in hold {number[row]}"
-                raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
+            if setting[row] != setting[row - 1]:
+                expected = f"{table.cell(row - 1, set_column)} as before in hold {number[row]}"
+                raise table.complain(row, set_column, table.cell(row, set_column), expected)
             if time[row] <= time[row - 1]:
                 expected = f"a time after {table.cell(row - 1, 'time_s')} s in hold {number[row]}"
                 raise table.complain(row, "time_s", table.cell(row, "time_s"), expected)
@@ -272,24 +311,49 @@ def _holds(table: Table, length_mm: float, tension: Sequence[float]) -> tuple[Ho
         holds.append(
             Hold(
                 number=number[begin],
-                displacement_mm=displacement[begin],
+                setting=setting[begin],
                 duration_s=time[end - 1],
                 time_s=frozen(time[begin:end]),
-                tension_N=frozen(tension[begin:end]),
+                readings=frozen(values[begin:end]),
                 temperature_C=None if temperature is None else frozen(temperature[begin:end]),
                 start_s=start,
+                control=control,
             )
         )
         start += time[end - 1]
-    size = len(holds) * max(hold.time_s.size for hold in holds)
-    if size > MOST:
-        found = f"{len(holds)} holds, the longest of {max(hold.time_s.size for hold in holds)} readings"
+    longest = max(hold.time_s.size for hold in holds)
+    if len(holds) * longest > MOST:
+        found = f"{len(holds)} holds, the longest of {longest} readings"
         expected = f"at most {MOST} as holds times readings of the longest; `wirebayes import` thins a recording"
         raise InputError(f"{table.path}: found {found}, expected {expected}")
     if times_run_on([hold.time_s for hold in holds]) < RUN_ON_CERTAIN:
         expected = f"the time since hold {number[first[1]]} began, not since the test began (0 s at each hold's start)"
         raise table.complain(first[1], "time_s", table.cell(first[1], "time_s"), expected)
     return tuple(holds)
+
+
+def _temperatures(table: Table, values: Sequence[float]) -> list[float] | None:
+    """Logged temperatures, where there is a column of them; a row without a reading need not have one."""
+    if "temperature_C" not in table.header:
+        return None
+    out = []
+    for row, value in enumerate(values):
+        empty = np.isnan(value) and not table.cell(row, "temperature_C")
+        temperature = np.nan if empty else table.number(row, "temperature_C")
+        if temperature < -273.15:
+            raise table.complain(row, "temperature_C", table.cell(row, "temperature_C"), "at least -273.15 °C")
+        out.append(temperature)
+    return out
+
+
+def _check_displacement(table: Table, row: int, displacement: float, length_mm: float) -> None:
+    """Refuse a displacement that leaves no wire, or stretches it beyond what any thread bears."""
+    if length_mm + displacement <= 0:
+        expected = f"a displacement above -{length_mm:g} mm, the wire's length"
+        raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
+    if displacement > STRETCH * length_mm:
+        expected = f"at most {STRETCH:g} times the wire's length of {length_mm:g} mm (is length_mm in mm?)"
+        raise table.complain(row, "displacement_mm", table.cell(row, "displacement_mm"), expected)
 
 
 MOST = 100_000  # padded readings: thousands of walkers and simulations of more fill the memory of a desk's computer
@@ -341,7 +405,7 @@ PUSH = 5.0  # times the pull, and times the readings' spread in a hold: far beyo
 FOLLOWS = 0.9  # correlation with the displacement, which noise on a slack wire does not have
 
 
-def frozen(values: Sequence[float]) -> NDArray[np.float64]:
+def frozen(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """A read-only array, so that what was measured stays what was measured."""
     array = np.array(values, dtype=float)
     array.flags.writeable = False

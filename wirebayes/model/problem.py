@@ -218,6 +218,10 @@ def build(
     """
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
+        if experiment.control == "force":
+            raise InputError(
+                f"{experiment.source}, experiment {experiment.name}: found control = 'force', expected 'displacement'"
+            )
         materials.setdefault(experiment.material, []).append(experiment)
     several = len(experiments) > 1
     distributions: dict[str, Any] = {}
@@ -264,15 +268,15 @@ def _samples(
     members: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History
 ) -> list[Sample]:
     """The experiments of one material as the likelihood sees them."""
-    tension = tension_reference(np.concatenate([h.tension_N for e in members for h in e.holds]))
+    tension = tension_reference(np.concatenate([h.readings for e in members for h in e.holds]))
     length = _reference_length(members) if len(members) > 1 else 0.0
     out = []
     for e in members:
-        largest = max((float(np.abs(h.tension_N).max()) for h in e.recorded_holds), default=0.0)
+        largest = max((float(np.abs(h.readings).max()) for h in e.recorded_holds), default=0.0)
         present = tuple(x for x in effects if not isinstance(x, EventEffect) or x.test in ("", e.name))
         model = Model(law, history, present, tension, length)
-        finest = max(e.resolution_N, FINEST * largest)
-        out.append(Sample(e.name, e.material, e.protocol(), e.tension()[..., None], finest, model))
+        finest = max(e.resolution, FINEST * largest)
+        out.append(Sample(e.name, e.material, e.protocol(), e.readings()[..., None], finest, model))
     return out
 
 

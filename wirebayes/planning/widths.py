@@ -86,7 +86,7 @@ def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History)
     (sample,) = problem.samples
     tension = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]
     holds = [
-        replace(hold, tension_N=frozen(row[mask].tolist())) if hold.recorded else hold
+        replace(hold, readings=frozen(row[mask].tolist())) if hold.recorded else hold
         for hold, row, mask in zip(test.holds, tension, sample.protocol.mask, strict=True)
     ]
     return replace(test, holds=tuple(holds))

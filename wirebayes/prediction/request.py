@@ -193,6 +193,8 @@ class _File:
                 expected = f"{trained.displacement_mm[row]:g}, as hold {number} was trained on"
                 raise self.complain(i, 0, "displacement_mm", f"{hold.displacement_mm:g}", expected)
             times = trained.time_s[row][trained.mask[row]]
+            if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
+                times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
             for k in range(max(len(times), len(hold.time_s))):
                 if k >= len(hold.time_s):
                     found = f"{k} reading{'s' * (k != 1)} of hold {number}"
@@ -202,7 +204,7 @@ class _File:
                     expected = f"the times hold {number} was trained on: {listed}"
                     raise self.complain(i, k, "time_s", f"{hold.time_s[k]:g}", expected)
             if hold.temperature_C is not None and trained.warming_K is not None and trained.reference_C is not None:
-                logged = trained.reference_C + trained.warming_K[row][trained.mask[row]]
+                logged = trained.reference_C + trained.warming_K[row][: len(times)]
                 wrong = np.flatnonzero(np.abs(hold.temperature_C - logged) > _SAME_K)
                 if len(wrong):
                     k = int(wrong[0])

@@ -276,7 +276,8 @@ def _measured(
         None if reference_C is None else np.nan_to_num(whole(here["warming_K"].values)[:, :width]),
         reference_C,
     )
-    return protocol, np.nan_to_num(readings)
+    padding = protocol.mask.shape[1] - readings.shape[1]  # a column where a hold went on after its last reading
+    return protocol, np.pad(np.nan_to_num(readings), [(0, 0), (0, padding)])
 
 
 def datatree(folder: Path) -> xr.DataTree:

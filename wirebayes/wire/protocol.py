@@ -2,19 +2,23 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.typing import Floats
 
+Control = Literal["displacement", "force"]  # what is set in a hold; the other is read
+
 
 @dataclass(frozen=True)
 class Protocol:
     """Holds of one test, in order, unrecorded ones included.
 
-    Ragged reading times are padded with zeros to ``R`` columns; `mask` marks real readings.
+    Ragged reading times are padded with zeros to ``R`` columns; `mask` marks real readings. Where a hold goes on after
+    its last reading, the column behind that reading holds the time of its end, which the mask leaves out; a column is
+    added where there is none.
 
     Attributes
     ----------
@@ -26,7 +30,7 @@ class Protocol:
     mask : (H, R) bool array
         True where a reading was taken; a row of False is an unrecorded hold.
     duration_s : (H,) array
-        How long each hold lasted.
+        How long each hold lasted: until its last reading, or longer.
     number : (H,) int array
         The hold numbers of the readings' file; -1 for an unrecorded hold.
     warming_K : (H, R) array or None
@@ -43,6 +47,32 @@ class Protocol:
     number: NDArray[np.int64]
     warming_K: Floats | None = None
     reference_C: float | None = None
+
+    def __post_init__(self) -> None:
+        longer = self._longer
+        if not longer.any():
+            return
+        end = self.last_reading + 1
+        if end[longer].max() == self.mask.shape[1]:
+            padded = {name: np.pad(getattr(self, name), [(0, 0), (0, 1)]) for name in ("time_s", "mask")}
+            if self.warming_K is not None:
+                padded["warming_K"] = np.pad(self.warming_K, [(0, 0), (0, 1)])
+        else:
+            padded = {"time_s": self.time_s.copy()}
+            if self.warming_K is not None:
+                padded["warming_K"] = self.warming_K.copy()
+        rows = np.flatnonzero(longer)
+        padded["time_s"][rows, end[rows]] = self.duration_s[rows]
+        if "warming_K" in padded:  # the wire keeps the temperature that was read last
+            padded["warming_K"][rows, end[rows]] = padded["warming_K"][rows, end[rows] - 1]
+        for name, array in padded.items():
+            object.__setattr__(self, name, array)
+
+    @property
+    def _longer(self) -> NDArray[np.bool_]:
+        """(H,) True where a hold went on after its last reading."""
+        last_s = np.max(self.time_s * self.mask, axis=1, initial=0.0)
+        return np.asarray(self.recorded & (self.duration_s > last_s))
 
     @property
     def recorded(self) -> NDArray[np.bool_]:
@@ -72,6 +102,11 @@ class Protocol:
         return np.asarray(np.maximum(self.mask.sum(axis=1) - 1, 0))
 
     @cached_property
+    def end(self) -> NDArray[np.int64]:
+        """(H,) column in which each hold ends: that of its last reading, or the one behind it."""
+        return self.last_reading + self._longer
+
+    @cached_property
     def flat(self) -> dict[str, Any]:
         """The same as contiguous arrays: what compiled code calls a ``Test`` (``wire/_kernel.pyx``)."""
         times, where = self.distinct_times
@@ -87,7 +122,7 @@ class Protocol:
             "direction": direction,
             "times": times,
             "which": which,
-            "last": self.last_reading.astype(np.intc),
+            "last": self.end.astype(np.intc),
             "recorded": self.recorded.view(np.uint8),
             "which_age": np.zeros((0, 0, 0), np.intc),
             "read_times": len(times),

@@ -244,8 +244,8 @@ class Walk:
         courses = law.beside(beside, hold)
         total = sum(courses.values(), grown)
         readings = self.change("reading", self._tension(position, total, hold), hold)
-        last = self.protocol.last_reading[j]
-        return readings, grown[last], {key: course[last][None] for key, course in courses.items()}
+        end = self.protocol.end[j]
+        return readings, grown[end], {key: course[end][None] for key, course in courses.items()}
 
     def fresh(self, j: int, stretched: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
         """Some readings of a hold without a past, and their derivatives by the stretched length.
@@ -313,7 +313,7 @@ class Walk:
         stiff = np.where(tension > 0, k1, 0.0)
         by_setting = stiff * (by_s + by_l * (amount_s * fraction))
         by_creep = stiff * (by_l * (1.0 + amount_c * fraction))
-        end = every[self.protocol.last_reading[j]]
+        end = every[self.protocol.end[j]]
         out = creep + amount * end
         return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end
 
