@@ -219,7 +219,16 @@ def readings_table(path: Path) -> Table:
 
 
 def readings_of(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
-    """Check a table of readings, as `read_readings` does."""
+    """Check a table of readings, as `read_readings` does.
+
+    Parameters
+    ----------
+    table : Table
+    length_mm : float
+        Zero-tension length, so that a displacement that leaves no wire is found.
+    control : {"displacement", "force"}
+        What was set.
+    """
     column = READ[control]
     values = [table.number(row, column) if table.cell(row, column) else np.nan for row in range(len(table.rows))]
     if not np.isfinite(values).any():
@@ -260,6 +269,14 @@ def protocol_holds(table: Table, length_mm: float, control: Control = "displacem
 
     The column of what is read, when there is one, is filled at most at the first time of a hold; every other
     reading has NaN.
+
+    Parameters
+    ----------
+    table : Table
+    length_mm : float
+        Zero-tension length, so that a displacement that leaves no wire is found.
+    control : {"displacement", "force"}
+        What is set.
 
     Raises
     ------
