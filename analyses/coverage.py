@@ -53,10 +53,10 @@ def wire(seed: int) -> Simulated:
 def training(made: Simulated) -> tuple[Problem, int]:
     """The problem of the first two thirds of the holds, and how many they are."""
     sample = made.problem.samples[0]
-    count = (2 * len(sample.protocol.displacement_mm)) // 3
+    count = (2 * len(sample.protocol.setting)) // 3
     p = sample.protocol
     cut = replace(
-        p, displacement_mm=p.displacement_mm[:count], time_s=p.time_s[:count], mask=p.mask[:count],
+        p, setting=p.setting[:count], time_s=p.time_s[:count], mask=p.mask[:count],
         duration_s=p.duration_s[:count], number=p.number[:count],
     )  # fmt: skip
     return replace(made.problem, samples=(replace(sample, protocol=cut, readings=sample.readings[:count]),)), count
@@ -76,7 +76,7 @@ def held_out(made: Simulated, theta: Array, count: int, rng: np.random.Generator
     out = []
     for j in range(count, len(seen)):
         setting = setting_sd * rng.normal(size=len(theta))
-        clean = line.tension[j] + line.by_creep[j] * carried + line.by_setting[j] * setting
+        clean = line.reading[j] + line.by_creep[j] * carried + line.by_setting[j] * setting
         carried = line.carry_by_creep[j] * carried + line.carry_by_setting[j] * setting
         draws = clean + np.sqrt(rounded) * rng.normal(size=clean.shape)
         low, high = np.quantile(draws, [0.05, 0.95], axis=1)

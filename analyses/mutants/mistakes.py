@@ -186,7 +186,7 @@ NAMED = [
     (DISCOVERY + "held_out.py", "[0.05, 0.95]", "[0.1, 0.9]"),
     (DISCOVERY + "power.py", "> threshold) >= 0.8)", "> threshold) >= 0.5)"),
     (DISCOVERY + "held_out.py", "    log_weight = np.minimum(log_weight, ceiling)\n", ""),
-    (MODEL + "likelihoods.py", " + resolution_N * resolution_N / 12.0", ""),
+    (MODEL + "likelihoods.py", " + resolution * resolution / 12.0", ""),
     (MODEL + "problem.py", "return out if ratio == 1.0 else", "return out if True else"),
     (SAMPLER + "moves.py", "scale = 2.38 /", "scale = 0.238 /"),
 ]

@@ -112,7 +112,7 @@ def test_creep_at_once_solves_eq_2_and_stands_still() -> None:
     model = Model(effects=(RIVALS["at_once"](), RIVALS["not_in_time"]()))
     tension = simulate(protocol, theta(), model)[..., 0]
     assert np.ptp(tension, axis=1).max() == 0
-    strain = (protocol.displacement_mm + TRUTH["preload"]) / 1000.0
+    strain = (protocol.setting + TRUTH["preload"]) / 1000.0
     parts = tension[:, 0] / TRUTH["k1"] + TRUTH["B"] * tension[:, 0] ** TRUTH["U"] / 1000.0
     assert parts == pytest.approx(strain, rel=1e-12)
     line = linearise(protocol, theta(), model)
@@ -126,8 +126,8 @@ def test_hooke_without_creep_is_a_spring() -> None:
     assert problem.names == ("k1", "preload", "sensor_sd", "setting_sd")
     rows = np.array([[700.0, 0.3, 0.01, 0.02]])
     line = problem.linearised(rows, problem.samples[0])[0]
-    displacement = problem.samples[0].protocol.displacement_mm
-    assert line.tension[:, :, 0] == pytest.approx(np.tile(0.7 * (displacement + 0.3)[:, None], 5))
+    displacement = problem.samples[0].protocol.setting
+    assert line.reading[:, :, 0] == pytest.approx(np.tile(0.7 * (displacement + 0.3)[:, None], 5))
 
 
 def test_every_candidate_differs_from_the_base_in_its_one_thing() -> None:

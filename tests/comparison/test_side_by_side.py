@@ -175,7 +175,7 @@ def test_a_law_of_time_constants_creeps_by_exponentials(name: str) -> None:
               "two_modes.slow_share": 0.4, "two_modes.slower": 10.0}  # fmt: skip
     theta = np.array([[values[parameter] for parameter in problem.names]])
     sample = problem.samples[0]
-    tension, t = problem.linearised(theta, sample)[0].tension[0, :, 0], sample.protocol.time_s[0]
+    tension, t = problem.linearised(theta, sample)[0].reading[0, :, 0], sample.protocol.time_s[0]
     crept = (1000.0 + 1.0 + 0.3) / (1.0 + tension / 700.0) - 1000.0  # zero-tension length less that of the start, mm
     share = 1.0 - np.exp(-0.05 * t)
     if name == "two_modes":

@@ -64,7 +64,7 @@ def test_information_on_amplitudes_is_that_of_a_regression_beside_everything_els
     unit = np.eye(z.shape[1])
 
     def readings(z: np.ndarray, displaced: float | np.ndarray = 0.0) -> np.ndarray:
-        protocol = replace(sample.protocol, displacement_mm=sample.protocol.displacement_mm + displaced)
+        protocol = replace(sample.protocol, setting=sample.protocol.setting + displaced)
         own = problem.parameters(target.coordinates.to_natural(z), sample)
         return np.asarray(simulate(protocol, own, sample.model)[sample.protocol.mask][:, 0])
 
@@ -75,7 +75,7 @@ def test_information_on_amplitudes_is_that_of_a_regression_beside_everything_els
     moving = [i for i, name in enumerate(names) if name not in ("sensor_sd", "setting_sd")]
     h = 1e-5
     slopes = np.stack([readings(z + h * unit[i]) - readings(z - h * unit[i]) for i in moving], axis=1) / (2 * h)
-    steps = h * np.eye(len(sample.protocol.displacement_mm))
+    steps = h * np.eye(len(sample.protocol.setting))
     shifts = np.stack([readings(z, step) - readings(z, -step) for step in steps], axis=1) / (2 * h)
     own = {name: float(v[0]) for name, v in problem.parameters(target.coordinates.to_natural(z), sample).items()}
     variance = own["sensor_sd"] ** 2 + sample.resolution_N**2 / 12.0

@@ -58,8 +58,8 @@ def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
     first, second = more.samples
     assert "a second length, 3420 mm" in words or f"{2 * first.protocol.length_mm:g} mm" in words
     assert second.protocol.length_mm == 2.0 * first.protocol.length_mm
-    recorded = first.protocol.displacement_mm[first.protocol.recorded]
-    assert second.protocol.displacement_mm == pytest.approx(2.0 * recorded)
+    recorded = first.protocol.setting[first.protocol.recorded]
+    assert second.protocol.setting == pytest.approx(2.0 * recorded)
     assert more.prior.fixed == {"creep_length_exponent": 1.0}  # creep is a strain until readings say otherwise
     theta = more.prior.rvs(1, np.random.default_rng(0))
     own = [more.parameters(theta, s)["B"][0] for s in more.samples]
@@ -103,7 +103,7 @@ def test_the_plan_with_the_largest_value_wins_and_is_compared_with_the_present_t
     monkeypatch.setattr(module, "_another_length", lambda problem: ("length", WHOLE))
     monkeypatch.setattr(module, "with_protocols", lambda problem, protocols, empty: protocols[0])
     monkeypatch.setattr(module, "replace_problem", lambda target, other: other)
-    fit: Any = SimpleNamespace(target=SimpleNamespace(problem=problem, displacement_mm=WHOLE.displacement_mm))
+    fit: Any = SimpleNamespace(target=SimpleNamespace(problem=problem, displacement_mm=WHOLE.setting))
     words, ratio = module._best_plan(fit, lambda x: float(x.displacement_mm.sum()))  # type: ignore[attr-defined]
     assert words == "take twice as many, half as large steps over 1 to 4 mm" and ratio == pytest.approx(11.5 / 7.0)
     problem.samples.append(problem.samples[0])

@@ -45,9 +45,9 @@ def test_displacements_count_by_the_range_of_all_holds_read_or_not(tmp_path: Pat
     write(tmp_path, [Bench(displacements_mm=(1, 2, 9, 3), times_s=(0, 60), unrecorded={3})], Truth(QUIET), seed=3)
     protocol = read_experiments(tmp_path / "experiments.toml")[0].protocol()
     mask = protocol.mask
-    assert mask.sum() <= smooth_reference.FUNCTIONS and protocol.displacement_mm.max() == 9.0
+    assert mask.sum() <= smooth_reference.FUNCTIONS and protocol.setting.max() == 9.0
     hold, reading = np.nonzero(mask)
-    order, place = hold / 3.0, (protocol.displacement_mm[hold] - 1.0) / 8.0
+    order, place = hold / 3.0, (protocol.setting[hold] - 1.0) / 8.0
     time = np.log1p(protocol.time_s[hold, reading] / (0.2 * 60.0))
 
     def smooth(x: np.ndarray, length: float) -> np.ndarray:

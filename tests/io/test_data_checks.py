@@ -80,7 +80,7 @@ def test_one_gross_outlier_is_named_with_its_place(sound):
 @pytest.mark.parametrize(("strain", "warned"), [(4e-5, True), (6e-5, False), (0.4, False), (0.6, True)])
 def test_displacements_beside_the_length(sound, strain, warned):
     protocol, tension = sound
-    length = np.ptp(protocol.displacement_mm) / strain
+    length = np.ptp(protocol.setting) / strain
     assert (
         "displacement_mm and length_mm are both in mm" in warning(replace(protocol, length_mm=length), tension)
     ) == warned
@@ -95,7 +95,7 @@ def test_threads_and_ropes_get_no_warning(sound):
 
 def test_the_same_place_throughout(sound):
     protocol, tension = sound
-    still = replace(protocol, displacement_mm=np.ones_like(protocol.displacement_mm))
+    still = replace(protocol, setting=np.ones_like(protocol.setting))
     assert "all holds have the same displacement_mm" in warning(still, tension)
 
 

@@ -12,7 +12,7 @@ def columns(theta):
 
 def jacobian(protocol, theta, model):
     """(H, R) readings and (H, R, H) derivatives by a complex step through everything that follows a setting error."""
-    holds, step = len(protocol.displacement_mm), 1e-30
+    holds, step = len(protocol.setting), 1e-30
     clean = simulate(protocol, columns(theta), model)[..., 0]
     out = np.zeros((*clean.shape, holds))
     for j in range(holds):

@@ -27,7 +27,7 @@ LOADING = protocol([1.0, 2.0, 4.0, 6.0, 3.0, 7.0], [TIMES] * 6, unrecorded={2})
 
 def measured(p, theta, model=None, seed=0):
     rng = np.random.default_rng(seed)
-    setting = rng.normal(0, theta["setting_sd"], (len(p.displacement_mm), 1))
+    setting = rng.normal(0, theta["setting_sd"], (len(p.setting), 1))
     clean = simulate(p, columns(theta), model or Model(), setting)[..., 0]
     return np.where(p.mask, clean + rng.normal(0, theta["sensor_sd"], clean.shape), 0.0)
 
@@ -206,7 +206,7 @@ def test_hold_by_hold_is_the_limit_of_a_wide_setting_error_given_the_first_readi
 def test_with_an_effect_too_every_hold_is_a_test_of_its_own_through_its_first_reading(key):
     model = Model(effects=(named(key),))
     theta = columns(PLAIN | STRONG)
-    first = np.linspace(1.0, 6.0, len(LOADING.displacement_mm))[:, None]
+    first = np.linspace(1.0, 6.0, len(LOADING.setting))[:, None]
     for j, course in enumerate(likelihoods.hold_courses(LOADING, theta, model, first)):
         if course is None:
             continue
@@ -293,7 +293,7 @@ def test_residuals_that_are_absurd_say_nothing_of_the_holds_before(times):
     theta = PLAIN | {"sensor_sd": 1.0, "setting_sd": 1e-9}
     p = protocol([1.0, 2.0, 4.0], [TIMES] * 3)
     line = linearise(p, columns(theta))
-    y = line.tension.copy()
+    y = line.reading.copy()
     y[1, 2] += 1e6 * times
     y[2, 1] += 3e6 * times
     noise = np.ones(1), np.array([1e-9])

@@ -43,7 +43,7 @@ def dense(experiment: Experiment, values: dict[str, float]) -> tuple[np.ndarray,
     holds, step = len(protocol.number), 1e-6
     moved = np.eye(holds) * step
     many = {name: np.full(holds, value) for name, value in values.items()}
-    up, down = simulate(protocol, many, setting_mm=moved), simulate(protocol, many, setting_mm=-moved)
+    up, down = simulate(protocol, many, setting_error=moved), simulate(protocol, many, setting_error=-moved)
     return simulate(protocol, theta)[..., 0], (up - down) / (2 * step)
 
 

@@ -94,7 +94,7 @@ def test_exact_thresholds_of_a_silent_check(simulated):
     """A test that never moved has no steps to compare with; a fit without setting errors has none to judge."""
     sample = simulated.problem.samples[0]
     own = draws(simulated.problem, setting_sd=5.0)
-    still = replace(sample.protocol, displacement_mm=np.ones(len(sample.protocol.displacement_mm)))
+    still = replace(sample.protocol, setting=np.ones(len(sample.protocol.setting)))
     assert posterior_checks.loose_steps(own, replace(sample, protocol=still)) == ""
     assert posterior_checks.loose_steps({k: v for k, v in own.items() if k != "setting_sd"}, sample) == ""
 
@@ -156,13 +156,11 @@ def test_an_error_must_be_large_in_nineteen_of_twenty_draws(simulated):
 
 def test_steps_are_the_typical_ones_of_those_that_move(simulated):
     """Their median, whatever the direction; holds at one place are no steps."""
-    protocol = replace(
-        simulated.problem.samples[0].protocol, displacement_mm=np.array([0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 9.0])
-    )
+    protocol = replace(simulated.problem.samples[0].protocol, setting=np.array([0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 9.0]))
     sample = replace(simulated.problem.samples[0], protocol=protocol)
     for sd, warned in ((0.99, False), (1.01, True)):
         found = posterior_checks.loose_steps({"setting_sd": np.full(9, sd)}, sample)
         assert bool(found) is warned and ("steps by 2 mm" in found) is warned
-    still = replace(sample, protocol=replace(protocol, displacement_mm=np.full(7, 3.0)))
+    still = replace(sample, protocol=replace(protocol, setting=np.full(7, 3.0)))
     assert posterior_checks.loose_steps({"setting_sd": np.full(9, 5.0)}, still) == ""
     assert posterior_checks.loose_steps({}, sample) == ""  # hold by hold there is no such error

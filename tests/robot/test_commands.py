@@ -14,7 +14,7 @@ from wirebayes.wire.staircase import Model
 DOCS = Path(__file__).parents[2] / "docs" / "example"
 PROTOCOL = Protocol(
     length_mm=1000.0,
-    displacement_mm=np.array([1.0, 13.0]),
+    setting=np.array([1.0, 13.0]),
     time_s=np.tile([0.0, 120.0], (2, 1)),
     mask=np.ones((2, 2), bool),
     duration_s=np.full(2, 120.0),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from wirebayes.wire.protocol import Protocol
 
 
-def protocol(displacements, times, *, length=1000.0, unrecorded=(), warming=None) -> Protocol:
+def protocol(settings, times, *, length=1000.0, unrecorded=(), warming=None, control="displacement") -> Protocol:
     """Holds with reading times of their own (ragged), those in `unrecorded` without readings."""
     width = max(len(t) for i, t in enumerate(times) if i not in unrecorded)
     time, mask = np.zeros((len(times), width)), np.zeros((len(times), width), bool)
@@ -17,7 +17,7 @@ def protocol(displacements, times, *, length=1000.0, unrecorded=(), warming=None
             time[i, : len(t)], mask[i, : len(t)] = t, True
     number = np.array([-1 if i in unrecorded else i + 1 for i in range(len(times))])
     duration = np.array([t[-1] for t in times], float)
-    return Protocol(length, np.array(displacements, float), time, mask, duration, number, warming)
+    return Protocol(length, np.array(settings, float), time, mask, duration, number, warming, control=control)
 
 
 def columns(**values):
@@ -31,7 +31,7 @@ PLAIN = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4}
 def by_hand(p, theta, *, law="hooke", history="saturating", setting=None):
     """Eqs (1)-(6) hold after hold; a list of lists of tensions, nothing for an unrecorded hold."""
     carried, out = 0.0, []
-    for j, displacement in enumerate(p.displacement_mm):
+    for j, displacement in enumerate(p.setting):
         stretched = p.length_mm + theta["preload"] + displacement + (0.0 if setting is None else setting[j])
 
         def tension(creep, stretched=stretched):
@@ -53,11 +53,32 @@ def by_hand(p, theta, *, law="hooke", history="saturating", setting=None):
     return out
 
 
+def weights_by_hand(p, theta, *, law="hooke", history="saturating", setting=None):
+    """The law solved for the length, hold after hold; a list of lists of displacements."""
+    carried, out = 0.0, []
+    for j, weight in enumerate(p.setting):
+        tension = weight + (0.0 if setting is None else setting[j])
+        goal = theta["B"] * tension ** theta["U"]
+        amount = goal - carried if history == "saturating" else goal
+        start = carried
+
+        def creep(t, start=start, amount=amount):
+            return start + amount * (1.0 - math.exp(-theta["k2"] * t ** theta["N"]))
+
+        strain = tension / theta["k1"]
+        longer = 1.0 + strain if law == "hooke" else 1.0 / (1.0 - strain)
+        times = p.time_s[j][p.mask[j]]
+        out.append([(p.length_mm + creep(t)) * longer - p.length_mm - theta["preload"] for t in times])
+        carried = creep(p.duration_s[j])
+    return out
+
+
 @st.composite
-def protocols(draw, most_holds=6):
-    """Any lengths, steps up and down (slack included), ragged times, late first readings, unrecorded holds."""
+def protocols(draw, most_holds=6, control="displacement"):
+    """Lengths, steps up and down (slack included) or weights, ragged times, late first readings, unrecorded holds."""
     holds = draw(st.integers(1, most_holds))
-    displacements = draw(st.lists(st.floats(-2.0, 12.0), min_size=holds, max_size=holds))
+    each = st.floats(-2.0, 12.0) if control == "displacement" else st.floats(0.1, 50.0)
+    values = draw(st.lists(each, min_size=holds, max_size=holds))
     gaps = st.lists(st.floats(1.0, 300.0), min_size=1, max_size=5)
     times = []
     for _ in range(holds):
@@ -65,7 +86,7 @@ def protocols(draw, most_holds=6):
         late = draw(st.sampled_from([0.0, 0.0, 5.0]))
         times.append([late + t for t in np.concatenate([[0.0], np.cumsum(steps)])])
     unrecorded = draw(st.sets(st.integers(0, holds - 2), max_size=1)) if holds > 1 else set()
-    return protocol(displacements, times, length=draw(st.floats(300.0, 3000.0)), unrecorded=unrecorded)
+    return protocol(values, times, length=draw(st.floats(300.0, 3000.0)), unrecorded=unrecorded, control=control)
 
 
 def parameters():

@@ -82,12 +82,12 @@ def test_readings_and_derivatives_are_those_of_numpy(p, model, rows, seed):
     line, expected = linearise(p, theta, model), by_numpy(lambda: linearise(p, theta, model))
     assume(all(np.isfinite(value).all() for value in vars(expected).values()))
     # of a wire that is just slack, or pulls by rounding alone, the derivatives are anything
-    stretched = theta["preload"] + p.displacement_mm[:, None] - expected.creep[:-1]
+    stretched = theta["preload"] + p.setting[:, None] - expected.creep[:-1]
     assume((np.abs(stretched) > 1e-3).all())
-    assume(not any(((t > 0) & (t < 1e-6 * theta["k1"])).any() for t in (line.tension, expected.tension)))
+    assume(not any(((t > 0) & (t < 1e-6 * theta["k1"])).any() for t in (line.reading, expected.reading)))
     for name, value in vars(expected).items():
         same(getattr(line, name), value, theta["k1"].max())
-    setting = np.random.default_rng(seed).normal(0.0, 0.1, (len(p.displacement_mm), len(rows)))
+    setting = np.random.default_rng(seed).normal(0.0, 0.1, (len(p.setting), len(rows)))
     same(simulate(p, theta, model, setting), by_numpy(lambda: simulate(p, theta, model, setting)), theta["k1"].max())
 
 
@@ -95,7 +95,7 @@ def test_readings_and_derivatives_are_those_of_numpy(p, model, rows, seed):
 @given(protocols(), models, st.lists(parameters(), min_size=1, max_size=3), st.integers(0, 2**32 - 1))
 def test_single_holds_are_those_of_numpy(p, model, rows, seed):
     theta = drawn(model, rows, seed)
-    first = np.random.default_rng(seed).uniform(-0.5, 8.0, (len(p.displacement_mm), 1))
+    first = np.random.default_rng(seed).uniform(-0.5, 8.0, (len(p.setting), 1))
     found = likelihoods.hold_courses(p, theta, model, first)
     expected = by_numpy(lambda: likelihoods.hold_courses(p, theta, model, first))
     for one, other, recorded in zip(found, expected, p.recorded, strict=True):
@@ -111,7 +111,7 @@ def test_single_holds_are_those_of_numpy(p, model, rows, seed):
 def test_filters_are_those_of_numpy(p, row, sensor_sd, setting_sd, seed):
     theta = drawn(Model(), [row, row], seed)
     line = linearise(p, theta)
-    readings = line.tension[..., :1] + np.random.default_rng(seed).normal(0.0, sensor_sd, (*p.time_s.shape, 1))
+    readings = line.reading[..., :1] + np.random.default_rng(seed).normal(0.0, sensor_sd, (*p.time_s.shape, 1))
     seen = readings, p.mask, np.array([sensor_sd**2, 0.01]), np.array([setting_sd, 0.0])
     found, expected = likelihoods.chain(line, *seen), by_numpy(lambda: likelihoods.chain(line, *seen))
     for name, value in vars(expected).items():

@@ -26,8 +26,8 @@ def test_any_staircase_is_the_paper_s_equations_hold_after_hold(p, theta, law, h
     model = Model(law, history)
     line = linearise(p, columns(**theta), model)
     # where a hold begins just slack, rounding decides, of which a small power of the tension makes much
-    assume((np.abs(theta["preload"] + p.displacement_mm - line.creep[:-1, 0]) > 1e-3).all())
-    for found in (readings(p, theta, model), line.tension[..., 0]):
+    assume((np.abs(theta["preload"] + p.setting - line.creep[:-1, 0]) > 1e-3).all())
+    for found in (readings(p, theta, model), line.reading[..., 0]):
         for row, mask, wanted in zip(found, p.mask, expected, strict=True):
             assert row[mask] == pytest.approx(wanted, rel=1e-9, abs=1e-9 * theta["k1"])
 
@@ -103,7 +103,7 @@ def cut(p, at):
     """Hold 1 cut in two at one of its reading times: the later part starts a clock of its own."""
     before, after = p.time_s[1][: at + 1], p.time_s[1][at:] - p.time_s[1][at]
     times = [p.time_s[0], before, after, *p.time_s[2:]]
-    return protocol(np.insert(p.displacement_mm, 1, p.displacement_mm[1]), times)
+    return protocol(np.insert(p.setting, 1, p.setting[1]), times)
 
 
 @given(parameters(), st.integers(1, 3))
@@ -150,7 +150,7 @@ def test_a_slack_wire_reads_zero_does_not_creep_and_pulls_again():
 def test_closed_form_derivatives_are_those_of_a_complex_step(p, theta, law, history):
     model = Model(law, history)
     line = linearise(p, columns(**theta), model)
-    holds, step = len(p.displacement_mm), 1e-30
+    holds, step = len(p.setting), 1e-30
     carried = np.zeros(holds)
     for j in range(holds):
         setting = np.zeros((holds, 1), complex)
@@ -200,7 +200,7 @@ def test_a_hold_goes_on_creeping_after_its_last_reading(monkeypatch, effect, com
     model = Model(effects=effects)
     expected, found = linearise(read, theta, model), linearise(unread, theta, model)
     for j, t in enumerate(times):
-        np.testing.assert_array_equal(found.tension[j, : len(t)], expected.tension[j, : len(t)])
+        np.testing.assert_array_equal(found.reading[j, : len(t)], expected.reading[j, : len(t)])
     np.testing.assert_array_equal(found.creep, expected.creep)
     np.testing.assert_array_equal(found.carry_by_setting, expected.carry_by_setting)
     earlier = linearise(protocol([1, 2, 3], times), theta, model)

@@ -102,7 +102,7 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     for j in last:
         keep = sample.protocol.mask[j]
         by_creep, by_setting = line.by_creep[j][keep], line.by_setting[j][keep]
-        mean = line.tension[j][keep] + by_creep * carried.carried_mean[j]
+        mean = line.reading[j][keep] + by_creep * carried.carried_mean[j]
         known = variance + by_setting**2 * own["setting_sd"] ** 2
         drawn = mean + rng.normal(size=mean.shape) * np.sqrt(known + by_creep**2 * carried.carried_var[j])
         low, high = np.quantile(drawn, [0.05, 0.95], axis=1)

@@ -417,7 +417,7 @@ def _points(target: LogPosterior, around: _Around, readings: Sequence[Array] | N
         scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
         jac = np.moveaxis(likelihoods.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
         floor = np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2
-        yield _Point(line.tension, slopes, sd, ((y - line.tension)[mask] / sd).T, scaled, jac, floor)
+        yield _Point(line.reading, slopes, sd, ((y - line.reading)[mask] / sd).T, scaled, jac, floor)
 
 
 def _tangent(target: LogPosterior, around: _Around, points: Sequence[_Point]) -> Tangent:

@@ -35,7 +35,7 @@ class MeasurementPlan:
 def alternatives(p: Protocol, alone: bool) -> list[MeasurementPlan]:
     """What could be done with a sample instead; `alone` if there is no other, whose displacements would differ."""
     recorded = p.recorded
-    x = p.displacement_mm[recorded]
+    x = p.setting[recorded]
     down = x[-2::-1] if len(x) > 1 else x
     log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
     times = _longest_series(p)
@@ -73,7 +73,7 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
     """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
     longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
     p, length = longest.protocol, 2.0 * longest.protocol.length_mm
-    protocol = _holds(2.0 * p.displacement_mm[p.recorded], _longest_series(p), length)
+    protocol = _holds(2.0 * p.setting[p.recorded], _longest_series(p), length)
     model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
     more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
     exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}

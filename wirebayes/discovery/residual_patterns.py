@@ -20,11 +20,11 @@ def _warming(s: Sample) -> Array:
 # What was varied, of a sample's readings: (H, R) or what broadcasts to it.
 COVARIATES: dict[str, Callable[[Sample], Array]] = {
     "hold": lambda s: s.protocol.number[:, None],
-    "displacement": lambda s: s.protocol.displacement_mm[:, None],
+    "displacement": lambda s: s.protocol.setting[:, None],
     "time in hold": lambda s: s.protocol.time_s,
     "elapsed time": lambda s: s.protocol.start_s[:, None] + s.protocol.time_s,
     "tension": lambda s: s.readings[..., 0],
-    "direction": lambda s: np.sign(np.diff(s.protocol.displacement_mm, prepend=0.0))[:, None],
+    "direction": lambda s: np.sign(np.diff(s.protocol.setting, prepend=0.0))[:, None],
     "temperature": _warming,
     "length": lambda s: np.array(s.protocol.length_mm),
 }

@@ -220,7 +220,7 @@ def left_over(block: LaplaceFit, name: str) -> float:
     """Root mean square of what the best parameters leave over in an experiment's readings, N."""
     sample = block.target.problem.samples[block.names.index(name)]
     line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
-    return float(np.sqrt((((sample.readings - line.tension)[sample.protocol.mask]) ** 2).mean()))
+    return float(np.sqrt((((sample.readings - line.reading)[sample.protocol.mask]) ** 2).mean()))
 
 
 def _score(held: held_out.HeldOut) -> Scores:

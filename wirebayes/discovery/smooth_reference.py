@@ -30,7 +30,7 @@ class _Readings:
         j, r = np.nonzero(mask)
         later = protocol.time_s[mask][protocol.time_s[mask] > 0]
         typical = np.median(later) if len(later) else 1.0
-        place = protocol.displacement_mm[j] - protocol.displacement_mm.min()
+        place = protocol.setting[j] - protocol.setting.min()
         return _Readings(j, place, np.log1p(protocol.time_s[j, r] / (0.2 * typical)))
 
     def rows(self, which: NDArray[np.int64]) -> "_Readings":
@@ -48,8 +48,8 @@ def basis(protocol: Protocol, scale_N: float) -> Array:
     displacement (which differ once the wire is unloaded), times over the time within the hold (constant, or smooth
     in its logarithm). Zero where there is no reading.
     """
-    holds = max(len(protocol.displacement_mm) - 1, 1)
-    reach = np.ptp(protocol.displacement_mm) or 1.0  # of unrecorded holds, too
+    holds = max(len(protocol.setting) - 1, 1)
+    reach = np.ptp(protocol.setting) or 1.0  # of unrecorded holds, too
 
     def covariance(one: _Readings, other: _Readings) -> Array:
         orders = one.hold / holds, other.hold / holds

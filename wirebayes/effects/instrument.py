@@ -83,7 +83,7 @@ class _NeedsReversal(Effect):
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
-        turned = [p for p in protocols if len(set(np.sign(np.diff(p.displacement_mm, prepend=0.0))) - {0.0}) > 1]
+        turned = [p for p in protocols if len(set(np.sign(np.diff(p.setting, prepend=0.0))) - {0.0}) > 1]
         return [cls()] if turned else []
 
 
@@ -106,7 +106,7 @@ class GuideFriction(_NeedsReversal):
     """τ (1 ± μ) by direction of motion, relative to the first direction's value."""
 
     name = "guide_friction"
-    place = "reading"
+    place = "guide"
     formula = "friction"
     scope = "instrument"
     amplitudes = (Amplitude("mu", "-", 0.0, stats.norm(0.0, 0.05)),)

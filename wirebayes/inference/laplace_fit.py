@@ -151,7 +151,7 @@ def _with_expected_setting_error(target: LogPosterior, found: Optimum, rng: np.r
 
 def _typical_step(protocol: Protocol) -> float:
     """Median distance between displacements that follow each other, mm."""
-    steps = np.abs(np.diff(protocol.displacement_mm))
+    steps = np.abs(np.diff(protocol.setting))
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
 
 

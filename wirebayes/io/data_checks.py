@@ -53,7 +53,7 @@ class Readings:
     @property
     def displacement_mm(self) -> Floats:
         """Of each recorded hold."""
-        return self.protocol.displacement_mm[self.protocol.recorded]
+        return self.protocol.setting[self.protocol.recorded]
 
     @property
     def number(self) -> NDArray[np.int64]:

@@ -193,13 +193,14 @@ def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | 
         warming = _padded([empty if hold.temperature_C is None else hold.temperature_C - reference_C for hold in holds])
     return Protocol(
         length_mm=length_mm,
-        displacement_mm=np.array([hold.setting for hold in holds]),
+        setting=np.array([hold.setting for hold in holds]),
         time_s=_padded([hold.time_s for hold in holds]),
         mask=_padded([np.ones(hold.time_s.size) for hold in holds]) > 0,
         duration_s=np.array([hold.duration_s for hold in holds]),
         number=np.array([-1 if hold.number is None else hold.number for hold in holds], dtype=np.int64),
         warming_K=warming,
         reference_C=None if reference_C is None else float(reference_C),
+        control=holds[0].control if holds else "displacement",
     )
 
 

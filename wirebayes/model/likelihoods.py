@@ -14,7 +14,7 @@ import numpy as np
 from wirebayes.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Model, Theta, Walk
+from wirebayes.wire.staircase import Linearised, Model, Theta, Walk, simulate_alone
 
 if TYPE_CHECKING:
     from wirebayes.wire._kernel import Staircases
@@ -39,9 +39,9 @@ class Filtered:
     carried_var: Array
 
 
-def reading_variance(sensor_sd: Array, resolution_N: float) -> Array:
-    """Variance of one reading, N²: sensor error and rounding."""
-    return np.asarray(sensor_sd * sensor_sd + resolution_N * resolution_N / 12.0)
+def reading_variance(sensor_sd: Array, resolution: float) -> Array:
+    """Variance of one reading, N² or mm²: sensor error and rounding."""
+    return np.asarray(sensor_sd * sensor_sd + resolution * resolution / 12.0)
 
 
 def chain(
@@ -67,7 +67,7 @@ def chain(
     if compiled.kernel is not None:
         return Filtered(*compiled.kernel.chain(*_compiled(line, readings, mask, variance, setting_sd)))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
-    holds, _, n = line.tension.shape
+    holds, _, n = line.reading.shape
     out = np.zeros((holds, n))
     mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
     noise = _Noise.of(variance, setting_sd)
@@ -101,7 +101,7 @@ def standardised(
     if compiled.kernel is not None:
         return compiled.kernel.standardised(*_compiled(line, readings, mask, variance, setting_sd))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
-    n = line.tension.shape[2]
+    n = line.reading.shape[2]
     noise, total, out = _Noise.of(variance, setting_sd), np.zeros(n), []
     mean, var = np.zeros(n), np.zeros(n)
     for j in range(len(mask)):
@@ -128,7 +128,7 @@ def _compiled(
 
 def _flat(line: Linearised) -> tuple[Array, ...]:
     """Staircases as contiguous arrays."""
-    parts = (line.tension, line.by_setting, line.by_creep, line.carry_by_setting, line.carry_by_creep)
+    parts = (line.reading, line.by_setting, line.by_creep, line.carry_by_setting, line.carry_by_creep)
     return tuple(np.ascontiguousarray(part, float) for part in parts)
 
 
@@ -214,7 +214,7 @@ def _hold(line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: A
     weight, setting_var = noise.weight, noise.setting_var
     keep = slice(None) if mask.all() else mask
     by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
-    r = np.where(weight > 0, readings[keep], 0.0) - line.tension[j][keep] - by_c * m
+    r = np.where(weight > 0, readings[keep], 0.0) - line.reading[j][keep] - by_c * m
     cc, cs, ss, det, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, p, setting_var)
     cr = np.einsum("rn,rn->n", by_c, r) * weight
     sr = np.einsum("rn,rn->n", by_s, r) * weight
@@ -267,13 +267,13 @@ def seen(
     Returns
     -------
     (n, k, k) and (n, k) arrays
-        shapesᵀ V⁻¹ shapes and shapesᵀ V⁻¹ (readings - tension).
+        shapesᵀ V⁻¹ shapes and shapesᵀ V⁻¹ (readings - line.reading).
     """
     if compiled.kernel is not None:
-        observed = _observed(line.tension.shape[2], readings, mask, variance, setting_sd)
+        observed = _observed(line.reading.shape[2], readings, mask, variance, setting_sd)
         beside = (np.ascontiguousarray(a, float) for a in (filtered.carried_mean, filtered.carried_var, shapes))
         return compiled.kernel.seen(*_flat(line), *observed, *beside)
-    holds, _, n = line.tension.shape
+    holds, _, n = line.reading.shape
     k = shapes.shape[2]
     gram, along = np.zeros((k, k, n)), np.zeros((k, n))
     mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings
@@ -285,7 +285,7 @@ def seen(
             mean = a * mean
             continue
         by_c, by_s, f = line.by_creep[j][keep], line.by_setting[j][keep], shapes[j][keep]
-        r = readings[j][keep] - line.tension[j][keep] - by_c * filtered.carried_mean[j]
+        r = readings[j][keep] - line.reading[j][keep] - by_c * filtered.carried_mean[j]
         cc, cs, _, _, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, filtered.carried_var[j], q)
         cr = np.einsum("rn,rn->n", by_c, r) * weight
         sr = np.einsum("rn,rn->n", by_s, r) * weight
@@ -302,7 +302,7 @@ def seen(
 
 def jacobian(line: Linearised) -> Array:
     """(H, R, H, n) derivative of every reading by every setting error, N/mm; quadratic in the holds."""
-    holds, width, n = line.tension.shape
+    holds, width, n = line.reading.shape
     out = np.zeros((holds, width, holds, n))
     carried = np.zeros((holds, n))
     for j in range(holds):
@@ -334,7 +334,7 @@ def without_each_hold(
     (H, n) array
         Log densities.
     """
-    holds, _, n = line.tension.shape
+    holds, _, n = line.reading.shape
     noise, out = _Noise.of(variance, setting_sd), np.zeros((holds, n))
     out[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
     later = _Later(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
@@ -378,7 +378,7 @@ class _Later:
         """
         a, c, q = line.carry_by_creep[j], line.carry_by_setting[j], noise.setting_var
         by_c, by_s = line.by_creep[j][mask], line.by_setting[j][mask]
-        r = readings[mask] - line.tension[j][mask]
+        r = readings[mask] - line.reading[j][mask]
         cc, cs, ss, cr, sr, rr = (
             np.einsum("rn,rn->n", one, other) * noise.weight
             for one, other in ((by_c, by_c), (by_c, by_s), (by_s, by_s), (by_c, r), (by_s, r), (r, r))
@@ -472,56 +472,72 @@ def _single_holds(
 def hold_courses(
     protocol: Protocol, theta: Theta, model: Model, first: Array
 ) -> list[tuple[Array, Array, Array] | None]:
-    """Each hold's course when its first reading alone says how far the wire is stretched.
+    """Each hold's course when its first reading alone says where the hold begins.
+
+    Of a step, how far the wire is stretched; of a weight, which is known, the offset of the displacement.
 
     Parameters
     ----------
     protocol : Protocol
     theta : mapping of name to (n,) array
-        ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part.
+        ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part, nor does `k1` under weights.
     model : Model
     first : (H, n) or (H, 1) array
-        First reading of each hold, N.
+        First reading of each hold, N, or mm under weights.
 
     Returns
     -------
-    list of (tension, slope, valid) or None
-        For each hold the tensions (R, n) in N, their derivatives by the stretched length (R, n) in N/mm, and whether
-        the first reading determines a length (n,); None for a hold without readings.
+    list of (reading, slope, valid) or None
+        For each hold the readings (R, n), their derivatives by what the first reading determines (R, n), and whether
+        it does (n,); None for a hold without readings.
     """
-    n = np.shape(theta["k1"])[0]
+    n = np.shape(theta["B"])[0]
     theta = dict(theta) | {"preload": np.zeros(n)}
+    if protocol.control == "force":
+        return _under_weights(protocol, theta | {"k1": np.full(n, np.inf)}, model, first)
     call = compiled.call(protocol, theta, model)
     if call is not None:
-        first = np.broadcast_to(first, (len(protocol.displacement_mm), n))
+        first = np.broadcast_to(first, (len(protocol.setting), n))
         tension, slope = compiled.kernel.courses(*call, first, _NEWTON_STEPS)
         valid = (first > 0) & (slope[:, 0] > 0)
         recorded = protocol.recorded
         return [(t, s, v) if known else None for t, s, v, known in zip(tension, slope, valid, recorded, strict=True)]
     walk = Walk(protocol, theta, model)
     out: list[tuple[Array, Array, Array] | None] = []
-    for j in range(len(protocol.displacement_mm)):
+    for j in range(len(protocol.setting)):
         if not protocol.mask[j].any():
             out.append(None)
             continue
         target = np.broadcast_to(first[j], (n,))
         valid = target > 0
         target = np.where(valid, target, 1.0)
-        stretched = protocol.length_mm * (1.0 + target / walk.k1)
+        strain = target / walk.k1
+        displacement = protocol.length_mm * strain
         if model.law == "modified":
-            stretched = protocol.length_mm / np.maximum(1.0 - target / walk.k1, 0.1)
+            displacement = displacement / np.maximum(1.0 - strain, 0.1)
         for _ in range(_NEWTON_STEPS):
-            tension, slope = walk.fresh(j, stretched, slice(1))
+            tension, slope = walk.fresh(j, displacement, slice(1))
             # A slack guess has no slope: go out until it pulls.
             pulls = slope[0] > 0
-            move = np.where(
-                pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), target / walk.k1 * protocol.length_mm
-            )
-            stretched = stretched + move
+            move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), strain * protocol.length_mm)
+            displacement = displacement + move
             if np.max(np.abs(move)) < 1e-12 * protocol.length_mm:
                 break
-        tension, slope = walk.fresh(j, stretched)
+        tension, slope = walk.fresh(j, displacement)
         out.append((tension, slope, valid & (slope[0] > 0)))
+    return out
+
+
+def _under_weights(
+    protocol: Protocol, theta: Theta, model: Model, first: Array
+) -> list[tuple[Array, Array, Array] | None]:
+    """`hold_courses` where the tension is set: a wire that does not stretch creeps from its first reading on."""
+    courses = simulate_alone(protocol, theta, model)
+    out: list[tuple[Array, Array, Array] | None] = []
+    for j, course in enumerate(courses):
+        grown = course - course[0]
+        valid = np.isfinite(grown).all(axis=0)
+        out.append((first[j] + grown, np.ones_like(grown), valid) if protocol.recorded[j] else None)
     return out
 
 

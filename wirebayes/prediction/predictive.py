@@ -122,12 +122,12 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
     for j in range(len(request.requested)):
         if j < trained and request.requested[j]:
             past = list(walk.past)
-            out.append(walk.hold(j, walk.stretched(j) + again[j], creep, beside)[0])
+            out.append(walk.hold(j, protocol.setting[j] + again[j], creep, beside)[0])
             walk.past = past
-            _, creep, beside = walk.hold(j, walk.stretched(j) + setting[j], creep, beside)
+            _, creep, beside = walk.hold(j, protocol.setting[j] + setting[j], creep, beside)
         else:
-            tension, creep, beside = walk.hold(j, walk.stretched(j) + setting[j], creep, beside)
-            out.append(tension)
+            readings, creep, beside = walk.hold(j, protocol.setting[j] + setting[j], creep, beside)
+            out.append(readings)
     return np.array(out)
 
 
@@ -148,7 +148,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
     """
     line = linearise(sample.protocol, own, sample.model)
     variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
-    holds, _, n = line.tension.shape
+    holds, _, n = line.reading.shape
     carried = np.zeros((holds, n))
     # Normal equations of eta in units of its own sd; hold by hold, so that the whole Jacobian is never in memory.
     square, right = np.zeros((n, holds, holds)), np.zeros((n, holds))
@@ -156,7 +156,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
         by_eta = line.by_creep[j][:, None, :] * carried[None]
         by_eta[:, j] = line.by_setting[j]
         scaled = np.moveaxis(by_eta[keep] * (own["setting_sd"] / np.sqrt(variance)), -1, 0)
-        residual = ((sample.readings[j] - line.tension[j])[keep] / np.sqrt(variance)).T
+        residual = ((sample.readings[j] - line.reading[j])[keep] / np.sqrt(variance)).T
         square += np.swapaxes(scaled, 1, 2) @ scaled
         right += np.einsum("nrh,nr->nh", scaled, residual)
         carried = line.carry_by_creep[j] * carried

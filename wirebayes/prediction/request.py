@@ -189,8 +189,8 @@ class _File:
                     raise self.complain(i, 0, "hold", str(number), expected)
                 continue
             row = row_of[number]
-            if hold.displacement_mm != trained.displacement_mm[row]:
-                expected = f"{trained.displacement_mm[row]:g}, as hold {number} was trained on"
+            if hold.displacement_mm != trained.setting[row]:
+                expected = f"{trained.setting[row]:g}, as hold {number} was trained on"
                 raise self.complain(i, 0, "displacement_mm", f"{hold.displacement_mm:g}", expected)
             times = trained.time_s[row][trained.mask[row]]
             if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
@@ -227,7 +227,7 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
         warming = np.concatenate([padded(before.warming_K), padded(after.warming_K)])
     return Protocol(
         length_mm=before.length_mm,
-        displacement_mm=np.concatenate([before.displacement_mm, after.displacement_mm]),
+        setting=np.concatenate([before.setting, after.setting]),
         time_s=np.concatenate([padded(before.time_s), padded(after.time_s)]),
         mask=np.concatenate([padded(before.mask), padded(after.mask)]) > 0,
         duration_s=np.concatenate([before.duration_s, after.duration_s]),

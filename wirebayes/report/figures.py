@@ -85,8 +85,8 @@ def measured(protocol: Protocol, tension_N: Array, title: str) -> Figure:
     """
     figure, axes = panel("displacement, mm", "tension, N", title)
     first = True
-    for j in range(len(protocol.displacement_mm)):
-        x, seen = protocol.displacement_mm[j], protocol.mask[j]
+    for j in range(len(protocol.setting)):
+        x, seen = protocol.setting[j], protocol.mask[j]
         if not seen.any():
             axes.axvline(x, color=QUIET, ls=":", lw=1.2, label="held, not recorded")
             continue

@@ -70,9 +70,9 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
     HeldOut
     """
     protocol, measured = experiment.protocol(), experiment.tension()
-    trained = len(stored.sample.protocol.displacement_mm)
+    trained = len(stored.sample.protocol.setting)
     alone = stored.likelihood == "hold"
-    unused = protocol.recorded & (np.arange(len(protocol.displacement_mm)) >= trained)
+    unused = protocol.recorded & (np.arange(len(protocol.setting)) >= trained)
     request = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
     drawn = predict(stored.problem, some(stored.theta), stored.sample, request, rng)
     wanted = protocol.mask & unused[:, None]
@@ -146,7 +146,7 @@ def _last_alone(experiment: Experiment, time_s: Array) -> tuple[Protocol, Array]
     times = np.concatenate([[0.0], time_s[time_s > 0]])[None]
     one = replace(
         whole,
-        displacement_mm=np.array([hold.displacement_mm]),
+        setting=np.array([hold.setting]),
         time_s=times,
         mask=np.ones(times.shape, bool),
         duration_s=np.array([float(times[0, -1])]),

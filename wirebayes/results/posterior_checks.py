@@ -44,7 +44,7 @@ def warnings(fit: Fit, sample: Sample) -> list[str]:
 
 def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     """A setting error of the size of the steps, which is what mixed or contradictory readings look like."""
-    steps = np.abs(np.diff(sample.protocol.displacement_mm))
+    steps = np.abs(np.diff(sample.protocol.setting))
     if "setting_sd" not in own or not steps.any():
         return ""
     step, low = float(np.median(steps[steps > 0])), float(np.quantile(own["setting_sd"], 0.05))

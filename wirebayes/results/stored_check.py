@@ -40,7 +40,7 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
             raise ValueError(f"draws of {name} that are too few or no finite numbers")
         if (name in ABOVE_ZERO and values.min() <= 0) or (name in NOT_BELOW_ZERO and values.min() < 0):
             raise ValueError(f"draws of {name} below zero")
-    holds = (len(protocol.displacement_mm),)
+    holds = (len(protocol.setting),)
     for what, array in [("durations", protocol.duration_s), ("hold numbers", protocol.number)]:
         if array.shape != holds:
             raise ValueError(f"{len(array)} {what} for {holds[0]} holds")
@@ -51,7 +51,7 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
         if array.shape != protocol.mask.shape:
             raise ValueError("readings, times and temperatures that do not belong together")
     numbers: dict[str, Any] = {
-        "length": protocol.length_mm, "displacements": protocol.displacement_mm, "times": protocol.time_s,
+        "length": protocol.length_mm, "displacements": protocol.setting, "times": protocol.time_s,
         "durations": protocol.duration_s, "tensions": readings, "resolution": sample.resolution_N,
         "reference tension": model.tension_ref_N,
     }  # fmt: skip

@@ -152,7 +152,7 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     settings, clean, readings = [], [], []
     for sample in problem.samples:
         own = problem.parameters(theta, sample)
-        setting = rng.normal(size=(len(sample.protocol.displacement_mm), 1)) * own["setting_sd"]
+        setting = rng.normal(size=(len(sample.protocol.setting), 1)) * own["setting_sd"]
         tension = simulate(sample.protocol, own, sample.model, setting)
         noisy = tension + rng.normal(size=tension.shape) * own["sensor_sd"]
         readings.append(np.where(sample.protocol.mask[..., None], rounded(noisy, sample.resolution_N), 0.0))

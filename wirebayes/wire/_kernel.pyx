@@ -5,7 +5,7 @@ The twin of `wirebayes.wire.staircase` and of `wirebayes.model.likelihoods`, whi
 the reference, and compute what has no formula here. `wirebayes.wire.compiled` decides who computes.
 """
 
-from libc.math cimport exp, expm1, fabs, fmax, isnan, log, log1p, pow, sqrt
+from libc.math cimport INFINITY, NAN, exp, expm1, fabs, fmax, isinf, isnan, log, log1p, pow, sqrt
 
 import numpy as np
 
@@ -29,6 +29,9 @@ FORMULAS = (
 cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
 cdef double DAY_S = 86400.0
 cdef int NEWTON_STEPS = 7  # as in `wirebayes.effects.rivals`
+cdef int MOST_STEPS = 200  # as in `wirebayes.wire.inverse`
+cdef double EXACT = 4.0 * 2.220446049250313e-16
+cdef double MISSED = 1e-9
 
 
 cdef struct Dual:
@@ -67,14 +70,14 @@ cdef struct Chosen:
 
 cdef struct Places:
     # What has to be looked at for every reading: effects on the zero-tension length, the strain, the creep, the
-    # elongation beside it and the reading; and whether there are none.
-    Chosen zero, strain, creep, beside, reading
+    # elongation beside it, the guide and the reading; and whether there are none.
+    Chosen zero, strain, creep, beside, guide, reading
     bint empty
 
 
 cdef struct Wire:
     double k1, B, U, k2, N, base, length_mm, log_length_ratio, tension_ref_N, kept
-    bint modified
+    bint modified, weights
     int effects
     Places* at
     bint own_time, timed  # creep has a rate or a time of its own in each hold; it goes on by another law than eq (5)
@@ -86,15 +89,15 @@ cdef struct Wire:
 
 
 cdef struct Hold:
-    double index, order, start_s, direction, displacement_mm
+    double index, order, start_s, direction
     bint reversed, recorded
-    Dual position, carried, tension  # the tension when it begins
+    Dual position, carried, tension  # the tension when it begins, or as it is set
+    double strain  # under a weight, as it was found for the last reading
 
 
-cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
-    """Strain after all effects on length and strain."""
-    cdef Dual zero = elongation, out
-    cdef double inverse, share, width
+cdef inline Dual zero_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
+    """Zero-tension length after all effects on it."""
+    cdef Dual zero = elongation
     cdef int k, e
     zero.v += wire.length_mm
     for k in range(wire.at.zero.n):
@@ -103,18 +106,13 @@ cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warmi
             zero = times(zero, 1.0 + wire.own[e][0] * warming_K)
         elif hold.order >= wire.number[e]:  # a slip
             zero.v += wire.own[e][0]
-    if wire.modified:
-        inverse = 1.0 / hold.position.v
-        out.v = 1.0 - zero.v * inverse
-        share = zero.v * inverse * inverse
-        out.s = share * hold.position.s - inverse * zero.s
-        out.c = share * hold.position.c - inverse * zero.c
-    else:
-        inverse = 1.0 / zero.v
-        out.v = hold.position.v * inverse - 1.0
-        share = hold.position.v * inverse * inverse
-        out.s = inverse * hold.position.s - share * zero.s
-        out.c = inverse * hold.position.c - share * zero.c
+    return zero
+
+
+cdef inline Dual bent(Wire* wire, Dual out, Dual zero) noexcept nogil:
+    """A strain after all effects on it."""
+    cdef double share, width
+    cdef int k, e
     for k in range(wire.at.strain.n):
         e = wire.at.strain.each[k]
         if wire.formula[e] == STIFFENING:
@@ -130,6 +128,66 @@ cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warmi
         elif wire.formula[e] == AT_ONCE and out.v > 0:
             out = elastic_part(wire, out)
     return out
+
+
+cdef inline Dual strain_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
+    """Strain after all effects on length and strain."""
+    cdef Dual zero = zero_of(wire, hold, elongation, warming_K), out
+    cdef double inverse, share
+    if wire.modified:
+        inverse = 1.0 / hold.position.v
+        out.v = 1.0 - zero.v * inverse
+        share = zero.v * inverse * inverse
+        out.s = share * hold.position.s - inverse * zero.s
+        out.c = share * hold.position.c - inverse * zero.c
+    else:
+        inverse = 1.0 / zero.v
+        out.v = hold.position.v * inverse - 1.0
+        share = hold.position.v * inverse * inverse
+        out.s = inverse * hold.position.s - share * zero.s
+        out.c = inverse * hold.position.c - share * zero.c
+    return bent(wire, out, zero)
+
+
+cdef inline Dual unbent(Wire* wire, Hold* hold, Dual wanted, Dual zero) noexcept nogil:
+    """The strain that is this one after all effects on it: `wirebayes.wire.inverse`."""
+    cdef double low = 0.0, high = INFINITY, at = hold.strain if hold.strain > 0 else wanted.v, moved
+    cdef Dual found, level = constant(zero.v)
+    cdef int step
+    if wire.at.strain.n == 0 or not wanted.v > 0:
+        return wanted
+    for step in range(MOST_STEPS):
+        found = bent(wire, Dual(at, 1.0, 0.0), level)
+        if found.v <= wanted.v and found.s > 0:
+            low = at
+        else:
+            high = at
+        moved = at - (found.v - wanted.v) / found.s
+        if not (moved >= low and moved <= high):
+            moved = 2.0 * at if isinf(high) else 0.5 * (low + high)
+        if not fabs(moved - at) > EXACT * moved:
+            at = moved
+            break
+        at = moved
+    found = bent(wire, Dual(at, 1.0, 0.0), level)
+    if not (fabs(found.v - wanted.v) <= MISSED * wanted.v and found.s > 0):
+        return constant(NAN)
+    hold.strain = at
+    level = bent(wire, constant(at), zero)
+    return Dual(at - (found.v - wanted.v) / found.s, (wanted.s - level.s) / found.s, (wanted.c - level.c) / found.s)
+
+
+cdef inline Dual position_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
+    """Stretched length under the tension of a hold."""
+    cdef Dual zero = zero_of(wire, hold, elongation, warming_K)
+    cdef Dual strain = unbent(wire, hold, times(hold.tension, 1.0 / wire.k1), zero)
+    cdef double longer
+    if not wire.modified:
+        return product(zero, Dual(1.0 + strain.v, strain.s, strain.c))
+    if not strain.v < 1.0:
+        return constant(NAN)
+    longer = 1.0 / (1.0 - strain.v)
+    return product(zero, through(strain, longer, longer * longer))
 
 
 cdef inline Dual elastic_part(Wire* wire, Dual whole) noexcept nogil:
@@ -156,6 +214,15 @@ cdef inline Dual elastic_part(Wire* wire, Dual whole) noexcept nogil:
 cdef inline Dual tension_of(Wire* wire, Hold* hold, Dual elongation, double warming_K) noexcept nogil:
     cdef Dual strain = strain_of(wire, hold, elongation, warming_K)
     return times(strain, wire.k1) if strain.v > 0 else constant(0.0)
+
+
+cdef inline double guided(Wire* wire, Hold* hold) noexcept nogil:
+    """Tension beyond the guide, over that of the wire."""
+    cdef double out = 1.0
+    cdef int k
+    for k in range(wire.at.guide.n):
+        out *= 1.0 + wire.own[wire.at.guide.each[k]][0] * hold.direction
+    return out
 
 
 cdef inline Dual amount_of(Wire* wire, Hold* hold) noexcept nogil:
@@ -229,23 +296,21 @@ cdef inline double law_of_time(Wire* wire, double time_s) noexcept nogil:
 
 
 cdef inline Dual reading_of(
-    Wire* wire, Hold* hold, Dual tension, double time_s, double[:, ::1] shares, int which
+    Wire* wire, Hold* hold, Dual shown, double time_s, double[:, ::1] shares, int which
 ) noexcept nogil:
-    """What the sensor says of a tension."""
+    """What the sensor says of a tension, or the gauge of a displacement."""
     cdef double a
     cdef int k, e
     for k in range(wire.at.reading.n):
         e = wire.at.reading.each[k]
         a = wire.own[e][0]
         if wire.formula[e] == DRIFT:
-            tension.v += a * (hold.start_s + time_s)
+            shown.v += a * (hold.start_s + time_s)
         elif wire.formula[e] == SQUARE:
-            tension = through(tension, tension.v * (1.0 + a * tension.v), 1.0 + 2.0 * a * tension.v)
+            shown = through(shown, shown.v * (1.0 + a * shown.v), 1.0 + 2.0 * a * shown.v)
         elif wire.formula[e] == TRANSIENT:
-            tension = times(tension, 1.0 + a * shares[1 + e, which])
-        elif wire.formula[e] == FRICTION:
-            tension = times(tension, 1.0 + a * hold.direction)
-    return tension
+            shown = times(shown, 1.0 + a * shares[1 + e, which])
+    return shown
 
 
 cdef class Test:
@@ -254,16 +319,17 @@ cdef class Test:
     cdef int holds, width, read_times  # of `times`, which begin with those of readings
     cdef double length_mm
     cdef double[:, ::1] time_s, warming_K
-    cdef double[::1] displacement_mm, start_s, order, direction, times
+    cdef double[::1] setting, start_s, order, direction, times
+    cdef bint weights
     cdef int[:, ::1] which  # of `times`
     cdef int[:, :, ::1] which_age  # of `times`: since an earlier hold began, at the start of a hold and at its readings
     cdef int[::1] last
     cdef unsigned char[::1] recorded
 
-    def __init__(self, double length_mm, displacement_mm, time_s, warming_K, start_s, order, direction, times, which,
-                 last, recorded, which_age, int read_times):
-        self.length_mm = length_mm
-        self.displacement_mm, self.time_s, self.warming_K = displacement_mm, time_s, warming_K
+    def __init__(self, double length_mm, bint weights, setting, time_s, warming_K, start_s, order, direction, times,
+                 which, last, recorded, which_age, int read_times):
+        self.length_mm, self.weights = length_mm, weights
+        self.setting, self.time_s, self.warming_K = setting, time_s, warming_K
         self.start_s, self.order, self.direction, self.times = start_s, order, direction, times
         self.which, self.last, self.recorded, self.which_age = which, last, recorded, which_age
         self.holds, self.width = self.time_s.shape[0], self.time_s.shape[1]
@@ -310,8 +376,10 @@ cdef class Law:
         self.choose(&self.at.strain, (STIFFENING, TOE, SERIES, AT_ONCE))
         self.choose(&self.at.creep, (MEMORY, FLOW_CARRIED))
         self.choose(&self.at.beside, (SECOND_MODE, FLOW))
-        self.choose(&self.at.reading, (DRIFT, SQUARE, TRANSIENT, FRICTION))
-        self.at.empty = not (self.at.zero.n + self.at.strain.n + self.at.creep.n + self.at.beside.n + self.at.reading.n)
+        self.choose(&self.at.guide, (FRICTION,))
+        self.choose(&self.at.reading, (DRIFT, SQUARE, TRANSIENT))
+        self.at.empty = not (self.at.zero.n + self.at.strain.n + self.at.creep.n + self.at.beside.n + self.at.guide.n
+                             + self.at.reading.n)
 
     cdef void choose(self, Chosen* chosen, tuple formulas):
         """The effects with one of these formulas."""
@@ -336,6 +404,7 @@ cdef void take(
     wire.k1, wire.B, wire.U, wire.k2, wire.N = theta[0, i], theta[1, i], theta[2, i], theta[3, i], theta[4, i]
     wire.length_mm, wire.base = test.length_mm, test.length_mm + theta[5, i]
     wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
+    wire.weights = test.weights
     wire.effects, wire.at, wire.own_time, wire.timed, wire.solved = law.effects, &law.at, False, False, 0.0
     for e in range(law.effects):
         wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], 0.0
@@ -375,30 +444,47 @@ cdef void take(
                 shares[1 + e, t] = exp(-test.times[t] / wire.own[e][1])
 
 
-cdef void begin(Wire* wire, Hold* hold, Test test, int j, double stretched, double carried) noexcept:
-    """Hold `j` at its first moment."""
+cdef inline double set_in(Wire* wire, Test test, int j) noexcept:
+    """Stretched length or tension that is set in a hold."""
+    return test.setting[j] if wire.weights else wire.base + test.setting[j]
+
+
+cdef void begin(Wire* wire, Hold* hold, Test test, int j, double setting, double carried) noexcept:
+    """Hold `j` at its first moment; what is set is a stretched length, or a tension."""
     cdef int e
     cdef Dual elongation
     cdef double waited
     hold.index, hold.order, hold.start_s = j, test.order[j], test.start_s[j]
     hold.direction, hold.recorded = test.direction[j], test.recorded[j]
     hold.reversed = test.direction[j] != test.direction[0]
-    hold.position, hold.carried = Dual(stretched, 1.0, 0.0), Dual(carried, 0.0, 1.0)
-    elongation = hold.carried
-    for e in range(wire.effects):
-        if wire.formula[e] == LOST_MOTION and hold.reversed:
-            hold.position.v -= wire.own[e][0] * hold.direction
-        elif wire.formula[e] == SECOND_MODE or wire.formula[e] == FLOW:
-            elongation.v += wire.beside[e]
-    hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+    hold.carried, hold.strain = Dual(carried, 0.0, 1.0), 0.0
+    if wire.weights:
+        waited = guided(wire, hold)
+        hold.tension = times(Dual(setting, 1.0, 0.0), 1.0 / waited if waited > 0 else NAN)
+    else:
+        hold.position = Dual(setting + lagging(wire, hold), 1.0, 0.0)
+        elongation = hold.carried
+        elongation.v += beside_of(wire)
+        hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
     for e in range(wire.effects):
         if wire.formula[e] == WAIT and hold.order == wire.number[e]:
             waited = -expm1(-wire.k2 * pow(wire.own[e][0], wire.N))
             elongation = times(amount_of(wire, hold), waited)
             hold.carried = plus(hold.carried, elongation)
-            elongation = hold.carried
-            elongation.v += beside_of(wire)
-            hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+            if not wire.weights:
+                elongation = hold.carried
+                elongation.v += beside_of(wire)
+                hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+
+
+cdef inline double lagging(Wire* wire, Hold* hold) noexcept nogil:
+    """What effects on the position add to it, mm."""
+    cdef double total = 0.0
+    cdef int e
+    for e in range(wire.effects):
+        if wire.formula[e] == LOST_MOTION and hold.reversed:
+            total -= wire.own[e][0] * hold.direction
+    return total
 
 
 cdef inline double beside_of(Wire* wire) noexcept nogil:
@@ -422,7 +508,7 @@ cdef Dual follow(
     cdef double time_s, clock_s, share, carried_beside[_MOST_EFFECTS]
     cdef int r, k, e
     past[j, 0], past[j, 1], past[j, 2] = hold.start_s, amount.v, rate.v
-    if wire.at.empty and not (wire.own_time or wire.modified):
+    if wire.at.empty and not (wire.own_time or wire.modified or wire.weights):
         follow_hooke(wire, hold, test, j, width, amount, shares, readings)
         return plus(hold.carried, times(amount, shares[0, test.which[j, test.last[j]]]))
     out = hold.carried
@@ -459,7 +545,11 @@ cdef Dual follow(
                 wire.beside[e] = course.v
         if r == test.last[j]:
             out = grown
-        total = tension_of(wire, hold, total, test.warming_K[j, r])
+        if wire.weights:
+            total = position_of(wire, hold, total, test.warming_K[j, r])
+            total.v += lagging(wire, hold) - wire.base
+        else:
+            total = times(tension_of(wire, hold, total, test.warming_K[j, r]), guided(wire, hold))
         readings[r] = reading_of(wire, hold, total, time_s, shares, test.which[j, r])
     return out
 
@@ -522,7 +612,7 @@ cdef class Computed(Staircases):
         cdef int j
         take(&wire, self.law, self.test, self.theta, i, self.shares)
         for j in range(self.holds):
-            begin(&wire, &hold, self.test, j, wire.base + self.test.displacement_mm[j], creep)
+            begin(&wire, &hold, self.test, j, set_in(&wire, self.test, j), creep)
             self.carry[j] = follow(&wire, &hold, self.test, j, self.width, j, self.shares, self.past,
                                    self.readings + j * self.width)
             creep = self.carry[j].v
@@ -573,31 +663,33 @@ def linearise(Test test, Law law, const double[:, ::1] theta):
     return each[0], each[1], each[2], carry[0], carry[1], creep
 
 
-def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] setting_mm):
-    """Noise-free readings (H, R, n); `setting_mm` (H, n) or (H, 1)."""
+def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] setting_error, bint each_alone=False):
+    """Noise-free readings (H, R, n); `setting_error` (H, n) or (H, 1); of holds without a past if `each_alone`."""
     cdef Py_ssize_t n = theta.shape[1], i
     cdef int holds = test.holds, width = test.width, j, r
-    tension = np.empty((holds, width, n))
-    cdef double[:, :, ::1] y = tension
+    out = np.empty((holds, width, n))
+    cdef double[:, :, ::1] y = out
     cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
     cdef double[:, ::1] shares = np.empty((1 + law.effects, test.times.shape[0]))
     cdef Dual* readings = <Dual*> &scratch[0, 0]
     cdef double creep, moved
     cdef Wire wire
     cdef Hold hold
-    if setting_mm.shape[0] != holds or setting_mm.shape[1] not in (1, n):
+    if setting_error.shape[0] != holds or setting_error.shape[1] not in (1, n):
         raise ValueError("setting errors and columns are of different sizes")
     for i in range(n):
         take(&wire, law, test, theta, i, shares)
         creep = 0.0
         for j in range(holds):
-            moved = setting_mm[j, i if setting_mm.shape[1] > 1 else 0]
-            begin(&wire, &hold, test, j, wire.base + test.displacement_mm[j] + moved, creep)
-            creep = follow(&wire, &hold, test, j, width, j, shares, past, readings).v
+            moved = setting_error[j, i if setting_error.shape[1] > 1 else 0]
+            if each_alone:
+                alone(&wire, &hold, test, j, width, set_in(&wire, test, j) + moved, shares, past, readings)
+            else:
+                begin(&wire, &hold, test, j, set_in(&wire, test, j) + moved, creep)
+                creep = follow(&wire, &hold, test, j, width, j, shares, past, readings).v
             for r in range(width):
                 y[j, r, i] = readings[r].v
-    return tension
-
+    return out
 
 
 def courses(Test test, Law law, const double[:, ::1] theta, const double[:, :] first_N, int most_steps):
@@ -637,14 +729,14 @@ def courses(Test test, Law law, const double[:, ::1] theta, const double[:, :] f
 
 
 cdef void alone(
-    Wire* wire, Hold* hold, Test test, int j, int width, double stretched, double[:, ::1] shares, double[:, ::1] past,
+    Wire* wire, Hold* hold, Test test, int j, int width, double setting, double[:, ::1] shares, double[:, ::1] past,
     Dual* readings
 ) noexcept:
     """The first readings of a hold without a past."""
     cdef int e
     for e in range(wire.effects):
         wire.beside[e] = 0.0
-    begin(wire, hold, test, j, stretched, 0.0)
+    begin(wire, hold, test, j, setting, 0.0)
     follow(wire, hold, test, j, width, 0, shares, past, readings)
 
 

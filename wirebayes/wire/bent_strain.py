@@ -4,6 +4,7 @@ import numpy as np
 
 from wirebayes.typing import Array
 from wirebayes.wire.effect import HoldContext, Placed
+from wirebayes.wire.inverse import inverse
 
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 
@@ -31,25 +32,20 @@ def bent(effects: Placed, strain: Array, hold: HoldContext) -> tuple[Array, Arra
 
 
 def strain_of(effects: Placed, effective: Array, hold: HoldContext) -> Array:
-    """Strain that has an effective strain, by Newton's steps; NaN where none has.
+    """Strain that has an effective strain; NaN where none has.
 
     Parameters
     ----------
     effects : Placed
     effective : array
-        Tension over k1.
+        Tension over k1, real or complex.
     hold : HoldContext
 
     Returns
     -------
-    array of the shape of `effective`
+    array
+        Of the shape of `effective`, or of the readings where effects differ between them.
     """
-    strain = effective
-    if "strain" in effects.at:
-        for _ in range(50):
-            value, slope = bent(effects, strain, hold)
-            move = (value - effective) / np.where(slope > 0, slope, np.nan)
-            strain = strain - move
-            if not np.any(np.abs(move) > 1e-15):
-                break
-    return strain
+    if "strain" not in effects.at:
+        return effective
+    return inverse(lambda strain: effects.change("strain", strain, hold), effective)

@@ -14,7 +14,7 @@ from wirebayes.wire.protocol import Protocol
 
 Place = Literal[
     "sample",  # the dictionary of parameters itself, before anything is computed
-    "position",  # stretched length, mm
+    "position",  # stretched length, mm: of the wire by that of the screw, or of the gauge by that of the wire
     "zero_length",  # zero-tension length, creep included, mm
     "strain",  # strain whose product with k1 is the tension
     "wait",  # time passed at this displacement before the hold began, s
@@ -25,10 +25,11 @@ Place = Literal[
     "fraction",  # share of the amount reached by a time
     "creep",  # carried creep elongation over the hold, mm
     "elongation",  # an elongation beside the creep: carried-in value in, values over the hold out, mm
-    "reading",  # what the sensor says, N
+    "guide",  # tension beyond the guide, at the sensor or at the weight, N
+    "reading",  # what the sensor says, N, or the gauge where the tension is set, mm
 ]
 Scope = Literal["material", "instrument", "environment", "event"]
-OF_THE_BENCH = ("position", "wait", "reading")  # places that a wire away from the bench does not have
+OF_THE_BENCH = ("position", "wait", "guide", "reading")  # places that a wire away from the bench does not have
 
 
 @dataclass(frozen=True)
@@ -68,10 +69,10 @@ class HoldContext:
         False for a hold of which no reading was kept.
     order : float
         The hold's number; an unrecorded hold lies half a number below the one it precedes.
-    displacement_mm, previous_mm : float
-        Of this hold and of the one before (the first hold comes from zero).
+    displacement_mm : float or (R, n) array
+        Of this hold; where the tension is set, what follows from it, once that is known.
     direction, first_direction : int
-        Sign of the last move and of the first one of the test.
+        Sign of the last change of what is set, and of the first one of the test.
     start_s, duration_s : float
         Elapsed time when the hold begins; how long it lasts.
     time_s : (R, 1) array
@@ -84,6 +85,8 @@ class HoldContext:
         Tension when the hold begins.
     carried : (1, n) array
         Creep elongation carried into the hold.
+    zero_mm : (R, n) array
+        Zero-tension length at the times of the hold, for effects on the strain.
     past : list of (start_s, amount, k2)
         The clocks of earlier holds.
     """
@@ -91,8 +94,7 @@ class HoldContext:
     index: int
     recorded: bool
     order: float
-    displacement_mm: float
-    previous_mm: float
+    displacement_mm: Any
     direction: int
     first_direction: int
     start_s: float
@@ -105,6 +107,7 @@ class HoldContext:
     theta: dict[str, NDArray[Any]]
     initial_tension: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     carried: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
+    zero_mm: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     past: list[tuple[float, NDArray[Any], NDArray[Any]]] = field(default_factory=list)
 
     def carrying(self, carried: NDArray[Any]) -> "HoldContext":
@@ -253,7 +256,6 @@ def steady_hold(
         recorded=True,
         order=float(index),
         displacement_mm=0.0,
-        previous_mm=0.0,
         direction=1,
         first_direction=1,
         start_s=start_s,

@@ -37,6 +37,24 @@ def strain(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke
     return 1.0 - zero_tension_mm / stretched_mm
 
 
+def stretched(strain: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> Array:
+    """Stretched length at a strain, the inverse of `strain`, mm; NaN where eq (3) has none.
+
+    Parameters
+    ----------
+    strain, zero_tension_mm : array
+    law : {"hooke", "modified"}
+
+    Returns
+    -------
+    array
+        The broadcast of both; real or complex.
+    """
+    if law == "hooke":
+        return zero_tension_mm * (1.0 + strain)
+    return zero_tension_mm / np.where(strain.real < 1.0, 1.0 - strain, np.nan)
+
+
 def strain_slopes(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> tuple[Array, Array]:
     """Derivatives of `strain` by stretched and by zero-tension length, 1/mm.
 

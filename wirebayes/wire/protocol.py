@@ -24,7 +24,8 @@ class Protocol:
     ----------
     length_mm : float
         Zero-tension length of the sample before the test.
-    displacement_mm : (H,) array
+    setting : (H,) array
+        What was set in each hold: the displacement, mm, or the tension, N.
     time_s : (H, R) array
         Time of each reading since its hold began.
     mask : (H, R) bool array
@@ -37,16 +38,19 @@ class Protocol:
         Logged temperature minus the first logged reading.
     reference_C : float or None
         That first logged reading; None where no temperature was logged.
+    control : {"displacement", "force"}
+        What was set; the other was read.
     """
 
     length_mm: float
-    displacement_mm: Floats
+    setting: Floats
     time_s: Floats
     mask: NDArray[np.bool_]
     duration_s: Floats
     number: NDArray[np.int64]
     warming_K: Floats | None = None
     reference_C: float | None = None
+    control: Control = "displacement"
 
     def __post_init__(self) -> None:
         longer = self._longer
@@ -114,7 +118,8 @@ class Protocol:
         order, direction = (np.array([hold[key] for hold in self.holds], float) for key in ("order", "direction"))
         return {
             "length_mm": float(self.length_mm),
-            "displacement_mm": np.array(self.displacement_mm, float),
+            "weights": self.control == "force",
+            "setting": np.array(self.setting, float),
             "time_s": times[which],
             "warming_K": np.zeros(which.shape) if self.warming_K is None else np.array(self.warming_K, float),
             "start_s": self.start_s,
@@ -142,8 +147,7 @@ class Protocol:
         """What `wirebayes.wire.effect.HoldContext` says of each hold whatever the wire."""
         start, time = self.start_s, np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
         warming = np.zeros_like(time) if self.warming_K is None else self.warming_K
-        before = np.concatenate([[0.0], self.displacement_mm])
-        directions = _directions(self.displacement_mm)
+        directions = _directions(self.setting)
         out = []
         for j, number in enumerate(self.number):
             later = self.number[j:][self.number[j:] >= 0]
@@ -151,8 +155,7 @@ class Protocol:
                 "index": j,
                 "recorded": bool(self.recorded[j]),
                 "order": float(number) if number >= 0 else (float(later[0]) - 0.5 if later.size else np.inf),
-                "displacement_mm": float(self.displacement_mm[j]),
-                "previous_mm": float(before[j]),
+                "displacement_mm": float(self.setting[j]) if self.control == "displacement" else np.nan,
                 "direction": int(directions[j]),
                 "first_direction": int(directions[0]),
                 "start_s": float(start[j]),
@@ -164,10 +167,10 @@ class Protocol:
         return tuple(out)
 
 
-def _directions(displacement_mm: Floats) -> Floats:
+def _directions(setting: Floats) -> Floats:
     """(H,) sign of the last move; a hold without a move keeps the one before, and a test begins upwards."""
-    out, current = np.empty(len(displacement_mm)), 1.0
-    for j, move in enumerate(np.sign(np.diff(displacement_mm, prepend=0.0))):
+    out, current = np.empty(len(setting)), 1.0
+    for j, move in enumerate(np.sign(np.diff(setting, prepend=0.0))):
         current = move or current
         out[j] = current
     return out

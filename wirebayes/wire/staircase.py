@@ -1,4 +1,4 @@
-"""Tension of one wire through a sequence of holds, batched over parameter sets.
+"""Readings of one wire through a sequence of holds, batched over parameter sets.
 
 Arrays end in the batch axis: readings are ``(H, R, n)``, one row of memory per reading, because long inner loops are
 what numpy is fast at.
@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.wire import compiled, laws
+from wirebayes.wire.control import SETTINGS
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import Effect, HoldContext, Placed
+from wirebayes.wire.elastic import Elastic
 from wirebayes.wire.protocol import Protocol
 
 if TYPE_CHECKING:
@@ -58,16 +60,17 @@ class Linearised:
 
     Attributes
     ----------
-    tension : (H, R, n)
+    reading : (H, R, n)
+        N, or mm where the tension is set.
     by_setting, by_creep : (H, R, n)
-        Derivative of a hold's readings by its own setting error and by the creep carried into it, N/mm.
+        Derivative of a hold's readings by its own setting error and by the creep carried into it.
     carry_by_setting, carry_by_creep : (H, n)
         Derivative of the creep carried out, by the same two.
     creep : (H + 1, n)
         Creep elongation carried into each hold, and out of the last.
     """
 
-    tension: NDArray[Any]
+    reading: NDArray[Any]
     by_setting: NDArray[Any]
     by_creep: NDArray[Any]
     carry_by_setting: NDArray[Any]
@@ -76,7 +79,7 @@ class Linearised:
 
 
 def simulate(
-    protocol: Protocol, theta: Theta, model: Model = Model(), setting_mm: NDArray[Any] | None = None
+    protocol: Protocol, theta: Theta, model: Model = Model(), setting_error: NDArray[Any] | None = None
 ) -> NDArray[Any]:
     """Noise-free readings, the setting errors entering exactly.
 
@@ -86,15 +89,16 @@ def simulate(
     theta : mapping of name to (n,) array
         ``k1 B U k2 N preload`` and ``effect_name.parameter`` of every effect of the model.
     model : Model
-    setting_mm : (H, n) array, optional
-        Setting error of each hold; zero when left out. May be complex (derivatives).
+    setting_error : (H, n) array, optional
+        Of each hold, in the unit of what is set; zero when left out. May be complex (derivatives).
 
     Returns
     -------
-    (H, R, n) array, N
+    (H, R, n) array
+        N, or mm where the tension is set.
     """
     n = np.shape(theta["k1"])[0]
-    exact = np.zeros((len(protocol.displacement_mm), 1)) if setting_mm is None else np.asarray(setting_mm)
+    exact = np.zeros((len(protocol.setting), 1)) if setting_error is None else np.asarray(setting_error)
     call = None if np.iscomplexobj(exact) else compiled.call(protocol, theta, model)
     if call is not None:
         return compiled.kernel.simulate(*call, exact.astype(float))
@@ -102,17 +106,35 @@ def simulate(
     creep: NDArray[Any] = np.zeros(n)
     beside: dict[str, NDArray[Any]] = {}
     readings = []
-    for j in range(len(protocol.displacement_mm)):
-        stretched = walk.stretched(j) + (0.0 if setting_mm is None else setting_mm[j])
-        tension, creep, beside = walk.hold(j, stretched, creep, beside)
-        readings.append(tension)
+    for j in range(len(protocol.setting)):
+        row, creep, beside = walk.hold(j, protocol.setting[j] + exact[j], creep, beside)
+        readings.append(row)
     return np.array(readings)
+
+
+def simulate_alone(protocol: Protocol, theta: Theta, model: Model = Model()) -> list[NDArray[Any]]:
+    """Noise-free readings (R, n) of each hold as if there had been none before it.
+
+    Parameters
+    ----------
+    protocol, theta, model
+        As for `simulate`.
+    """
+    uncrept = np.zeros(len(theta["B"]))
+    call = compiled.call(protocol, theta, model)
+    if call is not None:
+        return list(compiled.kernel.simulate(*call, np.zeros((len(protocol.setting), 1)), True))
+    walk, out = Walk(protocol, theta, model), []
+    for j, setting in enumerate(protocol.setting):
+        walk.past = []
+        out.append(walk.hold(j, uncrept + setting, uncrept, {})[0])
+    return out
 
 
 def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linearised:
     """Readings with their derivatives by setting error and carried creep.
 
-    Without effects the derivatives are in closed form; with effects they come from a complex step through the same
+    Of a step test without effects the derivatives are in closed form; others come from a complex step through the same
     code that computes the readings. What effects carry beside the creep is held at its nominal value in them.
 
     Parameters
@@ -131,24 +153,25 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
         return Linearised(*compiled.kernel.linearise(*call))
     n = np.shape(theta["k1"])[0]
     holds, width = protocol.time_s.shape
-    walk = Walk(protocol, {k: np.tile(v, 2) for k, v in theta.items()} if model.effects else theta, model)
+    by_hand = not model.effects and protocol.control == "displacement"
+    walk = Walk(protocol, theta if by_hand else {k: np.tile(v, 2) for k, v in theta.items()}, model)
     shape = (holds, width, n)
-    tension, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
+    reading, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
     carry_by_setting, carry_by_creep = np.empty((holds, n)), np.empty((holds, n))
     creep = np.zeros((holds + 1, n))
     beside: dict[str, NDArray[Any]] = {}
-    if not model.effects:
+    if by_hand:
         for j in range(holds):
-            tension[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
-                walk.closed_form(j, walk.stretched(j), creep[j])
+            reading[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
+                walk.closed_form(j, walk.base + protocol.setting[j], creep[j])
             )
-        return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
+        return Linearised(reading, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
     # Both complex steps in one pass: the first n columns take that of the setting error, the others that of the creep.
     of_setting, of_creep = slice(None, n), slice(n, None)
     steps = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
     for j in range(holds):
-        y, out, beside = walk.hold(j, walk.stretched(j) + steps[0], np.tile(creep[j], 2) + steps[1], beside)
-        tension[j], by_setting[j], by_creep[j] = y[:, of_creep].real, y[:, of_setting].imag, y[:, of_creep].imag
+        y, out, beside = walk.hold(j, protocol.setting[j] + steps[0], np.tile(creep[j], 2) + steps[1], beside)
+        reading[j], by_setting[j], by_creep[j] = y[:, of_creep].real, y[:, of_setting].imag, y[:, of_creep].imag
         creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
             out[of_creep].real,
             out[of_setting].imag,
@@ -159,7 +182,7 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
         beside = {key: value.real for key, value in beside.items()}
     for derivative in (by_setting, by_creep, carry_by_setting, carry_by_creep):
         derivative /= _STEP
-    return Linearised(tension, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
+    return Linearised(reading, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
 
 
 def streamed(protocol: Protocol, theta: Theta, model: Model = Model()) -> "Linearised | Staircases":
@@ -194,17 +217,16 @@ class Walk:
         self.k1, self.B, self.U = self.theta["k1"], self.theta["B"], self.theta["U"]
         self.k2, self.N = self.theta["k2"], self.theta["N"]
         self.base = protocol.length_mm + self.theta["preload"]
+        elastic = Elastic(self.effects, self.k1, protocol.length_mm, model.law)
+        self.bench = SETTINGS[protocol.control](self.effects, elastic, self.base)
         self.kept = self.creep.kept
         self.own_time = bool(self.at.keys() & {"rate", "clock", "fraction"})
         # Holds mostly share their reading times, so the exponentials are few.
         times, self.where = protocol.distinct_times
         self.fraction = laws.creep_fraction(times[:, None], self.k2, self.N)
 
-    def stretched(self, j: int) -> NDArray[Any]:
-        return self.base + self.protocol.displacement_mm[j]
-
     def hold(
-        self, j: int, stretched: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
+        self, j: int, setting: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
     ) -> tuple[NDArray[Any], NDArray[Any], dict[str, NDArray[Any]]]:
         """One hold, effects included; real or complex.
 
@@ -212,8 +234,8 @@ class Walk:
         ----------
         j : int
             Its position among all holds. Holds are walked in order: effects may look at earlier ones.
-        stretched : (n,) array
-            Stretched length, setting error included, mm.
+        setting : (n,) or (1,) array
+            Displacement, mm, or tension, N, with its error.
         creep : (n,) array
             Creep elongation carried in, mm.
         beside : dict of effect key to (1, n) array
@@ -222,54 +244,53 @@ class Walk:
         Returns
         -------
         readings : (R, n) array
-            N.
+            N, or mm where the tension is set.
         creep : (n,) array
         beside : dict of effect key to (1, n) array
             Both carried out.
         """
         hold, law = self._context(j), self.creep
-        position = self.change("position", stretched[None], hold)
+        held = self.bench.held(setting, hold)
         hold.carried = creep[None]
         extra = sum((beside.get(e.key, 0.0) for e in self.at.get("elongation", ())), 0.0)
-        hold.initial_tension = self._first(position, hold.carried + extra, hold)
+        hold.initial_tension = self._first(held, hold.carried + extra, hold)
         if "wait" in self.at:
             wait = self.change("wait", np.zeros((1, 1)), hold)
             waited = law.amount(hold.initial_tension, hold) * laws.creep_fraction(wait, self.k2, self.N)
             hold.carried = hold.carried + waited
-            hold.initial_tension = self._first(position, hold.carried + extra, hold)
+            hold.initial_tension = self._first(held, hold.carried + extra, hold)
         amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
         fraction = law.fraction(k2, hold) if self.own_time else self.fraction[self.where[j]]
         grown = law.creep(hold.carried + amount * fraction, hold)
         self.past.append((hold.start_s, amount, k2))
         courses = law.beside(beside, hold)
         total = sum(courses.values(), grown)
-        readings = self.change("reading", self._tension(position, total, hold), hold)
+        readings = self.bench.read(held, total, hold)
         end = self.protocol.end[j]
         return readings, grown[end], {key: course[end][None] for key, course in courses.items()}
 
-    def fresh(self, j: int, stretched: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Some readings of a hold without a past, and their derivatives by the stretched length.
+    def fresh(self, j: int, setting: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Some readings of a hold without a past, and their derivatives by what is set.
 
         Parameters
         ----------
         j : int
             Position of the hold.
-        stretched : (n,) array
-            Stretched length, mm.
+        setting : (n,) array
+            Displacement, mm, or tension, N.
         rows : slice
             Which of its readings; all when left out.
 
         Returns
         -------
-        tension, slope : (r, n) arrays
-            N and N/mm.
+        reading, slope : (r, n) arrays
         """
         self.past = []
-        uncrept = np.zeros(len(stretched))
-        if not self.model.effects:
-            tension, slope, *_ = self.closed_form(j, stretched, uncrept, rows)
-            return tension, slope
-        moved = self.hold(j, stretched + 1j * _STEP, uncrept, {})[0][rows]
+        uncrept = np.zeros(len(setting))
+        if not self.model.effects and self.protocol.control == "displacement":
+            reading, slope, *_ = self.closed_form(j, self.base + setting, uncrept, rows)
+            return reading, slope
+        moved = self.hold(j, setting + 1j * _STEP, uncrept, {})[0][rows]
         return moved.real, moved.imag / _STEP
 
     def closed_form(
@@ -317,18 +338,13 @@ class Walk:
         out = creep + amount * end
         return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end
 
-    def _first(self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
+    def _first(self, held: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
         """Tension (1, n) when the hold begins: effects see its first time only."""
         times, warming = hold.time_s, hold.warming_K
         hold.time_s, hold.warming_K = times[:1], warming[:1]
-        first = self._tension(position, elongation, hold)
+        first = self.bench.tension(held, elongation, hold)
         hold.time_s, hold.warming_K = times, warming
         return first
-
-    def _tension(self, position: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
-        zero = self.change("zero_length", self.protocol.length_mm + elongation, hold)
-        strain = self.change("strain", laws.strain(position, zero, self.model.law), hold)
-        return np.where(strain.real > 0, self.k1 * strain, 0.0)
 
     def _context(self, j: int) -> HoldContext:
         length_ref_mm = self.model.length_ref_mm or self.protocol.length_mm

@@ -288,7 +288,7 @@ def _measured(sample: Sample, folder: Path) -> Experiment:
         log = None
         if p.warming_K is not None and p.reference_C is not None and mask.any():
             log = frozen((p.warming_K[i][mask] + p.reference_C).tolist())
-        holds.append(Hold(number, float(p.displacement_mm[i]), float(p.duration_s[i]), frozen(times), frozen(tension),
+        holds.append(Hold(number, float(p.setting[i]), float(p.duration_s[i]), frozen(times), frozen(tension),
                           log, float(p.start_s[i])))  # fmt: skip
     return Experiment(sample.name, sample.material, p.length_mm, sample.resolution_N, tuple(holds), folder)
 

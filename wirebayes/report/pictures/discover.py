@@ -92,7 +92,7 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Pa
     """
     sample, mask = stored.sample, stored.sample.protocol.mask
     line, _ = _walked(stored)
-    residual = np.where(mask, sample.readings[..., 0] - line.tension.mean(axis=2), 0.0)
+    residual = np.where(mask, sample.readings[..., 0] - line.reading.mean(axis=2), 0.0)
     level = residual.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
     for finding in verdict["where"]:
         x = np.broadcast_to(COVARIATES[finding["covariate"]](sample), mask.shape)[mask]
@@ -131,8 +131,8 @@ def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
     line, own = _walked(stored)
     variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
     width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
-    drawn = line.tension + np.random.default_rng(1).normal(size=line.tension.shape) * width
-    middle = line.tension.mean(axis=2)
+    drawn = line.reading + np.random.default_rng(1).normal(size=line.reading.shape) * width
+    middle = line.reading.mean(axis=2)
     low, high = np.quantile(drawn, [0.05, 0.95], axis=2)
     shown = np.flatnonzero(sample.protocol.recorded)
     for k, j in enumerate(shown):

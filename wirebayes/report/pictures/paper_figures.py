@@ -117,8 +117,8 @@ def prior_predictive(protocol: Protocol, drawn_N: Array, tension_N: Array, title
     figure.suptitle(title, fontsize=10.5, x=0.02, ha="left", color=INK)
     seen = protocol.recorded
     begin = np.maximum(drawn_N[seen, 0], 0.0)
-    _fan(above, protocol.displacement_mm[seen], begin)
-    above.plot(protocol.displacement_mm[seen], tension_N[seen, 0], "o", ms=4.5, color=CHAIN, label="measured")
+    _fan(above, protocol.setting[seen], begin)
+    above.plot(protocol.setting[seen], tension_N[seen, 0], "o", ms=4.5, color=CHAIN, label="measured")
     above.set_yscale("symlog", linthresh=1.0)
     above.set_ylim(bottom=0)
     above.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -1,0 +1,40 @@
+"""Elasticity of a wire with its effects: from the stretched length to the tension, and back."""
+
+import numpy as np
+
+from wirebayes.typing import Array
+from wirebayes.wire import laws
+from wirebayes.wire.bent_strain import strain_of
+from wirebayes.wire.effect import HoldContext, Placed
+
+
+class Elastic:
+    """The elastic law of one set of parameters.
+
+    Parameters
+    ----------
+    effects : Placed
+    k1 : (n,) array
+        N per unit strain.
+    length_mm : float
+        Zero-tension length before the test.
+    law : {"hooke", "modified"}
+    """
+
+    def __init__(self, effects: Placed, k1: Array, length_mm: float, law: laws.ElasticLaw) -> None:
+        self.effects, self.k1, self.length_mm, self.law = effects, k1, length_mm, law
+
+    def tension(self, position_mm: Array, elongation_mm: Array, hold: HoldContext) -> Array:
+        """Tension at a stretched length, N, after an elongation of the wire; zero when slack."""
+        hold.zero_mm = self._zero(elongation_mm, hold)
+        strain = self.effects.change("strain", laws.strain(position_mm, hold.zero_mm, self.law), hold)
+        return np.where(strain.real > 0, self.k1 * strain, 0.0)
+
+    def position(self, tension_N: Array, elongation_mm: Array, hold: HoldContext) -> Array:
+        """Stretched length under a tension, mm; NaN where the wire cannot carry it."""
+        hold.zero_mm = self._zero(elongation_mm, hold)
+        return laws.stretched(strain_of(self.effects, tension_N / self.k1, hold), hold.zero_mm, self.law)
+
+    def _zero(self, elongation_mm: Array, hold: HoldContext) -> Array:
+        zero: Array = self.effects.change("zero_length", self.length_mm + elongation_mm, hold)
+        return zero

@@ -1,0 +1,59 @@
+"""The inverse of a rising function, by Newton's steps between bounds; its derivatives come with it."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wirebayes.typing import Array
+
+_STEP = 1e-30  # a complex step has no truncation error, so it may be this small
+_MOST_STEPS = 200  # halving a bracket takes 60 from any start; a root far above the first guess some more
+_EXACT = 4.0 * np.finfo(float).eps
+_MISSED = 1e-9  # of the target: no step got nearer, so the function never rises so high
+
+
+def inverse(function: Callable[[Array], Array], target: Array) -> Array:
+    """Where a function takes given values.
+
+    Parameters
+    ----------
+    function : function of an array
+        Rises from zero at zero, and is the identity for negative values; real or complex (an imaginary part is a
+        derivative, and what the function refers to may have one, too).
+    target : array
+        Real or complex.
+
+    Returns
+    -------
+    array
+        Of the shape that `function` returns for `target`; NaN where the function rises no further than below the
+        target, the target itself where that is not above zero.
+    """
+    wanted = target.real
+    at = np.where(wanted > 0, wanted, 1.0)
+    low, high = np.zeros_like(at), np.full_like(at, np.inf)
+    with np.errstate(all="ignore"):
+        for _ in range(_MOST_STEPS):
+            value, slope = _with_slope(function, at)
+            beyond = ~((value <= wanted) & (slope > 0))  # or past where the function stops rising
+            low, high = np.where(beyond, low, at), np.where(beyond, at, high)
+            newton = at - (value - wanted) / slope
+            between = (newton >= low) & (newton <= high)
+            moved = np.where(between, newton, np.where(np.isinf(high), 2.0 * at, 0.5 * (low + high)))
+            done = ~(np.abs(moved - at) > _EXACT * moved) | ~(wanted > 0)
+            at = moved
+            if done.all():
+                break
+        value, slope = _with_slope(function, at)
+        reached = (np.abs(value - wanted) <= _MISSED * wanted) & (slope > 0)
+        found = np.where(reached, at, np.nan)
+        if np.iscomplexobj(target) or np.iscomplexobj(function(at)):
+            found = found - (function(at + 0j) - target) / slope  # one more step from the root has its derivatives
+    return np.where(wanted > 0, found, target)
+
+
+def _with_slope(function: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
+    """Real value, and slope by the argument alone: what else the function refers to may be complex."""
+    moved = function(at + 1j * _STEP)
+    rest = function(at + 0j).imag if np.iscomplexobj(function(at)) else 0.0
+    return moved.real, (moved.imag - rest) / _STEP
