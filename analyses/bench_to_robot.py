@@ -126,7 +126,7 @@ def delta(simulated: Simulated, effect: Effect) -> float:
 
     shift = np.eye(len(mask))[..., None]
     by_setting = [slope(lambda h, j=j: readings(fewer, {}, h * shift[j]), 1e-4) for j in range(len(mask))]
-    variance = own["sensor_sd"][0] ** 2 + sample.resolution_N**2 / 12.0
+    variance = own["sensor_sd"][0] ** 2 + sample.resolution**2 / 12.0
     jacobian = np.array(by_setting).T * own["setting_sd"][0]
     whiten = np.linalg.inv(np.linalg.cholesky(variance * np.eye(len(jacobian)) + jacobian @ jacobian.T))
     by_parameter = [

@@ -70,7 +70,7 @@ def held_out(made: Simulated, theta: Array, count: int, rng: np.random.Generator
     line = linearise(sample.protocol, own, sample.model)
     seen = sample.protocol.mask.copy()
     seen[count:] = False
-    rounded = variance + sample.resolution_N**2 / 12.0
+    rounded = variance + sample.resolution**2 / 12.0
     state = chain(line, sample.readings, seen, rounded, setting_sd)
     carried = state.carried_mean[count] + np.sqrt(state.carried_var[count]) * rng.normal(size=len(theta))
     out = []

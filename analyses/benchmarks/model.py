@@ -37,7 +37,7 @@ def data(problem):
     if (p.time_s[p.recorded, 0] != 0.0).any() or (p.duration_s <= 0).any() or not p.mask[p.recorded, 0].all():
         raise ValueError("the benchmark's model wants holds that last, each with its first reading at time 0")
     later = (p.time_s > 0) & p.mask
-    return Data(p.length_mm, sample.resolution_N, p.setting, p.duration_s,
+    return Data(p.length_mm, sample.resolution, p.setting, p.duration_s,
                 np.log(np.where(later, p.time_s, 1.0)), 1.0 * later, np.where(p.mask, sample.readings[..., 0], 0.0),
                 1.0 * p.mask, sample.model.history == "saturating")  # fmt: skip
 

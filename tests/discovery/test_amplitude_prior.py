@@ -78,7 +78,7 @@ def test_information_on_amplitudes_is_that_of_a_regression_beside_everything_els
     steps = h * np.eye(len(sample.protocol.setting))
     shifts = np.stack([readings(z, step) - readings(z, -step) for step in steps], axis=1) / (2 * h)
     own = {name: float(v[0]) for name, v in problem.parameters(target.coordinates.to_natural(z), sample).items()}
-    variance = own["sensor_sd"] ** 2 + sample.resolution_N**2 / 12.0
+    variance = own["sensor_sd"] ** 2 + sample.resolution**2 / 12.0
     covariance = variance * np.eye(len(slopes)) + own["setting_sd"] ** 2 * shifts @ shifts.T
     every = slopes.T @ np.linalg.solve(covariance, slopes)
     wide = 1e-3

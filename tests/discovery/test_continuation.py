@@ -315,7 +315,7 @@ def test_the_noise_ratio_of_a_fit_is_that_of_its_setting_and_sensor_errors(tmp_p
     each = {name: np.repeat(value, holds) for name, value in own.items()}
     up, down = (simulate(sample.protocol, each, sample.model, s * np.eye(holds))[mask] for s in (step, -step))
     by_setting = (up - down) / (2 * step)
-    variance = float(reading_variance(own["sensor_sd"], sample.resolution_N)[0])
+    variance = float(reading_variance(own["sensor_sd"], sample.resolution)[0])
     covariance = variance * np.eye(mask.sum()) + float(own["setting_sd"][0]) ** 2 * by_setting @ by_setting.T
     implied = variance * (np.eye(mask.sum()) + x.ratio[0] * x.left[0] * x.singular[0] ** 2 @ x.left[0].T)
     np.testing.assert_allclose(implied, covariance, rtol=1e-4, atol=1e-6 * covariance.max())

@@ -106,7 +106,7 @@ def test_scores_of_several_draws_are_averages_over_them() -> None:
     theta = np.array([[values[name] for name in problem.names] for values in members])
     densities, means, floors = [], [], []
     for values in members:
-        r, covariance, hold = normal(sample.protocol, values, sample.model, experiment.tension(), sample.resolution_N)
+        r, covariance, hold = normal(sample.protocol, values, sample.model, experiment.tension(), sample.resolution)
         _, derivative = jacobian(sample.protocol, values, sample.model)
         own = np.concatenate([derivative[j, sample.protocol.mask[j], j] for j in range(12)])
         past = hold < 9  # the first eight that were recorded
@@ -116,7 +116,7 @@ def test_scores_of_several_draws_are_averages_over_them() -> None:
         densities.append([stats.multivariate_normal(error[at] * 0.0, left[np.ix_(at, at)]).pdf(error[at])
                           for at in (hold[~past] == j for j in (9, 10, 11))])  # fmt: skip
         means.append(error)
-        noise = values["sensor_sd"] ** 2 + sample.resolution_N**2 / 12.0
+        noise = values["sensor_sd"] ** 2 + sample.resolution**2 / 12.0
         floors.append((noise + own**2 * values["setting_sd"] ** 2)[~past])
     own_parameters = problem.parameters(theta, sample)
     found = held_out._scored(sample, sample.model, own_parameters, 8, np.random.default_rng(0))
@@ -182,7 +182,7 @@ def test_what_is_not_known_of_the_creep_widens_the_bands(
     experiment = simulated_tests([bench], Truth(wire), seed=2)[0]
     problem = build([experiment])
     sample = problem.samples[0]
-    r, covariance, hold = normal(sample.protocol, wire, Model(), experiment.tension(), sample.resolution_N)
+    r, covariance, hold = normal(sample.protocol, wire, Model(), experiment.tension(), sample.resolution)
     past = hold < 2
     gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
     left = covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]

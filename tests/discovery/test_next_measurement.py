@@ -103,11 +103,11 @@ def test_the_plan_with_the_largest_value_wins_and_is_compared_with_the_present_t
     monkeypatch.setattr(module, "_another_length", lambda problem: ("length", WHOLE))
     monkeypatch.setattr(module, "with_protocols", lambda problem, protocols, empty: protocols[0])
     monkeypatch.setattr(module, "replace_problem", lambda target, other: other)
-    fit: Any = SimpleNamespace(target=SimpleNamespace(problem=problem, displacement_mm=WHOLE.setting))
-    words, ratio = module._best_plan(fit, lambda x: float(x.displacement_mm.sum()))  # type: ignore[attr-defined]
+    fit: Any = SimpleNamespace(target=SimpleNamespace(problem=problem, setting=WHOLE.setting))
+    words, ratio = module._best_plan(fit, lambda x: float(x.setting.sum()))  # type: ignore[attr-defined]
     assert words == "take twice as many, half as large steps over 1 to 4 mm" and ratio == pytest.approx(11.5 / 7.0)
     problem.samples.append(problem.samples[0])
-    assert module._best_plan(fit, lambda x: float(x.displacement_mm.sum()))[0].endswith("each sample's displacements")  # type: ignore[attr-defined]
+    assert module._best_plan(fit, lambda x: float(x.setting.sum()))[0].endswith("each sample's displacements")  # type: ignore[attr-defined]
     assert module._best_plan(fit, lambda x: 0.0 if x is fit.target else 1.0)[1] == np.inf
 
 

@@ -40,9 +40,7 @@ def test_the_density_is_the_normal_one_with_the_amplitudes_covariance(name):
     added = shapes[sample.protocol.mask] * inner.sd
     for i in range(len(theta)):
         row = {key: value[i] for key, value in own.items()}
-        r, covariance, _ = dense.normal(
-            sample.protocol, row, sample.model, sample.readings[..., 0], sample.resolution_N
-        )
+        r, covariance, _ = dense.normal(sample.protocol, row, sample.model, sample.readings[..., 0], sample.resolution)
         expected = dense.log_density(r, covariance + added @ added.T)
         assert found[i] == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
@@ -55,9 +53,7 @@ def test_residuals_give_the_log_likelihood_and_its_expected_information_without_
 
     def normal_at(move):
         own = {k: v[0] for k, v in inner.parameters((theta * (1.0 + move))[None], sample).items()}
-        r, covariance, _ = dense.normal(
-            sample.protocol, own, sample.model, sample.readings[..., 0], sample.resolution_N
-        )
+        r, covariance, _ = dense.normal(sample.protocol, own, sample.model, sample.readings[..., 0], sample.resolution)
         return r, covariance + added @ added.T
 
     model, covariance = normal_at(np.zeros(len(theta)))

@@ -151,7 +151,7 @@ def test_data_without_noise_have_a_floor() -> None:
         holds = tuple(replace(h, readings=-h.readings) for h in e.holds)
         largest = max(h.tension_N.max() for h in e.holds if h.recorded)
         for test in (e, replace(e, holds=holds)):
-            assert build([test]).samples[0].resolution_N == max(stated, 1e-5 * largest)
+            assert build([test]).samples[0].resolution == max(stated, 1e-5 * largest)
 
 
 def test_samples_of_one_material_refer_to_one_length_and_one_tension() -> None:
@@ -231,4 +231,4 @@ def test_a_test_without_readings_has_the_resolution_that_is_stated() -> None:
     nothing = tuple(replace(h, number=None, time_s=h.time_s[:0], readings=h.tension_N[:0]) for h in empty.holds)
     for stated in (0.0, 0.01):
         sample = build([replace(empty, holds=nothing, resolution=stated)]).samples[0]
-        assert sample.resolution_N == stated and sample.model.tension_ref_N == 1.0
+        assert sample.resolution == stated and sample.model.tension_ref_N == 1.0

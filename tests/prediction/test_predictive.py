@@ -139,7 +139,7 @@ def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
         c: a.neutral + (0.0 if a.is_shape else 0.3 if a.unit == "-" else 1e-3)
         for c, a in zip(effect.columns(), effect.amplitudes, strict=True)
     }  # fmt: skip
-    sample = replace(problem.samples[0], resolution_N=1e-9)
+    sample = replace(problem.samples[0], resolution=1e-9)
     theta = rows(values, problem.names, 3)
     drawn = predict(problem, theta, sample, question_of(experiment, train), np.random.default_rng(5))
     whole = simulate(experiment.protocol(), {n: np.array([values[n]]) for n in problem.names}, sample.model)
@@ -194,7 +194,7 @@ def test_setting_errors_of_the_past_follow_their_normal_given_the_readings() -> 
     own = {name: np.full(holds + 1, value) for name, value in TRUTH.items()}
     chance = np.vstack([np.zeros(holds), np.eye(holds)])
     drawn = settings_given_readings(own, sample, Given(chance))  # type: ignore[arg-type]
-    residual, covariance, _ = normal(sample.protocol, TRUTH, sample.model, sample.readings[..., 0], sample.resolution_N)
+    residual, covariance, _ = normal(sample.protocol, TRUTH, sample.model, sample.readings[..., 0], sample.resolution)
     _, derivative = jacobian(sample.protocol, TRUTH, sample.model)
     by_setting = derivative[sample.protocol.mask]
     gain = TRUTH["setting_sd"] ** 2 * by_setting.T @ np.linalg.inv(covariance)
@@ -241,7 +241,7 @@ def test_readings_are_rounded_evenly_within_half_a_step_and_only_requested_holds
     """However many draws there are; the sensor's error comes on top."""
     experiment = wire()
     problem = build([experiment])
-    sample = replace(problem.samples[0], resolution_N=0.5)
+    sample = replace(problem.samples[0], resolution=0.5)
     protocol = experiment.protocol()
     requested = protocol.recorded & (protocol.number != 2)
     request = PredictionRequest(protocol, 0, requested, np.full(len(requested), np.nan))
@@ -292,7 +292,7 @@ def test_hold_by_hold_each_hold_follows_from_its_own_first_reading() -> None:
     experiment = wire()
     problem = build([experiment], likelihood="hold")
     protocol = experiment.protocol()
-    sample = replace(problem.samples[0], resolution_N=1e-12)
+    sample = replace(problem.samples[0], resolution=1e-12)
     requested = protocol.recorded & (protocol.number != 2)
     first = np.where(protocol.number == 3, -1.0, experiment.tension()[:, 0])
     theta = rows(TRUTH | {"sensor_sd": 1e-12}, problem.names, 3)

@@ -76,11 +76,11 @@ def test_readings_without_noise_have_a_floor_and_say_so(simulated):
     sample = simulated.problem.samples[0]
     bare = draw([Bench(resolution_N=0.0)], Truth(WIRE | {"sensor_sd": 1e-12}), seed=1)
     experiment = Bench(resolution_N=0.0).experiment()
-    assert build([experiment]).samples[0].resolution_N == 0.0  # no tension, no floor
+    assert build([experiment]).samples[0].resolution == 0.0  # no tension, no floor
     read = with_tensions(experiment, bare.problem.samples[0].readings[..., 0])
     problem = build([read])
-    assert problem.samples[0].resolution_N == pytest.approx(FINEST * np.max(bare.problem.samples[0].readings))
-    assert build([with_tensions(Bench().experiment(), sample.readings[..., 0])]).samples[0].resolution_N == 0.01
+    assert problem.samples[0].resolution == pytest.approx(FINEST * np.max(bare.problem.samples[0].readings))
+    assert build([with_tensions(Bench().experiment(), sample.readings[..., 0])]).samples[0].resolution == 0.01
     quiet = fit(problem, 1, policy=HASTY)
     assert any("carry no noise" in warning for warning in posterior_checks.warnings(quiet, problem.samples[0]))
 
@@ -108,11 +108,11 @@ def test_readings_that_do_not_differ_are_not_called_noisy(simulated):
 
 @pytest.mark.parametrize(("share", "named"), [(1.9, True), (2.1, False)])
 def test_an_error_finer_than_a_load_cell_resolves_is_no_noise(simulated, share, named):
-    sample = replace(simulated.problem.samples[0], resolution_N=0.0)
+    sample = replace(simulated.problem.samples[0], resolution=0.0)
     largest = np.abs(sample.readings).max()
     own = draws(simulated.problem, sensor_sd=share * FINEST * largest / np.exp(0.001 * 1.645))
     assert ("carry no noise" in posterior_checks.noise(own, sample)) is named
-    coarse = replace(sample, resolution_N=0.01)  # the display hides what noise there is
+    coarse = replace(sample, resolution=0.01)  # the display hides what noise there is
     assert posterior_checks.noise(own, coarse) == ""
 
 
@@ -147,7 +147,7 @@ def test_an_error_must_be_large_in_nineteen_of_twenty_draws(simulated):
         noisy = {"sensor_sd": np.where(some, 0.1, 0.3) * signal}
         assert bool(posterior_checks.loose_steps(loose, sample)) is warned
         assert ("in all" in posterior_checks.noise(noisy, sample)) is warned
-    bare = replace(sample, resolution_N=0.0)
+    bare = replace(sample, resolution=0.0)
     largest = np.abs(sample.readings).max()
     for few, warned in ((4, True), (6, False)):  # and small in as many to be called none
         quiet = {"sensor_sd": np.where(np.arange(100) < few, 1.0, 0.1) * 2 * FINEST * largest}

@@ -148,7 +148,7 @@ def _raw(block: LaplaceFit, probe: Probe) -> float:
     theta, total = block.target.coordinates.to_natural(block.modes.z[:1]), 0.0
     for sample, shape in zip(block.target.problem.samples, shapes, strict=True):
         own = block.target.problem.parameters(theta, sample)
-        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
         total += float((shape[sample.protocol.mask] ** 2).sum() / variance[0])
     return total
 
@@ -233,7 +233,7 @@ def _log_units(target: LogPosterior, z: Array) -> Array:
     theta, total = target.coordinates.to_natural(z), np.zeros(len(z))
     for sample in target.problem.samples:
         own = target.problem.parameters(theta, sample)
-        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
         total += 0.5 * sample.protocol.mask.sum() * np.log(variance)
     return total
 

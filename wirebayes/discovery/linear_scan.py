@@ -408,7 +408,7 @@ def _points(target: LogPosterior, around: _Around, readings: Sequence[Array] | N
     for at, sample in enumerate(problem.samples):
         mask = sample.protocol.mask
         own = problem.parameters(theta, sample)
-        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N))
+        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution))
         line = linearise(sample.protocol, own, sample.model)
         y = sample.readings if readings is None else readings[at]
         moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
@@ -416,7 +416,7 @@ def _points(target: LogPosterior, around: _Around, readings: Sequence[Array] | N
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
         scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
         jac = np.moveaxis(likelihoods.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
-        floor = np.broadcast_to(sample.resolution_N**2 / 12.0, sd.shape) / sd**2
+        floor = np.broadcast_to(sample.resolution**2 / 12.0, sd.shape) / sd**2
         yield _Point(line.reading, slopes, sd, ((y - line.reading)[mask] / sd).T, scaled, jac, floor)
 
 
@@ -640,7 +640,7 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
     with np.errstate(all="ignore"):
         for at, sample in enumerate(target.problem.samples):
             own = target.problem.parameters(theta, sample)
-            sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N))
+            sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution))
             y = sample.readings if readings is None else readings[at]
             left = y - simulate(sample.protocol, own, sample.model)
             parts.append((left[sample.protocol.mask] / sd).T)

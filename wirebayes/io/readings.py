@@ -26,6 +26,8 @@ OPTIONAL = ("temperature_C",)
 SET: dict[Control, str] = {"displacement": "displacement_mm", "force": "tension_N"}
 READ: dict[Control, str] = {"displacement": "tension_N", "force": "displacement_mm"}
 
+UNIT: dict[str, str] = {"displacement_mm": "mm", "tension_N": "N"}
+
 # No bench comes near these: beyond them numbers are typing mistakes, and soon their squares overflow.
 LARGEST = {
     "displacement_mm": 1e8,  # 100 km

@@ -38,8 +38,10 @@ class Sample:
     ----------
     name, material : str
     protocol : Protocol
-    readings : (H, R, 1) array, N
-    resolution_N : float
+    readings : (H, R, 1) array
+        N, or mm where the tension is set.
+    resolution : float
+        Step to which they were rounded, no finer than any instrument resolves.
     model : Model
         With the effects that act on this sample.
     """
@@ -48,7 +50,7 @@ class Sample:
     material: str
     protocol: Protocol
     readings: Array
-    resolution_N: float
+    resolution: float
     model: Model
 
     @property
@@ -115,7 +117,7 @@ class Problem:
         for i, sample in enumerate(self.samples):
             own = self.parameters(theta, sample)
             y = sample.readings if readings is None else readings[i]
-            variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+            variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
             if self.likelihood == "hold":
                 out.append(likelihoods.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
@@ -139,7 +141,7 @@ class Problem:
             for i, sample in enumerate(self.samples):
                 y = sample.readings if readings is None else readings[i]
                 own = self.parameters(theta, sample)
-                variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+                variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
                 if self.likelihood == "hold":
                     found = likelihoods.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
                 else:
@@ -185,7 +187,7 @@ class Problem:
         own = self.parameters(theta, sample)
         return (
             linearise(sample.protocol, own, sample.model),
-            likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N),
+            likelihoods.reading_variance(own["sensor_sd"], sample.resolution),
             own["setting_sd"],
         )
 

@@ -26,7 +26,8 @@ def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Gene
     Returns
     -------
     (H, R, n) array
-        Tensions, N, rounded to the sample's resolution; entries outside the protocol's mask mean nothing.
+        N, or mm where the tension is set, rounded to the sample's resolution; entries outside the protocol's mask mean
+        nothing.
     """
     own = problem.parameters(theta, sample)
     protocol, n = sample.protocol, len(theta)
@@ -42,9 +43,9 @@ def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Gene
     else:
         setting = rng.normal(size=(holds, n)) * own["setting_sd"]
         out = simulate(protocol, own, sample.model, setting) + noise
-    return rounded(out, sample.resolution_N)
+    return rounded(out, sample.resolution)
 
 
-def rounded(readings_N: Array, resolution_N: float) -> Array:
+def rounded(readings: Array, resolution: float) -> Array:
     """Readings as the instrument writes them down."""
-    return readings_N if resolution_N == 0 else np.round(readings_N / resolution_N) * resolution_N
+    return readings if resolution == 0 else np.round(readings / resolution) * resolution

@@ -214,7 +214,7 @@ def _chain_scores(
     for start in range(0, len(theta), _CHUNK):
         own = problem.parameters(theta[start : start + _CHUNK], here)
         line = linearise(whole, own, here.model)
-        noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N), own["setting_sd"]
+        noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution), own["setting_sd"]
         with np.errstate(all="ignore"):
             before = likelihoods.chain(line, tension, whole.mask & ~requested[:, None], *noise)
             holds, first = (likelihoods.held_out(line, before, tension, rows, *noise) for rows in (later, later & one))
@@ -228,7 +228,7 @@ def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, request
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["k1"]}
-    variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution_N)
+    variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution)
     log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
     return _log_mean(log_p[requested])
 

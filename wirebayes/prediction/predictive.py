@@ -79,7 +79,7 @@ def _readings(
 ) -> Floats:
     own, protocol = problem.parameters(theta, sample), request.protocol
     shape = (*protocol.time_s.shape, len(theta))
-    error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution_N
+    error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution
     if problem.likelihood == "hold":
         return _hold_by_hold(own, sample.model, request, error)
     course = chain_course(own, sample, request, rng)
@@ -147,7 +147,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
         mm; one draw of all holds for each draw of the parameters.
     """
     line = linearise(sample.protocol, own, sample.model)
-    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
     holds, _, n = line.reading.shape
     carried = np.zeros((holds, n))
     # Normal equations of eta in units of its own sd; hold by hold, so that the whole Jacobian is never in memory.

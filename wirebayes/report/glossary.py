@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.report.blocks import Block, Definitions, Section, Text, unit_text
-from wirebayes.results.store import UNITS
+from wirebayes.results.store import unit_of
 from wirebayes.wire.effect import Effect
 
 SYMBOLS = {
@@ -82,7 +82,7 @@ def meaning(
     """
     blocks: list[Block] = []
     if model:
-        symbols = [(f"{n}{_unit(UNITS[n])}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
+        symbols = [(f"{n}{_unit(unit_of(n))}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
         blocks += [Text(_IN_WORDS), Definitions("Symbols", symbols, _LAWS)]
     names = list(dict.fromkeys(effect.split("@")[0].split(".")[0] for effect in effects))
     known = {**CATALOGUE, Discrepancy.name: Discrepancy, **{n: type(e) for n, e in (own or {}).items()}}

@@ -38,7 +38,7 @@ def warnings(fit: Fit, sample: Sample) -> list[str]:
     prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
     found = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), unchanged_prior(own, prior)]
     readings = sample.readings[..., 0]
-    stated = sample.resolution_N
+    stated = sample.resolution
     return data_checks.warnings(sample.protocol, readings, stated) + [sentence for sentence in found if sentence]
 
 
@@ -66,7 +66,7 @@ def noise(own: Mapping[str, Floats], sample: Sample) -> str:
             f"sensor_sd is at least {low:.2g} N while the readings differ by {signal:.3g} N in all: no wire of this "
             "model gives them; look for a misprint among them, mixed-up rows, or another unit"
         )
-    if max(high, sample.resolution_N) < QUIET * np.abs(readings).max():
+    if max(high, sample.resolution) < QUIET * np.abs(readings).max():
         return (
             f"the readings carry no noise (sensor_sd below {high:.1g} N): they were computed or smoothed, and the "
             "intervals are far narrower than a bench's; state resolution_N, and fit what the sensor wrote"

@@ -18,6 +18,7 @@ from wirebayes import __version__
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
+from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.io.run_folder import read_json, stored_results, write_bytes, write_json
 from wirebayes.json_files.summary import Derived, Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
@@ -28,17 +29,18 @@ from wirebayes.results import posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.stored_check import check
 from wirebayes.typing import Array
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.fresh import FreshSample
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.protocol import Control, Protocol
 from wirebayes.wire.staircase import Model
 
-UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", "sensor_sd": "N",
-         "setting_sd": "mm", LENGTH_EXPONENT: "1"}  # fmt: skip
+UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", LENGTH_EXPONENT: "1"}
 # a hold of the paper, and what a robot on the wire works through
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
 _PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
+_READING, _SETTING = "reading", "setting"  # of steps and weights together
 _MODEL = ("posterior", "observed_data", "constant_data")  # groups that say what was fitted, and the draws
 _CHUNK = 2000  # draws at a time: bounds the memory
 
@@ -127,7 +129,7 @@ class Stored:
         names: dict[str, Any] = dict.fromkeys(self.draws)
         return Problem(
             (Sample(self.sample.name, self.sample.material, self.sample.protocol, self.sample.readings,
-                    self.sample.resolution_N, model),),
+                    self.sample.resolution, model),),
             Prior(names, {}, frozenset()),
             self.likelihood,  # type: ignore[arg-type]
         )  # fmt: skip
@@ -229,22 +231,27 @@ def _stored(groups: Mapping[str, xr.Dataset], path: Path, at: int, own_effects: 
     if "reference_C" not in constant.attrs:
         raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
     reference_C = json.loads(constant.attrs["reference_C"])[at]
-    protocol, tension = _measured(constant, observed, names[at], float(lengths[at]), reference_C)
-    resolutions = json.loads(about["resolutions_N"])
-    sample = Sample(names[at], about["material"], protocol, tension[..., None], float(resolutions[at]), model)
+    if "controls" not in about:
+        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+    control = json.loads(about["controls"])[at]
+    protocol, readings = _measured(constant, observed, names[at], float(lengths[at]), reference_C, control)
+    resolutions = json.loads(about["resolutions"])
+    sample = Sample(names[at], about["material"], protocol, readings[..., None], float(resolutions[at]), model)
     check(draws, sample, about["likelihood"])
     return Stored(draws, sample, about["likelihood"], exponent)
 
 
 def _measured(
-    constant: Any, observed: Any, name: str, length_mm: float, reference_C: float | None
+    constant: Any, observed: Any, name: str, length_mm: float, reference_C: float | None, control: Control
 ) -> tuple[Protocol, Array]:
     """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
+    read_as = READ[control] if READ[control] in observed else _READING
+    set_as = SET[control] if SET[control] in constant else _SETTING
     own = constant["hold"].values
     if "experiment" in constant.coords:
         own = own[constant["experiment"].values == name]
-    here, tension = constant.sel(hold=own), observed["tension_N"].sel(hold=own).values
-    width = int(np.isfinite(tension).sum(axis=1).max())
+    here, measured = constant.sel(hold=own), observed[read_as].sel(hold=own).values
+    width = int(np.isfinite(measured).sum(axis=1).max())
     before = np.zeros(0, int)
     if "unrecorded_hold" in here.dims:
         if "unrecorded_experiment" in here:
@@ -258,23 +265,24 @@ def _measured(
         none = np.full((len(before), *recorded.shape[1:]), np.nan) if unrecorded is None else unrecorded
         return np.concatenate([none, recorded])[place]
 
-    readings, times = (whole(values)[:, :width] for values in (tension, here["time_s"].values))
+    readings, times = (whole(values)[:, :width] for values in (measured, here["time_s"].values))
     mask = np.isfinite(readings)
     if not np.array_equal(mask, np.isfinite(times)):
         raise ValueError("readings and times that do not belong together")
-    displacement, duration = (
+    setting, duration = (
         whole(here[key].values, here[f"unrecorded_{key}"].values if len(before) else None)
-        for key in ("displacement_mm", "duration_s")
+        for key in (set_as, "duration_s")
     )
     protocol = Protocol(
         length_mm,
-        displacement,
+        setting,
         np.nan_to_num(times),
         mask,
         duration,
         whole(number, np.full(len(before), -1)).astype(np.int64),
         None if reference_C is None else np.nan_to_num(whole(here["warming_K"].values)[:, :width]),
         reference_C,
+        control,
     )
     padding = protocol.mask.shape[1] - readings.shape[1]  # a column where a hold went on after its last reading
     return protocol, np.pad(np.nan_to_num(readings), [(0, 0), (0, padding)])
@@ -358,7 +366,7 @@ def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Any]:
     m, draws, _ = fit.theta.shape
     samples = zip(_left_out(fit.problem, fit.flat), fit.problem.samples, strict=True)
     holds = np.concatenate([values[s.protocol.recorded] for values, s in samples if s in members])
-    return {"tension_N": (("chain", "draw", "hold"), holds.T.reshape(m, draws, -1))}
+    return {_name(members, READ, _READING): (("chain", "draw", "hold"), holds.T.reshape(m, draws, -1))}
 
 
 def _label(tree: Any, fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> None:
@@ -367,9 +375,11 @@ def _label(tree: Any, fit: Fit, members: Sequence[Sample], provenance: Mapping[s
         node.attrs.clear()
         for name, variable in node.data_vars.items():
             if group in ("posterior", "prior"):
-                variable.attrs["units"] = unit_of(str(name), members[0].model.effects)
+                variable.attrs["units"] = unit_of(str(name), members[0].model.effects, _controls(members))
             elif group in ("log_likelihood", "sample_stats"):
                 variable.attrs["units"] = "1"
+            elif str(name) in (_READING, _SETTING, "hold_mean", f"unrecorded_{_SETTING}"):
+                variable.attrs["units"] = "of the hold's control"
             else:
                 variable.attrs["units"] = _UNIT_IN_NAME.get(str(name).rsplit("_", 1)[-1], "1")
     about = _about(fit, members, provenance)
@@ -381,7 +391,7 @@ def _label(tree: Any, fit: Fit, members: Sequence[Sample], provenance: Mapping[s
 def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes of the posterior: experiments, model, range of the readings, sampler."""
     first = members[0]
-    read = [s.readings[..., 0][s.protocol.mask] for s in members]
+    loads = [_tensions(s) for s in members]
     return {
         "wirebayes_version": __version__,
         "inference_library": "emcee",
@@ -390,13 +400,14 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
         "material": first.material,
         "length_mm": first.protocol.length_mm,
         "lengths_mm": json.dumps([s.protocol.length_mm for s in members]),
-        "resolutions_N": json.dumps([s.resolution_N for s in members]),
+        "controls": json.dumps([s.protocol.control for s in members]),
+        "resolutions": json.dumps([s.resolution for s in members]),
         "elastic_law": first.model.law,
         "history": first.model.history,
         "likelihood": fit.problem.likelihood,
         "effects": json.dumps([e.key for e in first.model.effects]),
         "tension_ref_N": first.model.tension_ref_N,
-        "tension_range_N": [float(min(r.min() for r in read)), float(max(r.max() for r in read))],
+        "tension_range_N": [float(min(t.min() for t in loads)), float(max(t.max() for t in loads))],
         "time_range_s": [0.0, float(max(s.protocol.duration_s.max() for s in members))],
         "walkers": fit.chains.z.shape[2],
         "thin": fit.thin,
@@ -432,10 +443,29 @@ def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
 def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Any]:
     """Readings of each hold, and their mean, which has the dimensions of the log-likelihood."""
     read, first = _stacked(members, values), ("chain", "draw") if shape else ()
+    name = _name(members, READ, _READING)
+    mean = "hold_mean" if name == _READING else f"hold_mean_{UNIT[name]}"
     return {
-        "tension_N": ((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
-        "hold_mean_N": ((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
+        name: ((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
+        mean: ((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
     }
+
+
+def _controls(members: Sequence[Sample]) -> list[Control]:
+    return sorted({s.protocol.control for s in members})
+
+
+def _name(members: Sequence[Sample], names: Mapping[Control, str], of_both: str) -> str:
+    """The name of what was set or read; where steps and weights are stored together, one without a unit."""
+    controls = _controls(members)
+    return names[controls[0]] if len(controls) == 1 else of_both
+
+
+def _tensions(sample: Sample) -> Array:
+    """Tensions that were read, or set while something was read, N."""
+    if sample.protocol.control == "force":
+        return sample.protocol.setting[sample.protocol.recorded]
+    return np.asarray(sample.readings[..., 0][sample.protocol.mask])
 
 
 def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
@@ -446,9 +476,10 @@ def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
     def each(field: str) -> Array:
         return np.concatenate([getattr(p, field) for p in protocols])
 
+    set_as = _name(members, SET, _SETTING)
     times = {s.name: s.protocol.time_s[None] for s in members}
     out: dict[str, Any] = {
-        "displacement_mm": ("hold", each("displacement_mm")[recorded]),
+        set_as: ("hold", each("setting")[recorded]),
         "duration_s": ("hold", each("duration_s")[recorded]),
         "time_s": (("hold", "time"), _stacked(members, times)[0]),
     }
@@ -456,13 +487,16 @@ def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
         warming = {s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
                    for s, p in zip(members, protocols, strict=True)}  # fmt: skip
         out["warming_K"] = (("hold", "time"), _stacked(members, warming)[0])
+    if set_as == _SETTING:
+        controls = np.concatenate([np.full(len(p.number), p.control) for p in protocols])
+        out["control"] = ("hold", controls[recorded])
     if not recorded.all():
         following = np.concatenate([_following(p.number) for p in protocols])
         names = np.repeat([s.name for s in members], [len(p.number) for p in protocols])
         out |= {
             "unrecorded_experiment": ("unrecorded_hold", names[~recorded]),
             "unrecorded_before_hold": ("unrecorded_hold", following[~recorded]),
-            "unrecorded_displacement_mm": ("unrecorded_hold", each("displacement_mm")[~recorded]),
+            f"unrecorded_{set_as}": ("unrecorded_hold", each("setting")[~recorded]),
             "unrecorded_duration_s": ("unrecorded_hold", each("duration_s")[~recorded]),
         }
     return out
@@ -521,10 +555,14 @@ def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
     return {name: np.stack(v, axis=-1) if isinstance(v, list) else v for name, v in out.items()}
 
 
-def unit_of(name: str, effects: tuple[Effect, ...] = ()) -> str:
-    """Unit of a parameter."""
-    units = UNITS | {c: a.unit for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True)}
-    return units.get(name, "1")
+def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Control] = ("displacement",)) -> str:
+    """Unit of a parameter; where several controls differ in it, of each in turn."""
+    each = []
+    for control in controls:
+        errors = {"sensor_sd": READ_UNIT[control], "setting_sd": SET_UNIT[control]}
+        own = {c: e.unit_under(a, control) for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True)}
+        each.append((UNITS | errors | own).get(name, "1"))
+    return " or ".join(dict.fromkeys(each))
 
 
 def derived(wire: FreshSample, tension_N: float) -> Derived:

@@ -52,7 +52,7 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
             raise ValueError("readings, times and temperatures that do not belong together")
     numbers: dict[str, Any] = {
         "length": protocol.length_mm, "displacements": protocol.setting, "times": protocol.time_s,
-        "durations": protocol.duration_s, "tensions": readings, "resolution": sample.resolution_N,
+        "durations": protocol.duration_s, "tensions": readings, "resolution": sample.resolution,
         "reference tension": model.tension_ref_N,
     }  # fmt: skip
     for what, value in numbers.items():

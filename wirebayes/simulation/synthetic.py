@@ -155,7 +155,7 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
         setting = rng.normal(size=(len(sample.protocol.setting), 1)) * own["setting_sd"]
         tension = simulate(sample.protocol, own, sample.model, setting)
         noisy = tension + rng.normal(size=tension.shape) * own["sensor_sd"]
-        readings.append(np.where(sample.protocol.mask[..., None], rounded(noisy, sample.resolution_N), 0.0))
+        readings.append(np.where(sample.protocol.mask[..., None], rounded(noisy, sample.resolution), 0.0))
         settings.append(setting[:, 0])
         clean.append(tension[..., 0])
     return Simulated(with_readings(problem, readings), theta, settings, clean)
@@ -230,7 +230,7 @@ def _referred(problem: Problem, theta: Array, sample: Sample) -> Sample:
 
 
 def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
-    step = Decimal(repr(sample.resolution_N)).normalize()
+    step = Decimal(repr(sample.resolution)).normalize()
     digits = max(0, -int(step.as_tuple().exponent)) if step else None
     rows = []
     for hold, tensions in zip(experiment.holds, sample.readings[..., 0], strict=True):

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.protocol import Control, Protocol
 
 Place = Literal[
     "sample",  # the dictionary of parameters itself, before anything is computed
@@ -172,6 +172,18 @@ class Effect:
     def columns(self) -> tuple[str, ...]:
         """Parameter names as they appear in a posterior: ``effect_name.parameter``."""
         return tuple(f"{self.name}.{a.name}" for a in self.amplitudes)
+
+    @classmethod
+    def unit_under(cls, amplitude: Amplitude, control: Control) -> str:
+        """Unit of an amplitude: what is added to a reading is in mm where the displacement is read.
+
+        Parameters
+        ----------
+        amplitude : Amplitude
+        control : {"displacement", "force"}
+        """
+        swapped = control == "force" and cls.place == "reading"
+        return amplitude.unit.replace("N", "mm") if swapped else amplitude.unit
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list["Effect"]:

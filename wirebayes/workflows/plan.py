@@ -290,7 +290,7 @@ def _measured(sample: Sample, folder: Path) -> Experiment:
             log = frozen((p.warming_K[i][mask] + p.reference_C).tolist())
         holds.append(Hold(number, float(p.setting[i]), float(p.duration_s[i]), frozen(times), frozen(tension),
                           log, float(p.start_s[i])))  # fmt: skip
-    return Experiment(sample.name, sample.material, p.length_mm, sample.resolution_N, tuple(holds), folder)
+    return Experiment(sample.name, sample.material, p.length_mm, sample.resolution, tuple(holds), folder)
 
 
 def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:

@@ -129,7 +129,7 @@ def _walked(stored: Stored) -> tuple[Linearised, dict[str, Array]]:
 def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
     sample = stored.sample
     line, own = _walked(stored)
-    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution_N)
+    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
     width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
     drawn = line.reading + np.random.default_rng(1).normal(size=line.reading.shape) * width
     middle = line.reading.mean(axis=2)
