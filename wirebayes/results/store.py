@@ -556,7 +556,15 @@ def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
 
 
 def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Control] = ("displacement",)) -> str:
-    """Unit of a parameter; where several controls differ in it, of each in turn."""
+    """Unit of a parameter; where several controls differ in it, of each in turn.
+
+    Parameters
+    ----------
+    name : str
+    effects : tuple of Effect
+    controls : sequence of {"displacement", "force"}
+        What was set in the tests that it belongs to.
+    """
     each = []
     for control in controls:
         errors = {"sensor_sd": READ_UNIT[control], "setting_sd": SET_UNIT[control]}

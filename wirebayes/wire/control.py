@@ -14,19 +14,6 @@ from wirebayes.wire.inverse import inverse
 from wirebayes.wire.protocol import Control
 
 
-class Setting(Interface):
-    """What a kind of test says of one hold."""
-
-    def held(self, setting: Array, hold: HoldContext) -> Array:
-        """What of the wire stays as it is during a hold, (1, n), for a setting (n,) that includes its error."""
-
-    def tension(self, held: Array, elongation_mm: Array, hold: HoldContext) -> Array:
-        """Tension of the wire, N."""
-
-    def read(self, held: Array, elongation_mm: Array, hold: HoldContext) -> Array:
-        """Readings (R, n) at elongations (R, n)."""
-
-
 class Steps:
     """The displacement is set, mm, and the tension is read, N.
 
@@ -42,13 +29,44 @@ class Steps:
         self.effects, self.elastic, self.base_mm = effects, elastic, base_mm
 
     def held(self, setting: Array, hold: HoldContext) -> Array:
+        """What of the wire stays as it is during a hold.
+
+        Parameters
+        ----------
+        setting : (n,) or (1,) array
+            What was set, with its error.
+        hold : HoldContext
+
+        Returns
+        -------
+        (1, n) array
+            Stretched length, mm, or tension, N.
+        """
         position: Array = self.effects.change("position", (self.base_mm + setting)[None], hold)
         return position
 
     def tension(self, held: Array, elongation_mm: Array, hold: HoldContext) -> Array:
+        """Tension of the wire, N.
+
+        Parameters
+        ----------
+        held : (1, n) array
+        elongation_mm : (R, n) array
+            Of the zero-tension length.
+        hold : HoldContext
+        """
         return self.elastic.tension(held, elongation_mm, hold)
 
     def read(self, held: Array, elongation_mm: Array, hold: HoldContext) -> Array:
+        """Readings (R, n), N or mm.
+
+        Parameters
+        ----------
+        held : (1, n) array
+        elongation_mm : (R, n) array
+            Of the zero-tension length.
+        hold : HoldContext
+        """
         tension = self.effects.change("guide", self.elastic.tension(held, elongation_mm, hold), hold)
         readings: Array = self.effects.change("reading", tension, hold)
         return readings

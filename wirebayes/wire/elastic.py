@@ -25,13 +25,30 @@ class Elastic:
         self.effects, self.k1, self.length_mm, self.law = effects, k1, length_mm, law
 
     def tension(self, position_mm: Array, elongation_mm: Array, hold: HoldContext) -> Array:
-        """Tension at a stretched length, N, after an elongation of the wire; zero when slack."""
+        """Tension at a stretched length, N; zero when slack.
+
+        Parameters
+        ----------
+        position_mm : array
+            Stretched length.
+        elongation_mm : array
+            Of the zero-tension length.
+        hold : HoldContext
+        """
         hold.zero_mm = self._zero(elongation_mm, hold)
         strain = self.effects.change("strain", laws.strain(position_mm, hold.zero_mm, self.law), hold)
         return np.where(strain.real > 0, self.k1 * strain, 0.0)
 
     def position(self, tension_N: Array, elongation_mm: Array, hold: HoldContext) -> Array:
-        """Stretched length under a tension, mm; NaN where the wire cannot carry it."""
+        """Stretched length under a tension, mm; NaN where the wire cannot carry it.
+
+        Parameters
+        ----------
+        tension_N : array
+        elongation_mm : array
+            Of the zero-tension length.
+        hold : HoldContext
+        """
         hold.zero_mm = self._zero(elongation_mm, hold)
         return laws.stretched(strain_of(self.effects, tension_N / self.k1, hold), hold.zero_mm, self.law)
 
