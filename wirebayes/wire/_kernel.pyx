@@ -163,7 +163,7 @@ cdef inline Dual unbent(Wire* wire, Hold* hold, Dual wanted, Dual zero) noexcept
         else:
             high = at
         moved = at - (found.v - wanted.v) / found.s
-        if not (moved >= low and moved <= high):
+        if not (moved >= low and moved <= high and found.s > 0):
             moved = 2.0 * at if isinf(high) else 0.5 * (low + high)
         if not fabs(moved - at) > EXACT * moved:
             at = moved

@@ -38,7 +38,7 @@ def inverse(function: Callable[[Array], Array], target: Array) -> Array:
             beyond = ~((value <= wanted) & (slope > 0))  # or past where the function stops rising
             low, high = np.where(beyond, low, at), np.where(beyond, at, high)
             newton = at - (value - wanted) / slope
-            between = (newton >= low) & (newton <= high)
+            between = (newton >= low) & (newton <= high) & (slope > 0)  # where it falls, steps lead further off
             moved = np.where(between, newton, np.where(np.isinf(high), 2.0 * at, 0.5 * (low + high)))
             done = ~(np.abs(moved - at) > _EXACT * moved) | ~(wanted > 0)
             at = moved
