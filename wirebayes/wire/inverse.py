@@ -8,7 +8,7 @@ from wirebayes.typing import Array
 
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 _MOST_STEPS = 200  # halving a bracket takes 60 from any start; a root far above the first guess some more
-_EXACT = 4.0 * np.finfo(float).eps
+_EXACT = 4.0 * np.finfo(float).eps  # relative; a smaller step is rounding
 _MISSED = 1e-9  # of the target: no step got nearer, so the function never rises so high
 
 
