@@ -22,12 +22,12 @@ def sound():
 
 
 def warning(protocol, tension, resolution=0.01):
-    return " | ".join(data_checks.warnings(protocol, tension, resolution))
+    return " | ".join(notice.text for notice in data_checks.warnings(protocol, tension, resolution))
 
 
 def test_a_sound_test_gets_no_warning(sound):
     assert warning(*sound) == ""
-    assert data_checks.of_experiments(paper.experiments()) == []
+    assert [notice for e in paper.experiments() for notice in data_checks.of_experiment(e)] == []
 
 
 def test_times_of_the_whole_test_are_suspected_where_they_are_not_certain():

@@ -200,11 +200,16 @@ def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
     (copy / "chain").mkdir()
     (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
     for converged in (True, False):
-        (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"converged": converged}))
-        assert ("do not trust these intervals" in read(write(copy)).words) is not converged
-    for passed, sentence in ((True, "good"), (False, "bad")):
+        unsure = [] if converged else [{"kind": "not-converged", "text": "the chains stand apart"}]
+        content = summary | {"converged": converged, "warnings": unsure}
+        (copy / "chain" / "summary.json").write_text(json.dumps(content))
+        first = read(write(copy)).words.split("What was measured")[0]
+        assert ("The chains stand apart." in first) is not converged
+    for passed, sentence in ((True, "Good."), (False, "Bad.")):
         check = {"passed": passed, "sentence": sentence, "gross_errors": []}
-        (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"model_check": check}))
+        failed = [] if passed else [{"kind": "model-check", "text": "bad"}]
+        content = summary | {"model_check": check, "warnings": failed}
+        (copy / "chain" / "summary.json").write_text(json.dumps(content))
         words = read(write(copy)).words
         assert check["sentence"] in words.split("What was measured")[0]
         for claim in ("What the readings determine (90", summary["extrapolation"]["sentence"]):
@@ -233,6 +238,7 @@ def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_p
 
 
 DISCOVERY = {
+    "warnings": [],
     "verdict": "named",
     "effects": ["strain_stiffening"],
     "best": "strain_stiffening",
@@ -285,7 +291,7 @@ DISCOVERY = {
     ],
 )
 def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, message, tmp_path):
-    content = {"version": 2, "experiments": {"wire-a": DISCOVERY | changes, "wire-b": DISCOVERY}}
+    content = {"version": 2, "experiments": {"wire-a": DISCOVERY | changes, "wire-b": DISCOVERY}, "warnings": []}
     page = read(write(folder_of(tmp_path / "out", "discover", discovery=content)))
     assert message in page.words
     assert "Unload in steps of 2 mm." in page.words
@@ -295,7 +301,7 @@ def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(chang
 
 CHECKED = {
     "material": "line", "length_mm": 1000.0, "recorded_holds": 2, "unrecorded_holds": 1, "readings": 6,
-    "duration_s": 360.0, "warnings": ["Hold 2 repeats hold 1."],
+    "duration_s": 360.0, "warnings": [{"kind": "data", "text": "hold 2 repeats hold 1"}],
     "holds": [{"number": None, "displacement_mm": 5.0, "start_s": 0.0, "duration_s": 120.0, "readings": 0,
                "first_s": None, "first_N": None, "last_N": None}],
     "parameters": {"k1": {"q05": 1.0, "q50": 2.0, "q95": 3.0, "prior_q05": 0.5, "prior_q95": 9.0,
@@ -344,10 +350,13 @@ def test_the_page_of_a_pose_that_cannot_be_held_says_so(tmp_path):
         "mass_kg": 2.0,
         "feasible": False,
         "pose": {"position_m": [0.0, 0.1, 0.25], "rotation_vector_rad": [0.0, 0.0, 0.0]},
-        "warnings": ["wire 3 is slack"],
+        "warnings": [
+            {"kind": "slack", "text": "wire 3 is slack"},
+            {"kind": "unheld", "text": "no tensions within the bounds hold the platform at this pose"},
+        ],
     }
     page = read(write(folder_of(tmp_path / "out", "pose", pose=pose)))
-    assert "No tensions within the stated bounds hold the platform" in page.words
+    assert "No tensions within the bounds hold the platform" in page.words
     assert "Wire 3 is slack." in page.words
 
 
@@ -355,7 +364,7 @@ def test_the_page_of_a_comparison_lists_models_and_failures(tmp_path):
     good = {"name": "plain", "failed": None, "weight": 0.75, "difference": {"elpd": 0.0, "se": 0.0}, "held_out": None}
     bad = {"name": "toe", "failed": "no finite start", "meaning": ""}
     models = [good | {"meaning": "the base"}, bad]
-    content = {"experiments": {"wire-a": {"base": "plain", "models": models}}}
+    content = {"experiments": {"wire-a": {"base": "plain", "models": models, "warnings": []}}}
     page = read(write(folder_of(tmp_path / "out", "compare", comparison=content)))
     assert "no finite start" in page.words
     assert "0.75" in page.words and "the base" in page.words
@@ -366,10 +375,13 @@ def test_the_page_of_an_export_shows_the_creep_and_leads_to_the_files(tmp_path):
     table = "tension_N,time_s,mean_mm_per_m,sd_mm_per_m,q05_mm_per_m,q50_mm_per_m,q95_mm_per_m\n"
     (out / "creep-table.csv").write_text(table + "2,60,0.5,0.1,0.4,0.51,0.6\n2,3600,1.5,0.1,1.4,1.53,1.6\n")
     (out / "klipper.cfg").write_text("[printer]\n")
+    left_out = [{"kind": "left-out", "text": "no firmware settings"}]
+    (out / "export.json").write_text(json.dumps({"files": [], "creep_table": [], "warnings": left_out}))
     page = read(write(out))
     assert "1.53" in page.words and "1.40 … 1.60" in page.words
     assert {"creep-table.csv", "klipper.cfg"} <= set(page.anchors)
     assert "robot.xml" not in page.anchors
+    assert "No firmware settings." in page.words
 
 
 def test_the_page_of_a_simulation_tells_the_truth(tmp_path):

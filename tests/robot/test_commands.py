@@ -94,7 +94,8 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
     assert main(arguments) == 0
     pose = json.loads((out / "pose.json").read_text())
     assert not pose["feasible"]
-    assert pose["sentence"] in capsys.readouterr().err
+    (warning,) = pose["warnings"]
+    assert warning["kind"] == "unheld" and warning["text"] in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_falls_are_found_at_their_time_and_reported(kind, seed):
     assert report["fall_probability"] == 1.0
     assert report["fall_time_s"]["first"] == ours
     warnings = stability.warnings(course, 0.0)
-    assert "falls in 100 % of the draws" in warnings[0]
+    assert "falls in 100 % of the draws" in warnings[0].text
 
 
 def test_early_times_do_not_depend_on_later_ones():

@@ -350,7 +350,7 @@ def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsy
     assert main([*arguments, "--draws", "20", "--output", str(tmp_path / "out")]) == 0
     content = json.loads((tmp_path / "out" / "pose.json").read_text())
     assert 0 < content["readings"]["effective_draws"] <= 20
-    assert any("of 20 draws agree with the readings" in warning for warning in content["warnings"])
+    assert any("of 20 draws agree with the readings" in notice["text"] for notice in content["warnings"])
     assert "independent ones" in (tmp_path / "out" / "report.html").read_text()
 
 
@@ -415,13 +415,13 @@ def test_commanded_poses_out_of_reach_are_named_and_take_no_other_row_with_them(
     robot, history = _standing_still([schema.read("hangprinter-4").home_m, [9.0, 0.0, 9.0], [0.0, 0.0, 0.4]])
     found = _answered(robot, history)
     named = "no tensions within the bounds hold the platform at the pose commanded at 60 s: no corrections lead there"
-    assert found.content["warnings"][0] == named
+    assert found.content["warnings"][0] == {"kind": "unheld", "text": named}
     assert np.isfinite(found.content["corrections"]["change_mm"]["mean"]).all(1).tolist() == [True, False, True]
     far = np.tile([9.0, 0.0, 9.0], (3, 1))
     beyond = _answered(*_standing_still(far))
-    assert "commanded at 0, 60, 120 s: no corrections" in beyond.content["warnings"][0]
+    assert "commanded at 0, 60, 120 s: no corrections" in beyond.content["warnings"][0]["text"]
     within = _answered(*_standing_still())
-    assert not any("corrections" in warning for warning in within.content["warnings"])
+    assert not any("corrections" in notice["text"] for notice in within.content["warnings"])
 
 
 def test_an_inclinometer_reads_what_turned_the_platform():

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wirebayes.notice import Notice
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim, control, drift, forward
@@ -54,9 +55,11 @@ def test_falls_are_shares_of_the_draws_that_began() -> None:
 
 
 def test_warnings_say_who_falls_when_and_what_catches_it() -> None:
-    began, fall, slack = stability.warnings(course(FIVE), 0.05)[:3]
+    found = stability.warnings(course(FIVE), 0.05)[:3]
+    assert [notice.kind for notice in found] == ["fall", "fall", "slack"]
+    began, fall, slack = (notice.text for notice in found)
     assert began.startswith("20 % of the draws cannot begin at the pose (specimens differing by 5 %): no stable")
-    assert "not stable" in stability.warnings(course(FIVE), 0.0, stable=False)[0]
+    assert "not stable" in stability.warnings(course(FIVE), 0.0, stable=False)[0].text
     assert "falls in 50 % of the draws within 60 s" in fall and "first after 5 s, in the median after 17.5 s" in fall
     assert fall.endswith("wire 2 giving way; it drops 20 mm")
     assert slack.endswith("wire 1 in 25 % of the draws, first after 20 s; wire 2 in 25 % of the draws, first after 4 s")
@@ -84,7 +87,7 @@ def test_a_platform_that_holds_is_warned_of_when_it_comes_near_to_a_fall(
     tension: float, stiffness: float, words: list[str]
 ) -> None:
     """Below a fifth of a wire's tension, or three tenths of the stiffness."""
-    assert stability.warnings(holding(tension, stiffness), 0.0) == words
+    assert [notice.text for notice in stability.warnings(holding(tension, stiffness), 0.0)] == words
     found = stability.summary(holding(tension, stiffness))
     assert found["caught_probability"] is None and found["fall_time_s"] is None and found["fall_probability"] == 0.0
 
@@ -225,8 +228,9 @@ def test_a_controller_without_creep_is_off_by_the_drift_of_its_command(hung: Any
 
 def test_draws_too_weak_for_the_pose_are_a_warning() -> None:
     commands: Any = SimpleNamespace(feasible=np.array([True, True, True, False]))
-    (words,) = answer._weak(commands)
-    assert words == "25 % of the draws cannot pull as hard as the pose requires, however far stretched"
+    (weak,) = answer._weak(commands)
+    assert weak.text == "25 % of the draws cannot pull as hard as the pose requires, however far stretched"
+    assert weak.kind == "unheld"
     assert answer._weak(SimpleNamespace(feasible=np.ones(4, bool))) == []  # type: ignore[arg-type]
 
 
@@ -267,10 +271,13 @@ def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:
     assert found["fall_wires"].tolist() == [0.25, 0.0, 0.5] and found["fall_distance_mm"] is None
     assert found["least_tension_wire"] == 3 and found["slack_time_s"] == [None] * 3
     assert found["stiffness_share"]["mean"] == 0.5 and found["least_tension_share"]["mean"] == pytest.approx(0.1)
-    assert stability.warnings(course(fallen), 0.0) == [
+    falls = (
         "the platform falls in 75 % of the draws within 60 s (specimens alike), first after 20 s, in the median after "
-        "40 s, wire 3 giving way; nothing catches it nearby",
-        "wire 3 may keep only 10 % of its tension within 60 s (specimens alike)",
+        "40 s, wire 3 giving way; nothing catches it nearby"
+    )
+    assert stability.warnings(course(fallen), 0.0) == [
+        Notice("fall", falls),
+        Notice("slack", "wire 3 may keep only 10 % of its tension within 60 s (specimens alike)"),
     ]
 
 
@@ -281,9 +288,10 @@ def test_wires_that_only_slacken_are_named_and_the_nearest_is_not_named_again() 
     loose = Falls(
         np.full(n, NEVER), np.full(n, -1), np.zeros(n), slack, np.tile([0.9, 0.1, 0.8], (n, 1)), np.full(n, 0.2)
     )
+    who = "within 60 s (specimens differing by 5 %)"
     assert stability.warnings(course(loose), 0.05) == [
-        "wires go slack within 60 s (specimens differing by 5 %): wire 2 in 25 % of the draws, first after 7.5 s",
-        "the stiffness against the softest motion may fall to 20 % within 60 s (specimens differing by 5 %)",
+        Notice("slack", f"wires go slack {who}: wire 2 in 25 % of the draws, first after 7.5 s"),
+        Notice("fall", f"the stiffness against the softest motion may fall to 20 % {who}"),
     ]
 
 
@@ -421,9 +429,8 @@ def test_a_pose_that_no_tensions_hold_is_answered_with_the_reason(hung: Any, mon
 def test_an_emptied_drum_is_named_with_its_wire(monkeypatch: pytest.MonkeyPatch) -> None:
     known: Any = SimpleNamespace(wire_m=np.array([5.0, 7.5, 9.0]))
     monkeypatch.setattr(answer.drums, "emptied", lambda drums, joint: [1])
-    assert answer._emptied(known, np.zeros((2, 3))) == [
-        "wire 2 is longer here than its drum's wire_length_m, 7.5 m"
-    ]  # fmt: skip
+    text = "wire 2 is longer here than its drum's wire_length_m, 7.5 m"
+    assert answer._emptied(known, np.zeros((2, 3))) == [Notice("geometry", text)]
 
 
 def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import plain
 from wirebayes.model.prior import wire_defaults
+from wirebayes.notice import Notice
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, schema
 from wirebayes.robot.mechanics.description import GivenWire
@@ -90,7 +91,7 @@ def test_the_tested_ranges_are_each_lines_own():
     stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
     line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
     message = draws.warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
-    assert message == ["wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N"]
+    assert message == [Notice("extrapolation", "wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N")]
 
 
 def test_only_lines_that_legs_hang_on_warn():
@@ -101,7 +102,7 @@ def test_only_lines_that_legs_hang_on_warn():
     assert draws.warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
     robot = replace(robot, wire=(THICK, *robot.wire[1:-1], "default"))
     assert draws.warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
-        "60 s is longer than the longest tested hold, 30 s"
+        Notice("extrapolation", "60 s is longer than the longest tested hold, 30 s")
     ]
 
 
@@ -130,7 +131,7 @@ def test_commands_take_a_posterior_for_each_name(fitted, tmp_path, capsys):  # n
     assert main([*arguments, "--wires", f"default={fitted}", "--wires", f"thick={fitted}"]) == 0
     message = json.loads((out / "pose.json").read_text())
     assert message["wires"]["lines"] == ["default", "thick"]
-    assert any("wire 1 weighs" in warning for warning in message["warnings"])
+    assert any(notice["kind"] == "sag" and "wire 1 weighs" in notice["text"] for notice in message["warnings"])
     assert main([*arguments, *(f"--wires={name}={fitted}" for name in ("default", "thick", "thin"))]) == 2
     assert "--wires: found thin, expected one of the legs' wires: default, thick" in capsys.readouterr().err
     assert main([*arguments, "--wires", f"thick={fitted}", "--wires", str(fitted)]) == 2

@@ -93,18 +93,11 @@ def answer(result: Result[Any]) -> list[str]:
     return [repr(result)]
 
 
-def _check_failed(fit: Posterior) -> bool:
-    check = fit.summary().get("model_check")
-    return check is not None and check["passed"] is False
-
-
 def next_step(result: Result[Any]) -> str:
     """What a person would do with this result."""
     folder = result.place.path
     if isinstance(result, Posterior | Posteriors):
-        fits = result.values() if isinstance(result, Posteriors) else [result]
-        failed = [f for f in fits if _check_failed(f)]
-        if failed:
+        if "model-check" in result.kinds:
             return "wirebayes discover FILE.toml --output DIR, to find out what the model is missing"
         return f"wirebayes predict {folder} PROTOCOL.csv --output FILE.csv, or wirebayes pose ROBOT.toml --wires DIR"
     if isinstance(result, Findings):
@@ -119,12 +112,12 @@ def next_step(result: Result[Any]) -> str:
     if isinstance(result, Pose):
         return _after_pose(result.summary(), folder)
     if isinstance(result, Calibration):
-        if not result.summary()["with_creep_model"]["converged"]:
+        if not result.summary()["with_creep_model"]["converged"] or "misfit" in result.kinds:
             return "wirebayes calibrate with more poses, or once readings, --tension-sd and --reference-sd are checked"
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"
     if isinstance(result, Check):
         return "wirebayes fit FILE.toml --output DIR" + (
-            ", once the warnings are settled" if result.messages else ", then wirebayes discover FILE.toml"
+            ", once the warnings are settled" if result.warnings else ", then wirebayes discover FILE.toml"
         )
     if isinstance(result, ImportedTests):
         names = list(result.summary()["experiments"])

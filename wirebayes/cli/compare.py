@@ -54,10 +54,12 @@ def compare(
         file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
         likelihood=likelihood, only=only or (), own_effects=own_effects, seed=seed,
     )  # fmt: skip
-    for line in planned.warnings:  # before the work, which takes minutes
+    said = [f"warning: {notice.text}" for notice in planned.warnings]
+    for line in said:  # before the work, which takes minutes
         typer.echo(line, err=True)
     with progress() as report:
         found = carry_out(planned, output, report)
-    for line in found.messages if found.computed else ():
-        typer.echo(line, err=True)
+    for line in found.messages:
+        if line not in said:
+            typer.echo(line, err=True)
     conclude(found, as_json=as_json, quiet=quiet)

@@ -43,6 +43,6 @@ def discover(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
             without=without or (), own_effects=own_effects, seed=seed, output=output, progress=report,
         )  # fmt: skip
-    for line in findings.messages if findings.computed else ():
+    for line in findings.messages:
         print(line, file=sys.stderr)
     conclude(findings, as_json=as_json, quiet=quiet)

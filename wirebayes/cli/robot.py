@@ -99,7 +99,7 @@ def pose(
             calibration=calibration, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed,
             output=output, progress=report,
         )  # fmt: skip
-    for line in found.messages if found.computed else ():
+    for line in found.messages:
         typer.echo(line, err=True)
     conclude(found, as_json=as_json, quiet=quiet)
 
@@ -164,5 +164,5 @@ def export(
         robot, named_lines(wires), tensions=tensions, times=times, draws=draws, experiment=experiment,
         own_effects=own_effects, seed=seed, output=output,
     )  # fmt: skip
-    for line in exported.messages if exported.computed else ():
+    for line in exported.messages:
         typer.echo(line, err=True)

@@ -27,6 +27,7 @@ from wirebayes.json_files.comparison import (
     ModelJson,
     PredictionScores,
 )
+from wirebayes.notice import Notice, from_json, named, to_json
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
 from wirebayes.typing import Floats
@@ -84,14 +85,18 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
         "name": candidate.name, "question": candidate.question, "sentence": candidate.sentence,
         "elastic_law": candidate.law, "history": candidate.history, "likelihood": candidate.likelihood,
         "scored": "all readings" if candidate.likelihood == "chain" else "later readings given each hold's first",
-        "failed": None,
+        "failed": None, "warnings": [],
     }  # fmt: skip
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # of proposals where the model cannot be computed
-            return {**content, **_scores(task, seed, policy)}
+            scores = _scores(task, seed, policy)
+        unsure = [] if scores["converged"] else [Notice("not-converged", scores["convergence"])]
+        return {**content, **scores, "warnings": to_json(unsure)}
     except Exception as error:  # a model that cannot be fitted stays in the table, with its reason
-        content["failed"] = f"{type(error).__name__}: {error}"
+        reason = f"{type(error).__name__}: {error}"
+        content["failed"] = reason
+        content["warnings"] = to_json([Notice("failed", reason)])
     return content
 
 
@@ -189,7 +194,7 @@ def _store(task: Task, directory: Path, seed: int, policy: Policy) -> None:
     write_json(directory / task.file, judge(task, seed, policy))
 
 
-def side_by_side(models: Sequence[ModelJson], base: str) -> ComparedModels:
+def side_by_side(models: Sequence[ModelJson], base: str, about: Sequence[Notice] = ()) -> ComparedModels:
     """The table of one experiment: differences, weights and what they mean.
 
     Parameters
@@ -198,6 +203,8 @@ def side_by_side(models: Sequence[ModelJson], base: str) -> ComparedModels:
         What `judge` returned, read back from JSON.
     base : str
         Name of the model that the others are compared with.
+    about : sequence of Notice
+        What is suspicious about the readings themselves.
 
     Returns
     -------
@@ -221,7 +228,8 @@ def side_by_side(models: Sequence[ModelJson], base: str) -> ComparedModels:
         row["meaning"] = _meaning(row, base)
         rows.append(row)
     rows.sort(key=lambda r: (r["failed"] is not None, r["weight"] is None, -(_elpd(r) if r["failed"] is None else 0.0)))
-    return {"base": base, "models": rows}
+    of_models = from_json(named({m["name"]: m for m in models}))
+    return {"base": base, "models": rows, "warnings": to_json([*about, *of_models])}
 
 
 def _elpd(row: ComparedModel) -> float:

@@ -10,6 +10,8 @@ from wirebayes.discovery.linear_scan import Scan, expand, scan
 from wirebayes.discovery.refit import occam
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
+from wirebayes.json_files.discovery import GrossError
+from wirebayes.notice import Notice
 from wirebayes.typing import Array
 
 MOST = 0.05  # share of readings that may be called gross errors
@@ -62,6 +64,18 @@ def without(experiment: Experiment, hold: int, reading: int) -> Experiment:
             h = replace(h, time_s=h.time_s[keep], readings=h.tension_N[keep], temperature_C=temperature)
         holds.append(h)
     return replace(experiment, holds=tuple(holds))
+
+
+def in_words(error: GrossError) -> Notice:
+    """The warning of a reading that was struck out.
+
+    Parameters
+    ----------
+    error : dict
+        As in ``discovery.json``.
+    """
+    which = f"reading {error['reading'] + 1} of hold {error['hold']}"
+    return Notice("gross-error", f"{which} looks like a gross error and was set aside: correct or remove it")
 
 
 def readings_of(experiments: Sequence[Experiment]) -> int:

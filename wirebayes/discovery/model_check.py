@@ -23,7 +23,8 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.discovery import GrossError
-from wirebayes.json_files.summary import ModelCheckResult
+from wirebayes.json_files.summary import ModelCheckResult, SummaryJson
+from wirebayes.notice import Notice, from_json, to_json
 from wirebayes.results.jobs import Job
 from wirebayes.workers import ParallelMap, workers
 
@@ -70,23 +71,36 @@ class ModelCheck:
         """The result in words, with what to do."""
         if self.p is None:
             return f"The model was not checked against the readings: {self.reason}."
-        gross = "".join(
-            f" Reading {g['reading'] + 1} of hold {g['hold']} of {g['experiment']} looks like a gross error. "
-            "This check set it aside, the fit did not: correct or remove it and fit again."
+        gross = "".join(f" {text[0].upper()}{text[1:]}." for text in self._gross_errors_in_words())
+        return (self._passed_in_words() if self.passed else f"{self._failed_in_words()}.") + gross
+
+    @property
+    def notices(self) -> list[Notice]:
+        """That the check failed, if so, and every reading that it set aside."""
+        failed = [Notice("model-check", self._failed_in_words())] if self.passed is False else []
+        return failed + [Notice("gross-error", text) for text in self._gross_errors_in_words()]
+
+    def _gross_errors_in_words(self) -> list[str]:
+        return [
+            f"reading {g['reading'] + 1} of hold {g['hold']} of {g['experiment']} looks like a gross error; "
+            "the model check set it aside, the fit did not: correct or remove it and fit again"
             for g in self.gross_errors
+        ]
+
+    def _passed_in_words(self) -> str:
+        return (
+            f"The model describes the readings: p = {self.p:.2g} in a test against {self.simulations} refitted "
+            f"simulations (level {self.alpha:.2g})."
         )
-        if self.passed:
-            return (
-                f"The model describes the readings: p = {self.p:.2g} in a test against {self.simulations} refitted "
-                f"simulations (level {self.alpha:.2g}).{gross}"
-            )
+
+    def _failed_in_words(self) -> str:
         model = "The model with these effects" if self.with_effects else "The plain model"
         other = "other effects of the catalogue" if self.with_effects else "what is missing"
         directions = ", ".join(self.surprising).replace("_", " ")
         return (
             f"{model} does not describe the readings (p = {self.p:.2g}, level {self.alpha:.2g}): its parameters, "
             "intervals and predictions can be wrong by more than they say. Run wirebayes discover to look for "
-            f"{other}; the readings deviate most in the direction of {directions}.{gross}"
+            f"{other}; the readings deviate most in the direction of {directions}"
         )
 
     def to_dict(self) -> ModelCheckResult:
@@ -238,4 +252,6 @@ def write_check(job: Job, directory: Path, check: ModelCheck) -> None:
     check : ModelCheck
     """
     path = directory / job.folder / "summary.json"
-    write_json(path, {"model_check": check.to_dict()} | json.loads(path.read_text(encoding="utf-8")))
+    summary: SummaryJson = json.loads(path.read_text(encoding="utf-8"))
+    summary["warnings"] = to_json([*check.notices, *from_json(summary["warnings"])])
+    write_json(path, {"model_check": check.to_dict(), **summary})

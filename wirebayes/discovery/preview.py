@@ -15,8 +15,9 @@ from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.check import EffectSize, ParameterRange
+from wirebayes.notice import Notice
 from wirebayes.results.contraction import contraction, source
-from wirebayes.results.posterior_checks import loose_steps, noise, stiffness, unchanged_prior
+from wirebayes.results.posterior_checks import of_posterior
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
@@ -36,13 +37,13 @@ class Preview:
     effects : dict
         Of each: ``amplitude_80``, the smallest that would be detected in four tests of five, its ``unit``, and
         whether the test ``shows`` it: yes (at usual sizes), if unusually large, or no, and the ``reason``.
-    warnings : list of str
+    warnings : list of Notice
         What is suspicious about what was fitted.
     """
 
     parameters: dict[str, ParameterRange]
     effects: dict[str, EffectSize]
-    warnings: list[str]
+    warnings: list[Notice]
 
 
 def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> Preview:
@@ -60,9 +61,8 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     before = problem.prior.rvs(4000, rng)
     sample = problem.samples[0]
     own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
-    found = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), unchanged_prior(own, prior)]
     parameters = {name: _range(theta[:, i], before[:, i]) for i, name in enumerate(problem.names)}
-    return Preview(parameters, _effects(block, kinds, rng), [sentence for sentence in found if sentence])
+    return Preview(parameters, _effects(block, kinds, rng), of_posterior(own, prior, sample))
 
 
 def _range(draws: Array, before: Array) -> ParameterRange:

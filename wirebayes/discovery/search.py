@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery import next_measurement, power, residual_patterns, shrinking
+from wirebayes.discovery import gross_errors, next_measurement, power, residual_patterns, shrinking
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.linear_scan import Expansion, expand
@@ -39,6 +39,7 @@ from wirebayes.json_files.discovery import (
     Remainder,
     Verdict,
 )
+from wirebayes.notice import named, to_json
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
 
@@ -160,7 +161,7 @@ def investigate(
         else []
         for i, (answer, last) in enumerate(zip(answers, final, strict=True))
     ]
-    return Findings({"version": 2, "experiments": out}, tuple(final), tuple(undecided))
+    return Findings({"version": 2, "experiments": out, "warnings": named(out)}, tuple(final), tuple(undecided))
 
 
 def _named(
@@ -190,15 +191,17 @@ def _own_reports(
     remains = answer.verdict in ("partial", "unknown")
     names = [a.name for a in answer.accepted]
     checks = shrinking.shrinking(block, answer.stages, names, remains, left_out, rng, parallel_map)
-    return {
-        e.name: {
+    reports: dict[str, HeldOutReport] = {}
+    for e, check in zip(block.experiments, checks, strict=True):
+        struck = [g for g in gate.struck if g["experiment"] == e.name]
+        reports[e.name] = {
             "steps": check.steps,
             "held_out": check.held_out,
             "residual_rms_N": shrinking.left_over(block, e.name),
-            "gross_errors": [g for g in gate.struck if g["experiment"] == e.name],
+            "gross_errors": struck,
+            "warnings": to_json(map(gross_errors.in_words, struck)),
         }
-        for e, check in zip(block.experiments, checks, strict=True)
-    }
+    return reports
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import times_run_on
+from wirebayes.notice import Notice
 from wirebayes.typing import Floats
 from wirebayes.wire.protocol import Protocol
 
@@ -73,7 +74,7 @@ class Readings:
         return max(spread, self.resolution_N / np.sqrt(12.0))
 
 
-def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list[str]:
+def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list[Notice]:
     """What is suspicious about the readings of one test.
 
     Parameters
@@ -84,17 +85,17 @@ def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list
 
     Returns
     -------
-    list of str
-        Sentences: what, where, what to change; empty for readings as a bench gives them.
+    list of Notice
+        What, where, what to change; empty for readings as a bench gives them.
     """
     readings = Readings(protocol, tension_N, resolution_N)
     found = (check(readings) for check in CHECKS)
-    return [sentence for sentence in found if sentence]
+    return [Notice("data", sentence) for sentence in found if sentence]
 
 
-def of_experiments(experiments: list[Experiment]) -> list[str]:
-    """The warnings of several tests, each with its name before it."""
-    return [f"{e.name}: {s}" for e in experiments for s in warnings(e.protocol(), e.tension(), e.resolution_N)]
+def of_experiment(experiment: Experiment) -> list[Notice]:
+    """The warnings of one test."""
+    return warnings(experiment.protocol(), experiment.tension(), experiment.resolution_N)
 
 
 def run_on_times(readings: Readings) -> str:

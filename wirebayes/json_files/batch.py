@@ -4,14 +4,14 @@ from typing import TypedDict
 
 from wirebayes.json_files.discovery import Verdict
 from wirebayes.json_files.values import Statistics
+from wirebayes.notice import Warned
 
 
-class FitColumns(TypedDict):
+class FitColumns(Warned):
     """What a fit adds to a row."""
 
     converged: bool | None
     parameters: dict[str, Statistics]
-    warnings: list[str]
     p_global: float | None
     check: str | None
 
@@ -53,7 +53,7 @@ class OutlierRow(TypedDict):
     sentence: str
 
 
-class BatchJson(TypedDict):
+class BatchJson(Warned):
     """The whole file."""
 
     version: int

@@ -3,6 +3,7 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import MeanAndSd, Numbers
+from wirebayes.notice import Warned
 from wirebayes.typing import Array
 
 
@@ -100,7 +101,7 @@ class UnknownsJson(BelongsTo, CalibratedUnknowns):
     """The whole of ``unknowns.json``."""
 
 
-class CalibrateJson(CalibratedPoses, Observed):
+class CalibrateJson(CalibratedPoses, Observed, Warned):
     """The whole file."""
 
     version: int
@@ -110,4 +111,3 @@ class CalibrateJson(CalibratedPoses, Observed):
     prior: CalibrationPrior
     with_creep_model: EstimatedLengths
     by_hooke_alone: EstimatedLengths
-    warnings: NotRequired[list[str]]

@@ -3,6 +3,7 @@
 from typing import TypedDict
 
 from wirebayes.json_files.values import Quantiles
+from wirebayes.notice import Warned
 
 
 class HoldUnderstood(TypedDict):
@@ -49,15 +50,14 @@ class EffectSize(TypedDict):
     reason: str | None
 
 
-class CheckedExperiment(Understood):
+class CheckedExperiment(Understood, Warned):
     """All that is said of one experiment."""
 
-    warnings: list[str]
     parameters: dict[str, ParameterRange]
     effects: dict[str, EffectSize]
 
 
-class CheckJson(TypedDict):
+class CheckJson(Warned):
     """The whole file."""
 
     experiments: dict[str, CheckedExperiment]

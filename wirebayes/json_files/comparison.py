@@ -3,6 +3,7 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import Integers, Numbers
+from wirebayes.notice import Warned
 
 
 class LeaveOneHoldOut(TypedDict):
@@ -62,7 +63,7 @@ class Judgement(TypedDict):
     held_out: HeldOutHolds | None
 
 
-class ModelJson(TypedDict):
+class ModelJson(Warned):
     """One model; where it could not be judged, `failed` is the reason and what a fit would have said is not there."""
 
     name: str
@@ -103,14 +104,14 @@ class ComparedModel(ModelJson, Differences):
     meaning: str
 
 
-class ComparedModels(TypedDict):
+class ComparedModels(Warned):
     """The models of one experiment, best first among those scored alike, failures last."""
 
     base: str
     models: list[ComparedModel]
 
 
-class ComparisonJson(TypedDict):
+class ComparisonJson(Warned):
     """The whole file."""
 
     version: int

@@ -2,6 +2,8 @@
 
 from typing import Literal, NotRequired, TypedDict
 
+from wirebayes.notice import Warned
+
 Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 
 
@@ -122,7 +124,7 @@ class HeldOut(TypedDict):
     shrinks: bool
 
 
-class HeldOutReport(TypedDict):
+class HeldOutReport(Warned):
     """How models predict an experiment's holds that they did not see."""
 
     steps: list[Step]
@@ -135,7 +137,7 @@ class ExperimentFindings(Answer, Outlook, HeldOutReport):
     """All that is said of one experiment."""
 
 
-class DiscoveryJson(TypedDict):
+class DiscoveryJson(Warned):
     """The whole file."""
 
     version: int

@@ -1,9 +1,9 @@
 """What `export` prints with ``--json``; the creep table is ``creep-table.csv``."""
 
-from typing import TypedDict
+from wirebayes.notice import Warned
 
 
-class ExportSummary(TypedDict):
+class ExportSummary(Warned):
     """Names of the files, and the creep table's rows by its header, `wire` where there are several."""
 
     files: list[str]

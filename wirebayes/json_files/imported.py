@@ -1,9 +1,9 @@
 """``import.json``: what was understood of raw files of a bench."""
 
-from typing import TypedDict
+from wirebayes.notice import Warned
 
 
-class ImportedExperiment(TypedDict):
+class ImportedExperiment(Warned):
     """The experiment out of one file; `notes` say what was recognised and done."""
 
     raw: str
@@ -13,10 +13,9 @@ class ImportedExperiment(TypedDict):
     holds: int
     readings: int
     notes: list[str]
-    warnings: list[str]
 
 
-class ImportJson(TypedDict):
+class ImportJson(Warned):
     """The whole file."""
 
     experiments: dict[str, ImportedExperiment]

@@ -4,6 +4,7 @@ from typing import TypedDict
 
 from wirebayes.json_files.discovery import DetectableAmplitude
 from wirebayes.json_files.values import Statistics
+from wirebayes.notice import Warned
 
 
 class ExpectedWidth(TypedDict):
@@ -83,7 +84,7 @@ class GuessedParameters(TypedDict):
     parameters: dict[str, Statistics]
 
 
-class PlanJson(TypedDict):
+class PlanJson(Warned):
     """The whole file, the best protocol first."""
 
     version: int

@@ -4,6 +4,7 @@ from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.calibrate import PoseNow
 from wirebayes.json_files.values import Band, Numbers, Quantiles
+from wirebayes.notice import Warned
 
 
 class Specimens(TypedDict):
@@ -263,7 +264,7 @@ class Workspace(ClaimNumbers):
     slices: list[SliceOfWorkspace]
 
 
-class RobotOnWires(TypedDict):
+class RobotOnWires(Warned):
     """What every answer says; where nothing holds the platform, `sentence` says so and ends it."""
 
     version: int
@@ -272,7 +273,6 @@ class RobotOnWires(TypedDict):
     wires: WiresUsed
     feasible: bool
     sentence: NotRequired[str]
-    warnings: NotRequired[list[str]]
 
 
 class PoseJson(RobotOnWires):

@@ -4,6 +4,7 @@ from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.json_files.values import Numbers, Statistics
+from wirebayes.notice import Warned
 
 
 class Parameter(Statistics):
@@ -84,7 +85,7 @@ class ModelCheckResult(TypedDict):
     sentence: str
 
 
-class SummaryJson(TypedDict):
+class SummaryJson(Warned):
     """The whole file."""
 
     model_check: NotRequired[ModelCheckResult]
@@ -95,7 +96,6 @@ class SummaryJson(TypedDict):
     effects: list[str]
     converged: bool
     convergence: str
-    warnings: list[str]
     parameters: dict[str, Parameter]
     derived: Derived
     identifiability: dict[str, Identifiability]

@@ -3,6 +3,7 @@
 from typing import TypedDict
 
 from wirebayes.json_files.values import Numbers
+from wirebayes.notice import Warned
 
 
 class TrueWire(TypedDict):
@@ -18,7 +19,7 @@ class TrueWire(TypedDict):
     noise_free_N: list[Numbers]
 
 
-class TruthJson(TypedDict):
+class TruthJson(Warned):
     """The whole file."""
 
     seed: int

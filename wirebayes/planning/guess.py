@@ -12,6 +12,7 @@ from wirebayes.inference.rough_draws import draws as rough_draws
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.prior import from_table, possible, wire_defaults
 from wirebayes.model.problem import MATERIAL, SAMPLE
+from wirebayes.notice import Notice
 from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 
@@ -28,11 +29,14 @@ class GuessedWire:
         What `B` refers to.
     source : str
         Where the guess comes from, in words.
+    doubts : tuple of Notice
+        What the fit that it comes from says against using it.
     """
 
     draws: dict[str, Array]
     length_mm: float
     source: str
+    doubts: tuple[Notice, ...] = ()
 
     def at(self, length_mm: float) -> dict[str, Array]:
         """The draws for a sample of another length: creep is a strain of the whole wire."""

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from wirebayes.inference.fit import seed_of
+from wirebayes.notice import Notice
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.results.store import Stored
@@ -60,8 +61,8 @@ def mixture_table(
     return rows
 
 
-def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0) -> list[str]:
-    """A sentence for every given first reading that is far from what is expected where it is not given.
+def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0) -> list[Notice]:
+    """A warning for every given first reading that is far from what is expected where it is not given.
 
     Parameters
     ----------
@@ -79,16 +80,17 @@ def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: in
     for hold, at in zip(request.holds, np.flatnonzero(request.prediction.requested), strict=True):
         read, mean, sd = request.prediction.first_N[at], first[at].mean(), first[at].std(ddof=1)
         if given[at] and abs(read - mean) > FAR_OFF * sd:
-            out.append(
+            text = (
                 f"hold {hold.number}: its first reading, {read:.4g} N, is {abs(read - mean) / sd:.0f} standard "
                 f"deviations from the {mean:.4g} N expected there: check tension_N (in N?) and displacement_mm; what "
                 "follows from it is not to be relied on"
             )
+            out.append(Notice("data", text))
     return out
 
 
-def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[str]:
-    """A sentence where predicted tensions, and one where times, are far beyond what the posterior was learned from.
+def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]:
+    """A warning where predicted tensions, and one where times, are far beyond what the posterior was learned from.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[str]:
         out.append(f"tensions of up to {tension:.4g} N are predicted; none above {highest:.4g} N was tested")
     if time > FAR_ON * longest:
         out.append(f"holds of up to {time:.4g} s are predicted; none longer than {longest:.4g} s was tested")
-    return out
+    return [Notice("extrapolation", text) for text in out]
 
 
 def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: int) -> Floats:

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.io.run_folder import plain, write_bytes
 from wirebayes.json_files.scene import SceneJson
+from wirebayes.notice import Notice, Warned, from_json
 
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
 _SENTENCE = 36  # characters; no number with its interval is longer
@@ -73,6 +74,14 @@ class Text:
 
 
 @dataclass(frozen=True)
+class Notices:
+    """Warnings, one a line, each with its kind."""
+
+    notices: Sequence[Notice]
+    kind: str = "notices"
+
+
+@dataclass(frozen=True)
 class Points:
     """A list of sentences under a heading."""
 
@@ -121,7 +130,31 @@ class View:
         return json.dumps(plain(self.scene), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
 
 
-Block = Table | Pictures | Text | Columns | Definitions | Links | View
+Block = Table | Pictures | Text | Notices | Columns | Definitions | Links | View
+
+
+def before_the_answer(warned: Warned) -> list[Block]:
+    """Warnings that change what the answer is worth.
+
+    Parameters
+    ----------
+    warned : dict
+        A file of results, or a part of it, with its ``warnings``.
+    """
+    grave = [notice for notice in from_json(warned["warnings"]) if notice.first]
+    return [Notices(grave)] if grave else []
+
+
+def beside_the_answer(warned: Warned) -> list[Block]:
+    """The other warnings.
+
+    Parameters
+    ----------
+    warned : dict
+        See `before_the_answer`.
+    """
+    light = [notice for notice in from_json(warned["warnings"]) if not notice.first]
+    return [Notices(light)] if light else []
 
 
 @dataclass(frozen=True)
@@ -242,6 +275,11 @@ def files_beside(folder: Path, contents: Sequence[tuple[str, str]]) -> Links:
         for path in sorted(folder.glob(name))[:_MOST_LINKS]
     ]
     return Links([(quote(name), holds) for name, holds in found])
+
+
+def sentence(text: str) -> str:
+    """A text as a sentence: its first letter large, a full stop at its end."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
 def words(name: str) -> str:

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from wirebayes import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
-from wirebayes.report.blocks import Page, View
+from wirebayes.report.blocks import Page, View, sentence
 from wirebayes.report.pages import PAGES
 
 
@@ -47,5 +47,6 @@ def render(page: Page) -> str:
     """The page as HTML with everything inside."""
     environment = Environment(loader=PackageLoader("wirebayes.report", "."), undefined=StrictUndefined)
     environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
+    environment.filters["sentence"] = sentence
     views = any(isinstance(block, View) for section in page.sections for block in section.blocks)
     return environment.get_template("page.html.jinja").render(page=page, views=views, version=__version__) + "\n"

@@ -10,6 +10,7 @@ import numpy as np
 from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
 from wirebayes.model.problem import FINEST, Sample
+from wirebayes.notice import Notice
 from wirebayes.typing import Floats
 
 LOOSE_STEPS = 0.5  # setting error over the typical step: the displacements hardly order the holds then
@@ -19,7 +20,7 @@ FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in 
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
-def warnings(fit: Fit, sample: Sample) -> list[str]:
+def warnings(fit: Fit, sample: Sample) -> list[Notice]:
     """What is suspicious about the readings of one sample and about what was fitted to them.
 
     Parameters
@@ -30,16 +31,33 @@ def warnings(fit: Fit, sample: Sample) -> list[str]:
 
     Returns
     -------
-    list of str
-        Sentences: what, where, what to change.
+    list of Notice
+        What, where, what to change.
     """
     theta = fit.flat
     own = fit.problem.parameters(theta, sample)
     prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
-    found = [loose_steps(own, sample), noise(own, sample), stiffness(own, prior), unchanged_prior(own, prior)]
     readings = sample.readings[..., 0]
-    stated = sample.resolution
-    return data_checks.warnings(sample.protocol, readings, stated) + [sentence for sentence in found if sentence]
+    of_readings = data_checks.warnings(sample.protocol, readings, sample.resolution)
+    return [*of_readings, *of_posterior(own, prior, sample)]
+
+
+def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample: Sample) -> list[Notice]:
+    """What is suspicious about the parameters of one sample.
+
+    Parameters
+    ----------
+    own, prior : mapping of name to (n,) array
+        Draws of its posterior and of its prior.
+    sample : Sample
+    """
+    found = [
+        ("data", loose_steps(own, sample)),
+        ("data", noise(own, sample)),
+        ("prior", stiffness(own, prior)),
+        ("prior", unchanged_prior(own, prior)),
+    ]
+    return [Notice(kind, sentence) for kind, sentence in found if sentence]
 
 
 def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:

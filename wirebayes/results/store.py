@@ -25,6 +25,7 @@ from wirebayes.json_files.values import Statistics
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
+from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.results import posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.stored_check import check
@@ -111,7 +112,7 @@ class Stored:
     likelihood : {"chain", "hold"}
     length_exponent : (n,) array or None
         Where samples of two lengths were fitted together: creep grows as length to this power.
-    doubts : tuple of str
+    doubts : tuple of Notice
         What the fit itself says against using it: that it has not converged, that its model failed the check.
     """
 
@@ -119,7 +120,7 @@ class Stored:
     sample: Sample
     likelihood: str
     length_exponent: Array | None = None
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Notice, ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -183,17 +184,19 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         return replace(stored, doubts=_doubts(groups, stored.sample.name, folder / "summary.json"))
 
 
-def _doubts(groups: Mapping[str, xr.Dataset], name: str, summary: Path) -> tuple[str, ...]:
+def _doubts(groups: Mapping[str, xr.Dataset], name: str, summary: Path) -> tuple[Notice, ...]:
     """What a fit says against using it, and its check, which is in the summary beside it if there was one."""
     out = []
     if not groups["posterior"].attrs.get("converged", 1):
-        out.append(f"the fit of {name} has not converged: nothing that follows from it is to be relied on")
+        text = f"the fit of {name} has not converged: nothing that follows from it is to be relied on"
+        out.append(Notice("not-converged", text))
     check = read_json(summary).get("model_check") if summary.is_file() else None
     if check and check["passed"] is False:
-        out.append(
+        text = (
             f"the model fitted to {name} does not describe its readings (p = {check['p']:.2g}): what follows from it "
             "can be wrong by more than is said; wirebayes discover looks for what is missing"
         )
+        out.append(Notice("model-check", text))
     return tuple(out)
 
 
@@ -608,11 +611,14 @@ def statistics(values: Array) -> Parameter:
         }  # fmt: skip
 
 
-def _warnings(fit: Fit, sample: Sample | None) -> list[str]:
-    """What is suspicious about the readings, with the experiment's name where there are several."""
+def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
+    """That the fit has not converged, and what is suspicious, with the experiment's name where there are several."""
+    found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
     if sample is not None:
-        return posterior_checks.warnings(fit, sample)
-    return [f"{s.name}: {warning}" for s in fit.problem.samples for warning in posterior_checks.warnings(fit, s)]
+        found += posterior_checks.warnings(fit, sample)
+    else:
+        found += [notice.of(s.name) for s in fit.problem.samples for notice in posterior_checks.warnings(fit, s)]
+    return to_json(found)
 
 
 def _summary(fit: Fit, sample: Sample | None) -> SummaryJson:

@@ -180,7 +180,7 @@ def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: 
         _write_readings(folder / f"{bench.name}.csv", bench.experiment(), sample)
     write_text(folder / FILE, "\n".join(_table(bench) for bench in benches))
     truths = {sample.name: _truth(made, i) for i, sample in enumerate(made.problem.samples)}
-    content: TruthJson = {"seed": seed, "experiments": truths}
+    content: TruthJson = {"seed": seed, "experiments": truths, "warnings": []}
     write_json(folder / TRUTH, content)
     return made
 

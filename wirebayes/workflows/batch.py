@@ -20,6 +20,7 @@ from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.problem import MATERIAL, SAMPLE, build
+from wirebayes.notice import Notice, from_json, named, to_json
 from wirebayes.results.outliers import outliers
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import as_finished, computing, executor
@@ -282,11 +283,14 @@ def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> N
     table = []
     for row in rows:
         own: dict[str, Any] = dict(row["parameters"])
-        listed = {"effects": row["effects"], "outlier": outlying.get(row["name"], []), "warnings": row["warnings"]}
+        texts = [notice["text"] for notice in row["warnings"]]
+        listed = {"effects": row["effects"], "outlier": outlying.get(row["name"], []), "warnings": texts}
         cells = {**row, **{key: "; ".join(value) or None for key, value in listed.items()}}
         values = [own.get(n, {}).get(q) for n in names for q in QUANTITIES]
         table.append([*(cells[c] for c in _FIRST), *values, *(cells[c] for c in _LAST)])
     write_csv(folder / TABLE, header, table)
     write_parquet(folder / PARQUET, header, table)
-    content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far)}
+    failed = [Notice("failed", f"{row['name']}: {row['error']}") for row in rows if row["error"]]
+    warnings = to_json([*failed, *from_json(named({row["name"]: row for row in rows}))])
+    content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far), "warnings": warnings}
     write_json(folder / Batch._content, content)

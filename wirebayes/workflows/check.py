@@ -10,6 +10,7 @@ from wirebayes.io import data_checks
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
+from wirebayes.notice import named, to_json
 from wirebayes.workers import computing
 from wirebayes.workflows.options import PathLike, Progress, Source, check_seed, experiments_of, path_of, silent
 from wirebayes.workflows.results import CHECKED, Check, Place
@@ -81,14 +82,14 @@ def check(
                 report("check", done, len(experiments))
                 with computing():
                     previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
-                warnings = [*data_checks.warnings(e.protocol(), e.tension(), e.resolution_N), *previewed.warnings]
+                warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings])
                 found[e.name] = {
                     **_understood(e), "warnings": warnings, "parameters": previewed.parameters,
                     "effects": previewed.effects,
                 }  # fmt: skip
                 understood(e, place.path / f"{e.name}.svg")
             report("check", len(experiments), len(experiments))
-            content: CheckJson = {"experiments": found}
+            content: CheckJson = {"experiments": found, "warnings": named(found)}
             write_json(place.path / CHECKED, content)
             run.finish()
     return Check(place, own, computed=run.state != "done")

@@ -11,11 +11,12 @@ from wirebayes.comparison.compare import POLICY, Task, run, side_by_side
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import Policy
-from wirebayes.io.data_checks import of_experiments
+from wirebayes.io.data_checks import of_experiment
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.problem import Likelihood
+from wirebayes.notice import Notice, named
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import computing
 from wirebayes.workflows.options import (
@@ -119,9 +120,9 @@ class Plan:
     own_effects: Path | None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Notice, ...]:
         """What is suspicious about the readings, worth knowing before the work begins."""
-        return tuple(f"warning: {warning}" for warning in of_experiments(self.experiments))
+        return tuple(notice.of(one.name) for one in self.experiments for notice in of_experiment(one))
 
 
 def plan(
@@ -209,17 +210,18 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
     place = Place.at(output)
     with open_run(place.path, plan.configuration) as opened:
         if opened.state == "done":
-            return Comparison(place, plan.own_effects, computed=False, warnings=plan.warnings)
+            return Comparison(place, plan.own_effects, computed=False)
         with computing():
             run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
         from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
 
-        content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}}
+        content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}, "warnings": []}
         for one in plan.experiments:
             with stored_results(place.path / one.name):
                 models: list[ModelJson] = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
-                content["experiments"][one.name] = side_by_side(models, BASE)
+                content["experiments"][one.name] = side_by_side(models, BASE, of_experiment(one))
             pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
+        content["warnings"] = named(content["experiments"])
         write_json(place.path / "comparison.json", content)
         opened.finish()
-    return Comparison(place, plan.own_effects, warnings=plan.warnings)
+    return Comparison(place, plan.own_effects)

@@ -19,6 +19,7 @@ from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.summary import SummaryJson
+from wirebayes.notice import from_json, named, to_json
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.results.store import load
@@ -145,6 +146,7 @@ def write_findings(found: search.Findings, output: Path, own_effects: Path | Non
     _mixtures(found, output)
     _pictures(found, output, own_effects)
     _posterior_amplitudes(found, output)
+    _warnings(found, output)
     write_json(output / "discovery.json", found.report)
 
 
@@ -207,6 +209,17 @@ def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
             column = next(c for c in parameters if c.startswith(f"{name}."))
             of_posterior = parameters[column]
             amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
+
+
+def _warnings(found: search.Findings, output: Path) -> None:
+    """What the fits say against themselves joins what the search says; of the same readings it is said once."""
+    reports = found.report["experiments"]
+    for name, report in reports.items():
+        fits: list[SummaryJson] = [read_json(output / name / model / "summary.json") for model in ("plain", "final")]
+        plain, final = (from_json(summary["warnings"]) for summary in fits)
+        alone = [notice.of("the final model") for notice in final if notice not in plain]
+        report["warnings"] = to_json([*from_json(report["warnings"]), *plain, *alone])
+    found.report["warnings"] = named(reports)
 
 
 def _pictures(found: search.Findings, output: Path, own_effects: Path | None) -> None:

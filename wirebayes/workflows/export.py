@@ -1,13 +1,19 @@
 """A robot with its wires for other programs."""
 
+from collections.abc import Mapping
+
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import open_run, write_csv, write_text
+from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
+from wirebayes.json_files.export import ExportSummary
+from wirebayes.notice import Notice, to_json
 from wirebayes.robot.export import files
-from wirebayes.robot.mechanics.draws import doubts
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.workflows.options import Numbers, PathLike, check_seed, numbers, path_of, rising_times, text_of
 from wirebayes.workflows.results import Export, Place
 from wirebayes.workflows.wires import RobotLike, Wires, configuration, draws_for, posterior_of, robot_of
 
+TABLE = "creep-table.csv"
 TENSIONS_N = (1.0, 2.0, 4.0, 8.0)  # an option; doubling, because creep goes as a power of the tension
 # an option; a minute to a day, because creep goes as a power of the time at first
 TIMES_S = (60.0, 600.0, 3600.0, 86400.0)
@@ -73,13 +79,32 @@ def export(
         contents["klipper.cfg"] = files.klipper(machine, line)
     contents |= files.simulators(machine, line)
     header, table = files.creep_tables(machine, line, loads, moments)
+    rows = [dict(zip(header, row, strict=True)) for row in table]
+    summary: ExportSummary = {
+        "files": sorted([*contents, TABLE]),
+        "creep_table": rows,
+        "warnings": to_json(_warnings(machine, line, contents)),
+    }
     place = Place.at(output)
     options = {"--experiment": experiment, "--tensions": text_of(tensions), "--times": text_of(times)}
     posterior = posterior_of(wires, experiment)
     with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, options)) as run:
         if run.state != "done":
-            write_csv(run.directory / "creep-table.csv", header, table)
+            write_csv(run.directory / TABLE, header, table)
             for name, text in contents.items():
                 write_text(run.directory / name, text)
+            write_json(run.directory / Export._content, summary)
             run.finish()
-    return Export(place, own, computed=run.state != "done", warnings=tuple(doubts(machine, line)))
+    return Export(place, own, computed=run.state != "done")
+
+
+def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> list[Notice]:
+    """What speaks against the fits, and what could not be exported."""
+    out = doubts(robot, line)
+    if "klipper.cfg" not in contents:
+        text = "no firmware settings: they exist for four or five drums with a position-only platform"
+        out.append(Notice("left-out", text))
+    if "robot.xml" not in contents:
+        text = "no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose"
+        out.append(Notice("unheld", text))
+    return out

@@ -12,6 +12,7 @@ from wirebayes.io.bench.convert import About, Converted, convert, default_name, 
 from wirebayes.io.bench.undecided import Choices, Decimal, TimeSince, Undecided
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
+from wirebayes.notice import named, to_json
 from wirebayes.user_files import read_bytes
 from wirebayes.workflows.options import PathLike, above_zero, check_choice, words
 from wirebayes.workflows.results import IMPORTED, ImportedTests, Place
@@ -143,7 +144,7 @@ def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> N
     from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
     tables: list[str] = []
-    content: ImportJson = {"experiments": {}}
+    content: ImportJson = {"experiments": {}, "warnings": []}
     for path, test in zip(paths, tests, strict=True):
         experiment = test.experiment
         write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
@@ -153,9 +154,10 @@ def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> N
         content["experiments"][experiment.name] = {
             "raw": path.name, "length_mm": experiment.length_mm, "material": experiment.material,
             "resolution_N": experiment.resolution_N or None, "holds": len(experiment.holds),
-            "readings": len(test.rows), "notes": test.notes, "warnings": data_checks.of_experiments([experiment]),
+            "readings": len(test.rows), "notes": test.notes, "warnings": to_json(data_checks.of_experiment(experiment)),
         }  # fmt: skip
         write_text(folder / f"{experiment.name}.toml", tables[-1])
     if len(tests) > 1:
         write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))
+    content["warnings"] = named(content["experiments"])
     write_json(folder / IMPORTED, content)

@@ -25,7 +25,7 @@ from wirebayes.results.jobs import Job, fitted, store
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import one_thread_each
 from wirebayes.workflows.discover import jobs_of, write_findings
-from wirebayes.workflows.results import POSTERIOR, SUMMARY, cautions
+from wirebayes.workflows.results import POSTERIOR, SUMMARY
 
 QUANTITIES = ("mean", "sd", "q05", "q50", "q95")
 _ALONE = Lock()  # a worker with several threads still draws one picture at a time
@@ -156,6 +156,7 @@ def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryCo
     return {
         **_columns(read_json(folder / experiment.name / "plain" / SUMMARY), p, p > ALPHA),
         "verdict": report["verdict"], "effects": report["effects"], "best_effect": report["best"],
+        "warnings": report["warnings"],
     }  # fmt: skip
 
 
@@ -164,12 +165,11 @@ def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitC
         n: {"mean": v["mean"], "sd": v["sd"], "q05": v["q05"], "q50": v["q50"], "q95": v["q95"]}
         for n, v in summary["parameters"].items()
     }
-    warnings = [s for s in cautions(summary) if s.startswith("warning: ")]
     check = None if passed is None else "passed" if passed else "failed"
     return {
         "converged": summary["converged"],
         "parameters": parameters,
-        "warnings": warnings,
+        "warnings": summary["warnings"],
         "p_global": p,
         "check": check,
     }

@@ -21,6 +21,7 @@ from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
+from wirebayes.notice import Notice, to_json
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked, too_long
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
@@ -175,12 +176,7 @@ def plan(
         report("protocols", len(request.tests), len(request.tests))
         order = ranked(judged, request.aim, request.budget_min)
         rows = [_row(j, request, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
-        summary: PlanJson = {
-            "version": 1, "aim": list(request.aim), "budget_min": request.budget_min, "best": rows[0]["name"],
-            "guess": {"source": request.guess.source, "length_mm": request.guess.length_mm,
-                      "parameters": {n: _statistics(v) for n, v in request.guess.draws.items()}},
-            "robot": None if machine is None else machine.name, "protocols": rows,
-        }  # fmt: skip
+        summary = _summary(rows, request, machine)
         write_json(opened.directory / "plan.json", summary)
         from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
 
@@ -256,8 +252,9 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
         message = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
         raise InputError(f"{folder}: {message}")
     sample = stored.sample
-    source = "; ".join([f"the posterior of {sample.name} in {folder.name}", *stored.doubts])
+    source = f"the posterior of {sample.name} in {folder.name}"
     guess = from_posterior(stored.draws, sample.protocol.length_mm, source, n)
+    guess = replace(guess, doubts=stored.doubts)
     return guess, {"posterior": hash_of(guess.draws)}, sample
 
 
@@ -323,6 +320,32 @@ def _row(
         "effects": seen.effects, "cosines": cosines, "not_identifiable": list(seen.hidden),
         "robot": None if machine is None else _drift(judged, request.guess, machine, law, history),
     }  # fmt: skip
+
+
+def _summary(rows: list[JudgedProtocol], request: _Request, machine: Robot | None) -> PlanJson:
+    """The content of ``plan.json``."""
+    guess = request.guess
+    return {
+        "version": 1,
+        "aim": list(request.aim),
+        "budget_min": request.budget_min,
+        "best": rows[0]["name"],
+        "guess": {
+            "source": guess.source,
+            "length_mm": guess.length_mm,
+            "parameters": {n: _statistics(v) for n, v in guess.draws.items()},
+        },
+        "robot": None if machine is None else machine.name,
+        "protocols": rows,
+        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *guess.doubts]),
+    }
+
+
+def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]:
+    """That no test is done within the time there is, if so."""
+    if best["within_budget"]:
+        return []
+    return [Notice("budget", f"no test is done within {budget_min:g} min")]
 
 
 def _drift(judged: Judged, guess: GuessedWire, machine: Robot, law: ElasticLaw, history: History) -> RobotDrift:

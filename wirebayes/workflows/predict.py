@@ -9,6 +9,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.arrays import is_table, protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
+from wirebayes.notice import to_json
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import HEADER, beyond_tested, dataset, mixture_table, unlikely_readings
 from wirebayes.results import store
@@ -61,7 +62,7 @@ def predict(
         Dimension ``reading``, a row of the protocol each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``,
         ``q95_N`` with units as attributes. The attribute ``prediction`` says which sample was predicted, given what;
         ``warnings``, where there is one, what speaks against the posterior, what lies far beyond the tested range, and
-        which given readings are far from what was expected.
+        which given readings are far from what was expected; ``warning_kinds`` has the kind of each.
 
     Raises
     ------
@@ -101,9 +102,13 @@ def predict(
         sentence += (
             f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
         )
-    warnings = [*dict.fromkeys(doubt for _, stored in members for doubt in stored.doubts)]
-    warnings += [*beyond_tested(rows, members[0][1]), *unlikely_readings(requests, seed)]
-    return dataset(rows, {"prediction": sentence, "seed": seed} | ({"warnings": warnings} if warnings else {}))
+    doubts = [doubt for _, stored in members for doubt in stored.doubts]
+    notices = to_json([*doubts, *beyond_tested(rows, members[0][1]), *unlikely_readings(requests, seed)])
+    attributes: dict[str, Any] = {"prediction": sentence, "seed": seed}
+    if notices:  # in two attributes, for netCDF holds text but no mappings
+        attributes["warnings"] = [notice["text"] for notice in notices]
+        attributes["warning_kinds"] = [notice["kind"] for notice in notices]
+    return dataset(rows, attributes)
 
 
 def stored_posteriors(

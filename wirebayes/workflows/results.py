@@ -1,6 +1,5 @@
 """What the public functions return: views of folders of results, which say in short what they hold."""
 
-import csv
 import os
 import shutil
 import weakref
@@ -27,6 +26,7 @@ from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.truth import TruthJson
+from wirebayes.notice import Notice, Warned, from_json
 from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics.draws import specimens_in_words
@@ -92,9 +92,20 @@ class Result(Generic[Content]):
         return self.place.path
 
     @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What speaks against the results, gravest first: the same on a terminal, on the page and in the JSON."""
+        with stored_results(self.folder):
+            return from_json(cast(Warned, self.summary())["warnings"])
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Kinds of the warnings, on which it depends what to do next."""
+        return frozenset(notice.kind for notice in self.warnings)
+
+    @property
     def messages(self) -> tuple[str, ...]:
         """What the command says on standard error."""
-        return ()
+        return tuple(f"warning: {notice.text}" for notice in self.warnings)
 
     def summary(self) -> Content:
         """The results as plain values, as they stand in the JSON file."""
@@ -225,12 +236,11 @@ class Posterior(Result[SummaryJson]):
         return target
 
     @property
-    def messages(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Notice, ...]:
         """What is suspicious about the readings, and why the posterior should not be believed, if so."""
-        path, name = self.folder / SUMMARY, self.within if self.within != "." else self.name
-        with stored_results(path):
-            summary: SummaryJson = read_json(path)
-            return tuple(f"{name}: {message}" for message in cautions(summary))
+        name = self.within if self.within != "." else self.name
+        with stored_results(self.folder / SUMMARY):
+            return tuple(notice.of(name) for notice in from_json(self.summary()["warnings"]))
 
     def _short_form(self) -> list[str]:
         s = self.summary()
@@ -285,9 +295,9 @@ class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
         return store.datatrees({name: posterior.folder for name, posterior in self.members.items()})
 
     @property
-    def messages(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Notice, ...]:
         """Of all of them."""
-        return tuple(message for posterior in self.members.values() for message in posterior.messages)
+        return tuple(notice for posterior in self.members.values() for notice in posterior.warnings)
 
     def _short_form(self) -> list[str]:
         return [repr(posterior) for posterior in self.members.values()]
@@ -329,17 +339,6 @@ class Findings(Result[DiscoveryJson]):
         """One tree with a branch ``NAME/plain`` and ``NAME/final`` for each experiment."""
         both = [*self.plain.values(), *self.final.values()]
         return store.datatrees({posterior.within: posterior.folder for posterior in both})
-
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """What is suspicious about the readings, and which posteriors should not be believed."""
-        plain = [message for p in self.plain.values() for message in p.messages]
-        # the readings are the same, so they are warned of once
-        odd = tuple(f"{p.within}: warning: " for p in self.final.values())
-        return (
-            *plain,
-            *(message for p in self.final.values() for message in p.messages if not message.startswith(odd)),
-        )
 
     def _posteriors(self, model: str) -> dict[str, Posterior]:
         return {
@@ -404,9 +403,9 @@ class Batch(Result[BatchJson]):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """Experiments that failed or did not converge, the first of them where there are many."""
-        lines = [f"{row['name']}: {row['error'] or 'not converged'}" for row in self.rows if not row["converged"]]
-        more = f"and {len(lines) - _MESSAGES} more: see summary.csv, columns converged and error"
+        """The gravest warnings, where there are many."""
+        lines = [f"warning: {notice.text}" for notice in self.warnings]
+        more = f"and {len(lines) - _MESSAGES} more warnings: see summary.csv, columns warnings and error"
         return (*lines[:_MESSAGES], *([more] if len(lines) > _MESSAGES else []))
 
     def _posteriors(self, model: str) -> dict[str, Posterior]:
@@ -453,14 +452,6 @@ class Plan(Result[PlanJson]):
         """The first of them."""
         return self.protocols[0]
 
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """That no test fits the time there is, if so."""
-        found = self.summary()
-        if found["protocols"][0]["within_budget"]:
-            return ()
-        return (f"no test is done within {found['budget_min']:g} min",)
-
     def _short_form(self) -> list[str]:
         return [f"{len(self.protocols)} protocols", f"best {self.best['name']}"]
 
@@ -478,30 +469,13 @@ class Plan(Result[PlanJson]):
 class Comparison(Result[ComparisonJson]):
     """Models side by side on readings that their fits have not seen.
 
-    Attributes
-    ----------
-    warnings : tuple of str
-        What is suspicious about the readings; not known any more of results that were loaded.
-
     Examples
     --------
     >>> comparison
     Comparison(wire: 2 models, best plain)
     """
 
-    warnings: tuple[str, ...] = ()
-
     _content: ClassVar[str] = "comparison.json"
-
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """Models that could not be judged or did not converge."""
-        return tuple(
-            f"{name}: {row['name']}: {row['failed'] or row['convergence']}"
-            for name, table in self.summary()["experiments"].items()
-            for row in table["models"]
-            if row["failed"] is not None or not row["converged"]
-        )
 
     def _short_form(self) -> list[str]:
         return [
@@ -531,11 +505,8 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """Why there is no answer, the estimated spread of specimens, and ways in which it leaves what was tested."""
-        found = self.summary()
-        unheld = (found["sentence"],) if "sentence" in found else ()
-        spread = specimens_in_words(found["wires"])
-        return (*unheld, *spread, *(f"warning: {warning}" for warning in found.get("warnings", [])))
+        """The estimated spread of specimens, and the warnings."""
+        return (*specimens_in_words(self.summary()["wires"]), *super().messages)
 
     def _short_form(self) -> list[str]:
         found = self.summary()
@@ -570,17 +541,6 @@ class Calibration(Result[CalibrateJson]):
 
     _content: ClassVar[str] = "calibrate.json"
 
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """That the lengths should not be used, if so, and holds whose readings contradict each other."""
-        with stored_results(self.folder / self._content):
-            found = self.summary()
-            models = (("the creep model", found["with_creep_model"]), ("Hooke's law alone", found["by_hooke_alone"]))
-            astray = [called for called, lengths in models if not lengths["converged"]]
-        advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
-        unsure = [f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}"] if astray else []
-        return (*unsure, *(f"warning: {warning}" for warning in found.get("warnings", [])))
-
     def _short_form(self) -> list[str]:
         found = self.summary()
         sure = "converged" if found["with_creep_model"]["converged"] else "NOT CONVERGED"
@@ -599,41 +559,20 @@ class Calibration(Result[CalibrateJson]):
 class Export(Result[ExportSummary]):
     """A robot with its wires for other programs: firmware settings, creep table, MuJoCo model.
 
-    Attributes
-    ----------
-    warnings : tuple of str
-        What the fits say against using them; of results that were loaded the firmware's comments alone know.
-
     Examples
     --------
     >>> exported.files["klipper.cfg"].splitlines()[2]
     '[printer]'
     """
 
-    warnings: tuple[str, ...] = ()
+    _content: ClassVar[str] = "export.json"
 
     @property
     def files(self) -> dict[str, str]:
         """Content of each file by name."""
-        own = (CONFIGURATION, COMPLETE)
+        own = (CONFIGURATION, COMPLETE, self._content)
         paths = sorted(path for path in self.folder.iterdir() if path.is_file() and path.name not in own)
         return {path.name: path.read_text(encoding="utf-8") for path in paths}
-
-    def summary(self) -> ExportSummary:
-        """Names of the files, and the rows of the creep table."""
-        rows = csv.DictReader(self.files["creep-table.csv"].splitlines())
-        table = [{key: value if key == "wire" else float(value) for key, value in row.items()} for row in rows]
-        return {"files": list(self.files), "creep_table": table}
-
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """What speaks against the fits, and what could not be exported."""
-        out = [f"warning: {warning}" for warning in self.warnings]
-        if "klipper.cfg" not in self.files:
-            out.append("no firmware settings: they exist for four or five drums with a position-only platform")
-        if "robot.xml" not in self.files:
-            out.append("no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose")
-        return tuple(out)
 
     def _short_form(self) -> list[str]:
         return list(self.files)
@@ -688,13 +627,6 @@ class ImportedTests(Result[ImportJson]):
         """The tests as `read_experiments` reads the files that were written."""
         return [e for name in self.summary()["experiments"] for e in read_experiments(self.folder / f"{name}.toml")]
 
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """What is suspicious about the readings."""
-        return tuple(
-            f"warning: {warning}" for found in self.summary()["experiments"].values() for warning in found["warnings"]
-        )
-
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
         return [f"{name}: {each['holds']} holds, {each['readings']} readings" for name, each in found.items()]
@@ -715,12 +647,6 @@ class Check(Result[CheckJson]):
     """
 
     _content: ClassVar[str] = CHECKED
-
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """What is suspicious."""
-        found = self.summary()["experiments"]
-        return tuple(f"warning: {name}: {warning}" for name, test in found.items() for warning in test["warnings"])
 
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
@@ -771,23 +697,12 @@ class Reproduction(Result[dict[str, Any]]):
         return store.datatrees({name: posterior.folder for name, posterior in self.posteriors.items()})
 
     @property
-    def messages(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Notice, ...]:
         """Fits that did not converge."""
-        return self.not_converged
+        return tuple(Notice("not-converged", line) for line in self.not_converged)
 
     def _short_form(self) -> list[str]:
         return [str(self.folder / "report.html"), f"{len(self.posteriors)} fits"]
-
-
-def cautions(summary: SummaryJson) -> list[str]:
-    """What the ``summary.json`` of a fit says against it."""
-    out = [f"warning: {warning}" for warning in summary["warnings"]]
-    if not summary["converged"]:
-        out.append(summary["convergence"])
-    check = summary.get("model_check")
-    if check and (check["passed"] is False or check["gross_errors"]):
-        out.append(check["sentence"])
-    return out
 
 
 def html_table(title: str, header: list[str], rows: list[list[str]], notes: tuple[str, ...] = ()) -> str:

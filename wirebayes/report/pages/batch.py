@@ -17,6 +17,8 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    before_the_answer,
+    beside_the_answer,
     drawn,
     files_beside,
     number,
@@ -25,6 +27,7 @@ from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
 
+_MOST_WARNINGS = 10  # shown at once; more push the summary's pictures off the screen
 _MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all
 _SHOWN = ("k1", "B", "U", "k2", "N")
 
@@ -35,7 +38,10 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
     first: list[Block] = [Columns([_done(rows), _known(fitted), _reliability(rows, configuration)])]
-    sections = [Section("Summary", first), Section("Outlying specimens", _outliers(fitted, far))]
+    warned: list[Block] = [*before_the_answer(found), *beside_the_answer(found)]
+    sections = [Section("Summary", first)]
+    sections += [Section("Warnings", warned, folded=len(found["warnings"]) > _MOST_WARNINGS)] if warned else []
+    sections += [Section("Outlying specimens", _outliers(fitted, far))]
     if fitted:
         alt = "Parameters of all specimens by material."
         picture = Picture(drawn(specimens_of_materials(fitted, far)), alt, _PICTURE, wide=True)
@@ -90,7 +96,7 @@ def _reliability(rows: list[Row], configuration: dict[str, Any]) -> Points:
             f"chance, each at its level of {ALPHA:g}."
         )
     odd = [row["name"] for row in rows if row["warnings"]]
-    points += [f"Suspicious readings or fits: {_some(odd)}; the column warnings says how."] if odd else []
+    points += [f"Suspicious readings or fits: {_some(odd)}; see the warnings."] if odd else []
     return Points("How far it can be trusted", points or ["All fits converged."])
 
 

@@ -5,19 +5,31 @@ from typing import Any
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths
-from wirebayes.report.blocks import Block, Columns, Page, Points, Section, Table, Text, files_beside, number, span
+from wirebayes.report.blocks import (
+    Block,
+    Columns,
+    Page,
+    Points,
+    Section,
+    Table,
+    Text,
+    before_the_answer,
+    beside_the_answer,
+    files_beside,
+    number,
+    span,
+)
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
+from wirebayes.robot.self_calibration.answer import MISFIT
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``calibrate.json``."""
     found: CalibrateJson = read_json(folder / "calibrate.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
-    first: list[Block] = [Columns([_done(found), _known(found), _unknown(creep, hooke)])]
-    first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in found.get("warnings", [])]
-    if not creep["converged"]:
-        first.insert(0, Text("Not converged: do not use any of these lengths.", strong=True))
+    columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
+    first = [*before_the_answer(found), columns, *beside_the_answer(found)]
     sections = [
         Section("Summary", first),
         Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
@@ -70,7 +82,7 @@ def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
             points.append(f"With {name} the search did not converge: do not use its lengths.")
         if result["misfit"] is None:
             continue
-        fits = "explains" if result["misfit"] < 1.5 else "cannot explain"
+        fits = "explains" if result["misfit"] < MISFIT else "cannot explain"
         points.append(
             f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
             f"{fits} the readings."

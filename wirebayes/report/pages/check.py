@@ -15,6 +15,8 @@ from wirebayes.report.blocks import (
     Points,
     Section,
     Table,
+    before_the_answer,
+    beside_the_answer,
     embedded,
     files_beside,
     number,
@@ -57,9 +59,8 @@ def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
         f"Length {number(e['length_mm'])} mm.",
     ]
     notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
-    odd = e["warnings"] or ["Nothing."]
-    columns = [Points("What it is", about), Points("What was done", notes), Points("What is suspicious", odd)]
-    return [Columns(columns), *picture]
+    columns = [Points("What it is", about), Points("What was done", notes)]
+    return [*before_the_answer(e), Columns(columns), *picture, *beside_the_answer(e)]
 
 
 def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
@@ -72,9 +73,10 @@ def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
     blind = [f"Effects it cannot show: {', '.join(spoken(name) for name in hidden)}."] if hidden else []
     prior = [name for name, p in e["parameters"].items() if p["determined_by"] == "prior"]
     blind += [f"Parameters it does not determine: {', '.join(prior)}."] if prior else []
-    columns = [Points("What it is", about), Points("What is suspicious", e["warnings"] or ["Nothing."])]
     blocks: list[Block] = [
-        Columns([*columns, Points("What it cannot determine", blind or ["Nothing to report."])]),
+        *before_the_answer(e),
+        Columns([Points("What it is", about), Points("What it cannot determine", blind or ["Nothing to report."])]),
+        *beside_the_answer(e),
         *picture,
     ]
     rows = [

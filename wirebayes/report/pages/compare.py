@@ -6,7 +6,19 @@ from typing import Any
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
-from wirebayes.report.blocks import Block, Page, Pictures, Section, Table, Text, files_beside, number, pictures_in
+from wirebayes.report.blocks import (
+    Block,
+    Page,
+    Pictures,
+    Section,
+    Table,
+    Text,
+    before_the_answer,
+    beside_the_answer,
+    files_beside,
+    number,
+    pictures_in,
+)
 from wirebayes.report.glossary import meaning
 
 _CAPTIONS = {
@@ -41,7 +53,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     rows = table["models"]
     good = [r for r in rows if r.get("failed") is None]
-    blocks: list[Block] = [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
+    blocks: list[Block] = before_the_answer(table)
+    blocks += [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
+    blocks += beside_the_answer(table)
     if (folder / name).is_dir() and (pictures := pictures_in(folder / name, _CAPTIONS)):
         blocks.append(Pictures(pictures))
     header = ["model", "weight", f"elpd − {table['base']}", "standard error", "held out: rms, N"]

@@ -15,6 +15,8 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    before_the_answer,
+    beside_the_answer,
     drawn,
     embedded,
     files_beside,
@@ -67,7 +69,8 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         "partial": f"{listed([spoken(e) for e in v['effects']]).capitalize()} {'are' if v['effects'][1:] else 'is'} "
         "missing, and something else that no effect in the catalogue explains.",
     }
-    blocks: list[Block] = [Text(words.get(v["verdict"], v["verdict"]), strong=True)]
+    blocks: list[Block] = [*before_the_answer(v), Text(words.get(v["verdict"], v["verdict"]), strong=True)]
+    blocks += beside_the_answer(v)
     where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
     known = [_held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]

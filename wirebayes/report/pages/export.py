@@ -4,7 +4,22 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from wirebayes.report.blocks import Page, Picture, Pictures, Section, Table, Text, drawn, files_beside, number, span
+from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.export import ExportSummary
+from wirebayes.report.blocks import (
+    Page,
+    Picture,
+    Pictures,
+    Section,
+    Table,
+    Text,
+    before_the_answer,
+    beside_the_answer,
+    drawn,
+    files_beside,
+    number,
+    span,
+)
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.creep_table import growth
 
@@ -17,6 +32,7 @@ _FILES = (
     ("robot.sdf", "the robot for Gazebo"),
     ("robot.urdf", "its bodies and frames for ROS and others, without wires"),
     ("robot.sdf", "the same for Gazebo"),
+    ("export.json", "the table and the warnings as JSON"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
 
@@ -25,6 +41,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``creep-table.csv`` and links to what lies beside it."""
     with (folder / "creep-table.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
+    summary: ExportSummary = read_json(folder / "export.json")
     wires = list(dict.fromkeys(row.get("wire") for row in rows))  # None, once, where all legs hang on one line
     lines = [
         [
@@ -44,7 +61,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     pictures = [_growth(wire, [row for row in rows if row.get("wire") == wire]) for wire in wires]
     header = _HEADER if wires == [None] else ("wire", *_HEADER)
     sections = [
-        Section("Files", [files_beside(folder, _FILES)]),
+        Section("Files", [*before_the_answer(summary), files_beside(folder, _FILES), *beside_the_answer(summary)]),
         Section("Creep of the line", [words, Pictures(pictures), Table(header, lines, caption)]),
         meaning(("90 % interval",), model=False),
     ]

@@ -19,6 +19,8 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    before_the_answer,
+    beside_the_answer,
     drawn,
     files_beside,
     number,
@@ -143,14 +145,14 @@ def _passed(summary: SummaryJson) -> bool | None:
 
 def _cautions(summary: SummaryJson) -> list[Block]:
     """What a reader must know before anything else."""
-    if "model_check" in summary:
-        check = summary["model_check"]
-        out: list[Block] = [Text(check["sentence"], strong=not check["passed"] or bool(check["gross_errors"]))]
+    if "model_check" not in summary:
+        check = Text("The model was not checked against the readings: the check was left out.", strong=True)
+    elif summary["model_check"]["passed"] is None:
+        check = Text(summary["model_check"]["sentence"], strong=True)
     else:
-        out = [Text("The model was not checked against the readings: the check was left out.", strong=True)]
-    if not summary["converged"]:
-        out.insert(0, Text("Not converged: do not trust these intervals.", strong=True))
-    return [Text(f"Check the readings: {warning}.", strong=True) for warning in summary["warnings"]] + out
+        check = Text(summary["model_check"]["sentence"])
+    said = "model-check" in [notice["kind"] for notice in summary["warnings"]]
+    return [*before_the_answer(summary), *([] if said else [check]), *beside_the_answer(summary)]
 
 
 def _sampled(summary: SummaryJson) -> str:

@@ -15,6 +15,8 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    before_the_answer,
+    beside_the_answer,
     embedded,
     files_beside,
     number,
@@ -34,7 +36,8 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``plan.json``."""
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
-    first: list[Block] = [Columns([_requested(found), _recommended(found), _reliability(rows)]), _ranking(found)]
+    columns = Columns([_requested(found), _recommended(found), _reliability(rows)])
+    first = [*before_the_answer(found), columns, *beside_the_answer(found), _ranking(found)]
     picture = picture_file(folder, "plan")
     if picture is not None:
         alt = "Expected widths and detectable effects of each test."
@@ -75,8 +78,6 @@ def _recommended(found: PlanJson) -> Points:
         f"The creep after an hour at {number(best['creep']['tension_N'])} N would be known to "
         f"{number(creep['sd'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
     )
-    if not best["within_budget"]:
-        points.insert(0, "No test fits into the available time.")
     return Points("What to do", points)
 
 

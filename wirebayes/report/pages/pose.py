@@ -17,6 +17,8 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    before_the_answer,
+    beside_the_answer,
     embedded,
     files_beside,
     number,
@@ -48,11 +50,8 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     if "history" in content:
         return pose_history.page(folder, configuration, content)
     pose: PoseJson = content
-    blocks: list[Block] = [Columns([_requested(pose), *_answers(pose)])]
-    if not pose.get("feasible", True):
-        sentence = pose.get("sentence", "No tensions within the stated bounds hold the platform at this pose.")
-        blocks.insert(0, Text(sentence, strong=True))
-    blocks[:0] = [Text(sentence, strong=True) for sentence in _urgent_warnings(pose)]
+    columns = Columns([_requested(pose), *_answers(pose)])
+    blocks: list[Block] = [*before_the_answer(pose), columns, *beside_the_answer(pose)]
     view = robot_view(folder)
     turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
     captions = _CAPTIONS | dict.fromkeys(turned, _TURNED)
@@ -83,12 +82,6 @@ _FILES = (
 _TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "exit point")
 
 
-def _urgent_warnings(pose: PoseJson) -> list[str]:
-    """What must be read first: falls, slack wires and poses that are not held, as the command said them."""
-    urgent = ("falls", "slack", "cannot begin", "cannot pull", "its tension", "softest motion")
-    return [w[:1].upper() + w[1:] + "." for w in pose.get("warnings", []) if any(word in w for word in urgent)]
-
-
 def _requested(pose: PoseJson) -> Points:
     place = ", ".join(number(float(x)) if x else "0" for x in pose["pose"]["position_m"])
     wires = pose.get("wires", {})
@@ -110,7 +103,7 @@ def _requested(pose: PoseJson) -> Points:
 
 
 def _answers(pose: PoseJson) -> list[Points]:
-    known, unknown = [], []
+    known = []
     for entry in pose.get("drift", []):
         last = entry["times_s"][-1]
         if entry["distance_mm"]["q50"]:
@@ -129,9 +122,7 @@ def _answers(pose: PoseJson) -> list[Points]:
         moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
         chance = number(space["probability"], 2)
         known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
-    sentences = [warning[:1].upper() + warning[1:] + "." for warning in pose.get("warnings", [])]
-    unknown += [sentence for sentence in sentences if sentence not in _urgent_warnings(pose)]
-    unknown.append("How much specimens of one line differ is assumed, not measured, unless three or more were tested.")
+    unknown = ["How much specimens of one line differ is assumed, not measured, unless three or more were tested."]
     known = known or ["Nothing: the pose cannot be held."]
     return [Points("What is known", known), Points("What is not known", unknown)]
 

@@ -14,7 +14,8 @@ from wirebayes.report.blocks import (
     Points,
     Section,
     Table,
-    Text,
+    before_the_answer,
+    beside_the_answer,
     embedded,
     files_beside,
     number,
@@ -60,9 +61,9 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
     lead = "Where the platform was, from measured joint values." if measured else "Where commanded poses lead."
     lead += " The wires' creep is carried through the whole history of their tensions."
     if not pose["feasible"]:
-        return Page(f"Robot {pose['robot']}", lead, [Section("Summary", [Text(pose["sentence"], strong=True)])])
-    first: list[Block] = [Columns([Points("What was computed", _requested(pose)), *_answers(pose)])]
-    first[:0] = [Text(w[:1].upper() + w[1:] + ".", strong=True) for w in pose["warnings"] if _is_urgent(w)]
+        return Page(f"Robot {pose['robot']}", lead, [Section("Summary", before_the_answer(pose))])
+    columns = Columns([Points("What was computed", _requested(pose)), *_answers(pose)])
+    first = [*before_the_answer(pose), columns, *beside_the_answer(pose)]
     files = {name: picture_file(folder, name) for name in _CAPTIONS}
     pictures = {
         name: Picture(embedded(file), _CAPTIONS[name], _CAPTIONS[name], wide=name in _WIDE)
@@ -76,11 +77,6 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
     sections.append(meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]))
     seed = f"Seed {configuration.get('seed')}."
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed)
-
-
-def _is_urgent(warning: str) -> bool:
-    """Whether a warning must be read first."""
-    return "falls" in warning or "slack" in warning
 
 
 def _requested(pose: PoseHistoryJson) -> list[str]:
@@ -140,7 +136,7 @@ def _answers(pose: PoseHistoryJson) -> list[Points]:
     left = pose["corrections"]["left_mm"]
     if left["q50"] and left["q50"][-1] is not None:
         known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {_last(left)} mm.")
-    unknown = [w[:1].upper() + w[1:] + "." for w in pose["warnings"] if not _is_urgent(w)]
+    unknown = []
     clock = pose["clock"]
     unknown.append(
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "

@@ -287,7 +287,7 @@ def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> st
         lines.append(f"The firmware takes one spring constant for all wires: here that of wire {spring.of}.")
     else:
         lines += [spring.remark] if spring.remark else []
-    lines[1:1] = [f"Beware: {doubt}." for doubt in doubts(robot, line)]
+    lines[1:1] = [f"Beware: {doubt.text}." for doubt in doubts(robot, line)]
     lines.insert(1, "The firmware knows no creep; creep-table.csv says how much a line grows under load.")
     return "".join(f"{mark} {text}\n" for text in (*lines, _pulleys_left_out(robot)) if text)
 

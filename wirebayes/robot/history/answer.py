@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wirebayes.json_files.pose_history import Clock, DriftOverTime, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
+from wirebayes.notice import Notice, to_json
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate, Progress, estimate
@@ -25,6 +26,7 @@ from wirebayes.robot.motion import drift as drifting
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.motion.drift import Course
+from wirebayes.robot.pose.answer import unheld
 from wirebayes.robot.pose.request import band
 from wirebayes.typing import Floats
 
@@ -101,7 +103,7 @@ def answer(
             found, joint = commanded.drift(robot, line, history, errors, rng, progress)
         except commanded.Unheld as unheld:
             sentence = f"No{str(unheld)[2:]}."
-            return HistoryAnswer(content | {"feasible": False, "sentence": sentence}, {}, rows)
+            return HistoryAnswer(_without_answer(content, sentence), {}, rows)
 
         def again(few: WireDraws, restart: float) -> Track:
             drawn = np.random.default_rng(seed)  # the same draws both times
@@ -109,7 +111,7 @@ def answer(
 
     if not found.track.held[:, 0].any():
         sentence = "No draw of the wires holds the platform at the first row; see --position for where it starts."
-        return HistoryAnswer(content | {"feasible": False, "sentence": sentence}, {}, rows)
+        return HistoryAnswer(_without_answer(content, sentence), {}, rows)
     to = corrections.target(robot, history, found)
     change = corrections.wanted(robot, found, to) - joint
     best = _mean(joint + change) if joint.ndim == 2 else joint + _mean(change)
@@ -131,14 +133,18 @@ def answer(
             "misfit": found.misfit, "converged": found.converged, "effective_draws": found.effective,
             "used": found.used,
         }  # fmt: skip
-    content["warnings"] = _warnings(robot, line, history, found, joint, content)
-    if history.position_m is not None:
-        content["warnings"] = _unreached(history.times_s, found, to, change) + content["warnings"]
+    unreached = [] if history.position_m is None else _unreached(history.times_s, found, to, change)
+    content["warnings"] = to_json([*unreached, *_warnings(robot, line, history, found, joint, content)])
     tables = {
         "poses.csv": _pose_table(robot, history, found, to),
         "corrections.csv": _correction_table(robot, history, _mean(joint) if joint.ndim == 3 else joint, change),
     }
     return HistoryAnswer(content, tables, rows, found, to)
+
+
+def _without_answer(content: PoseHistoryJson, sentence: str) -> PoseHistoryJson:
+    """An answer that ends because nothing holds the platform, and why."""
+    return content | {"feasible": False, "sentence": sentence, "warnings": unheld(sentence)}
 
 
 def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -> PoseHistoryJson:
@@ -150,6 +156,7 @@ def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertai
         "mass_kg": robot.mass_kg,
         "wires": draws.summary(robot, line),
         "feasible": True,
+        "warnings": [],
         "history": {
             "kind": kind,
             "rows": len(history.times_s),
@@ -240,7 +247,7 @@ def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> Clock:
     return {"largest_mm": 1e3 * float(np.nanmax(middle)), "at_the_end_mm": 1e3 * float(middle[-1])}
 
 
-def _unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -> list[str]:
+def _unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -> list[Notice]:
     """Which commanded poses no corrections ``(n, t, w)`` lead to, though the platform still hangs then."""
     never = found.track.held.any(0) & ~np.isfinite(change_m).all(-1).any(0)
     unheld = ~np.isfinite(to.tension_N).all(-1)
@@ -254,42 +261,47 @@ def _unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -
         if rows.size:
             times = ", ".join(f"{times_s[k]:.10g}" for k in rows[:_NAMED])
             more = f" s and {rows.size - _NAMED} times more" if rows.size > _NAMED else " s"
-            out.append(f"{reason} commanded at {times}{more}: no corrections lead there")
+            out.append(Notice("unheld", f"{reason} commanded at {times}{more}: no corrections lead there"))
     return out
 
 
 def _warnings(
     robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: PoseHistoryJson
-) -> list[str]:
-    out, held = [], found.track.held
+) -> list[Notice]:
+    out, held = list[Notice](), found.track.held
     lost = 1.0 - held[:, -1].mean()
     if lost > 0:
         first = history.times_s[np.argmin(held.all(0))]
-        out.append(f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s")
+        text = f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s"
+        out.append(Notice("fall", text))
     slack = ((found.track.tension_N <= 0) & held[..., None]).any(1).mean(0)
     for i in np.flatnonzero(slack > 0.05):
-        out.append(f"wire {i + 1} goes slack in {100 * slack[i]:.0f} % of the draws")
+        out.append(Notice("slack", f"wire {i + 1} goes slack in {100 * slack[i]:.0f} % of the draws"))
     if history.read and not found.converged:
-        out.append("the readings could not be brought together with the joint values: no mode was reached")
+        text = "the readings could not be brought together with the joint values: no mode was reached"
+        out.append(Notice("not-converged", text))
     elif found.misfit is not None and found.misfit > _MISFIT:
-        out.append(
+        text = (
             f"the readings contradict joint values and wires: mean squared residual {found.misfit:.3g}, expected about "
             "1; check signs, units, payload and the standard errors"
         )
+        out.append(Notice("misfit", text))
     if found.effective is not None and found.effective < _FEWEST:
         then = "the bands' ends are rough" if found.used else "the readings are not used, the bands are those without"
-        out.append(
+        text = (
             f"only about {found.effective:.0f} of {line.count} draws agree with the readings: {then}; take more "
             "--draws, and check payload and standard errors"
         )
+        out.append(Notice("few-draws", text))
     clock = content["clock"]
     width = content["drift"][0]["distance_mm"]
     widths = np.asarray(width["q95"], float) - np.asarray(width["q05"], float)
     if clock["largest_mm"] > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
-        out.append(
+        text = (
             f"when the wires' clocks restart matters here: by up to {clock['largest_mm']:.3g} mm, more than half of "
             "the band; give a column hold to say it"
         )
+        out.append(Notice("clock", text))
     holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
     longest = float(np.diff(history.times_s[holds]).max())
     lengths = inverse.lengths(robot, joint_m)[0]

@@ -18,7 +18,7 @@ from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, sensors, weight
 from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, path
@@ -94,6 +94,11 @@ class LiveEstimator:
         About where the platform is at the first step.
     seed : int
 
+    Attributes
+    ----------
+    warnings : tuple of Notice
+        What the fits of the wires say against using them.
+
     Examples
     --------
     >>> joints = held.summary()["inverse"]["joint_value_m"]["q50"]
@@ -116,6 +121,7 @@ class LiveEstimator:
         self._rng = np.random.default_rng(seed)
         known = unknowns(robot, line, errors, self._rng)
         self._bare, self.robot, self._reads = robot, robot, reads
+        self.warnings = tuple(doubts(robot, line))
         n, d, m = line.count, known.count, robot.legs + 2
         white = known.draws
         if reads:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.json_files.pose import Specimens, WiresUsed
+from wirebayes.notice import Notice
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
@@ -52,7 +53,7 @@ class WireDraws:
         parameters are then the line's. Empty: a stated spread is used.
     specimens : int
         How many were tested.
-    doubts : tuple of str
+    doubts : tuple of Notice
         What the fits say against using them.
     """
 
@@ -68,7 +69,7 @@ class WireDraws:
     others: Mapping[str, "WireDraws"] = field(default_factory=dict)
     spread: Mapping[str, Floats] = field(default_factory=dict)
     specimens: int = 1
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Notice, ...] = ()
 
     @property
     def count(self) -> int:
@@ -295,15 +296,15 @@ def _specimens(line: WireDraws) -> Specimens:
     }
 
 
-def doubts(robot: Robot, line: WireDraws) -> list[str]:
+def doubts(robot: Robot, line: WireDraws) -> list[Notice]:
     """What the fits of the lines that legs hang on say against using them."""
     of_leg = lines_of(robot, line)
     used = {name: one for name, one in line.each.items() if any(leg is one for leg in of_leg)}
-    return [f"wire {name}: {text}" if line.others else text for name, one in used.items() for text in one.doubts]
+    return [doubt.of(f"wire {name}") if line.others else doubt for name, one in used.items() for doubt in one.doubts]
 
 
-def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    """One sentence for each doubt about a line's fit, and for each way in which a use leaves what was tested.
+def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
+    """A warning for each doubt about a line's fit, and for each way in which a use leaves what was tested.
 
     Parameters
     ----------
@@ -319,7 +320,7 @@ def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, ze
 
     Returns
     -------
-    list of str
+    list of Notice
     """
     out = doubts(robot, line)
     if not line.others and not robot.given:
@@ -328,38 +329,41 @@ def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, ze
     for name, one in line.each.items():
         own = np.array([leg is one for leg in of_leg])
         if own.any():  # a wire that the robot's file gives was not tested at all
-            which = f"wire {name}: " if line.others else ""
-            out += [which + text for text in _of_one(one, tension_N[..., own], time_s, zero_m[..., own])]
+            found = _of_one(one, tension_N[..., own], time_s, zero_m[..., own])
+            out += [notice.of(f"wire {name}") for notice in found] if line.others else found
     return out
 
 
-def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    out = []
+def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
+    beyond, dropped = list[str](), list[str]()
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:
         low, high = line.tension_range_N
         if loads.min() < low or loads.max() > high:
-            out.append(
+            beyond.append(
                 f"tensions {loads.min():.3g} to {loads.max():.3g} N leave the tested range {low:.3g} to {high:.3g} N"
             )
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
-        out.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
+        beyond.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
     if lengths.size and (lengths.min() < 0.5 * line.length_mm or lengths.max() > 2.0 * line.length_mm):
         rule = "is taken to be a strain of the whole wire"
         if LENGTH_EXPONENT in line.parameters:
             rule = "grows with length by the exponent fitted to the tested lengths"
-        out.append(
+        beyond.append(
             f"wires of {lengths.min():.0f} to {lengths.max():.0f} mm, tested at {line.length_mm:.0f} mm: creep {rule}"
         )
     kept = line.material()
-    out.extend(
+    dropped.extend(
         f"the robot knows no temperature: the effect {e.name} sees none, as at the first reading of the test"
         for e in kept
         if e.place == "zero_length"
     )
-    dropped = [e.name for e in line.effects if e.scope == "material" and e not in kept]
-    out.extend(f"the material effect {name} has no place in the robot and is left out" for name in dropped)
+    dropped.extend(
+        f"the material effect {e.name} has no place in the robot and is left out"
+        for e in line.effects
+        if e.scope == "material" and e not in kept
+    )
     if any(e.name == "discrepancy" for e in line.effects):
-        out.append("what the fit could not name is not in the robot: its wires follow the named model only")
-    return out
+        dropped.append("what the fit could not name is not in the robot: its wires follow the named model only")
+    return [Notice("extrapolation", text) for text in beyond] + [Notice("left-out", text) for text in dropped]

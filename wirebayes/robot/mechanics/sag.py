@@ -10,6 +10,7 @@ References
 
 import numpy as np
 
+from wirebayes.notice import Notice
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.typing import Floats
@@ -37,7 +38,7 @@ def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -
     return share, share * level * length / 8.0, length * (share * level) ** 2 / 24.0
 
 
-def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[str]:
+def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
     """A sentence on the wire whose own weight matters most, where any does.
 
     Parameters
@@ -51,7 +52,7 @@ def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floa
 
     Returns
     -------
-    list of str
+    list of Notice
         Empty where no wire's weight matters.
     """
     share, depth, extra = sag(robot, position_m, rotation, tension_N)
@@ -60,7 +61,8 @@ def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floa
         return []
     i = int(heavy[np.argmax(extra[heavy])])
     others = f", and {heavy.size - 1} more" if heavy.size > 1 else ""
-    return [
+    text = (
         f"wire {i + 1} weighs {100 * share[i]:.2g} % of its tension{others}: it sags by {1e3 * depth[i]:.2g} mm and is "
         f"{1e3 * extra[i]:.2g} mm longer than the straight line it is taken for"
-    ]
+    )
+    return [Notice("sag", text)]

@@ -17,6 +17,7 @@ from wirebayes.json_files.pose import (
     VarianceShares,
 )
 from wirebayes.json_files.values import Band
+from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.robot.mechanics import draws, drums, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
@@ -74,6 +75,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
             content["sentence"] = (
                 "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
             )
+        content["warnings"] = unheld(content["sentence"])
         return Answer(content, {})
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
@@ -81,6 +83,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     if not commands.feasible.any():
         content["feasible"] = False
         content["sentence"] = "These wires cannot pull as hard as the pose requires, however far stretched."
+        content["warnings"] = unheld(content["sentence"])
         return Answer(content, {})
     rng = np.random.default_rng(request.seed)
     content["inverse"] = _inverse(robot, commands, tau[0])
@@ -103,12 +106,23 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         for spread, course in courses.items()
         for warning in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
     ]
-    content["warnings"] = [*_weak(commands), *falls, *_untested(robot, line, request, commands, tau)]
+    content["warnings"] = to_json([*_weak(commands), *falls, *_untested(robot, line, request, commands, tau)])
     spaces = map_slices(robot, line, request.slices)
     held = [one for one in spaces if len(one.drift.position_m)]
     # the first orientation as a whole, then every slice of each
     content["workspace"] = {**claim.summary(held[0].drift), "slices": summaries(spaces)} if held else None
     return Answer(content, courses, spaces)
+
+
+def unheld(sentence: str) -> list[NoticeJson]:
+    """The only warning of an answer that ends because nothing holds the platform.
+
+    Parameters
+    ----------
+    sentence : str
+        Why.
+    """
+    return to_json([Notice("unheld", sentence[:1].lower() + sentence[1:].rstrip("."))])
 
 
 def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible: bool) -> PoseJson:
@@ -123,6 +137,7 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible:
             "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
         },
         "feasible": feasible,
+        "warnings": [],
     }  # fmt: skip
 
 
@@ -135,25 +150,25 @@ def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> Inv
     return found if robot.drums is None else {**found, **_motors(robot.drums, commands.joint_m)}
 
 
-def _weak(commands: inverse.Commands) -> list[str]:
+def _weak(commands: inverse.Commands) -> list[Notice]:
     weak = 100 * (1 - float(commands.feasible.mean()))
-    warning = f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched"
-    return [warning] if weak > 0 else []
+    text = f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched"
+    return [Notice("unheld", text)] if weak > 0 else []
 
 
 def _untested(
     robot: Robot, line: WireDraws, request: PoseRequest, commands: inverse.Commands, tension_N: Floats
-) -> list[str]:
-    """A sentence for each way in which the pose leaves what was tested or what the model knows."""
+) -> list[Notice]:
+    """A warning for each way in which the pose leaves what was tested or what the model knows."""
     out = draws.warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
     out += sag.warnings(robot, request.position_m, request.rotation, tension_N[0])
     return out if robot.drums is None else out + _emptied(robot.drums, commands.joint_m[commands.feasible])
 
 
-def _emptied(known: Drums, joint_m: Floats) -> list[str]:
-    """A sentence for each wire that is longer than its drum holds."""
+def _emptied(known: Drums, joint_m: Floats) -> list[Notice]:
+    """A warning for each wire that is longer than its drum holds."""
     return [
-        f"wire {i + 1} is longer here than its drum's wire_length_m, {known.wire_m[i]:g} m"
+        Notice("geometry", f"wire {i + 1} is longer here than its drum's wire_length_m, {known.wire_m[i]:g} m")
         for i in drums.emptied(known, joint_m)
     ]
 

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.json_files.pose import FallsReport, Times
+from wirebayes.notice import Notice
 from wirebayes.robot.motion.drift import Course, Falls
 from wirebayes.robot.pose.request import band
 from wirebayes.typing import Floats
@@ -56,8 +57,8 @@ def _nearest(falls: Falls, began: NDArray[np.bool_]) -> int:
     return int(np.bincount(share.argmin(1), minlength=share.shape[1]).argmax())
 
 
-def warnings(course: Course, spread: float, stable: bool = True) -> list[str]:
-    """One sentence for each way in which the platform may lose its hold, the worst first.
+def warnings(course: Course, spread: float, stable: bool = True) -> list[Notice]:
+    """One warning for each way in which the platform may lose its hold, the worst first.
 
     Parameters
     ----------
@@ -67,36 +68,40 @@ def warnings(course: Course, spread: float, stable: bool = True) -> list[str]:
     stable : bool
         Whether the commanded pose is a stable equilibrium at all.
     """
-    found, out = summary(course), []
+    found, out = summary(course), list[Notice]()
     who = f"specimens differing by {100 * spread:g} %" if spread else "specimens alike"
     last = course.times_s[-1]
     if found["began"] < 1:
         reason = "the pose is balanced but not stable" if not stable else "no stable equilibrium is found there"
-        out.append(f"{_percent(1 - found['began'])} of the draws cannot begin at the pose ({who}): {reason}")
+        text = f"{_percent(1 - found['began'])} of the draws cannot begin at the pose ({who}): {reason}"
+        out.append(Notice("fall", text))
     if not found["began"]:
         return out
     times, drop = found["fall_time_s"], found["fall_distance_mm"]
     if times is not None:
         wire = int(np.argmax(found["fall_wires"])) + 1
         fall = f"; it drops {drop['median']:.3g} mm" if drop else "; nothing catches it nearby"
-        out.append(
+        text = (
             f"the platform falls in {_percent(found['fall_probability'])} of the draws within {last:g} s ({who}), "
             f"first after {times['first']:.3g} s, in the median after {times['median']:.3g} s, wire {wire} giving "
             f"way{fall}"
         )
+        out.append(Notice("fall", text))
     slack = [
         f"wire {i + 1} in {_percent(p)} of the draws, first after {t['first']:.3g} s"
         for i, (p, t) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True))
         if t is not None
     ]
     if slack:
-        out.append(f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}")
+        out.append(Notice("slack", f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}"))
     elif (tension := found["least_tension_share"]["q05"]) is not None and tension < NEAR_SLACK:
         left = _percent(float(tension))
-        out.append(f"wire {found['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})")
+        text = f"wire {found['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})"
+        out.append(Notice("slack", text))
     if (stiffness := found["stiffness_share"]["q05"]) is not None and stiffness < NEAR_LOOSE:
         left = _percent(max(float(stiffness), 0.0))
-        out.append(f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})")
+        text = f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})"
+        out.append(Notice("fall", text))
     return out
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import norm
 
 from wirebayes.json_files.calibrate import CalibratedPoses, CalibrateJson, CalibrationPrior, EstimatedLengths, Observed
+from wirebayes.notice import Notice, to_json
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
@@ -20,6 +21,7 @@ CANDIDATES, NEXT = 200, 5
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
 # simulated sessions of every shipped robot it was off by at most 2.7 times their sum.
 _FAR = 10.0
+MISFIT = 1.5  # mean squared residual; of as few as 40 readings that agree, one session in a hundred exceeds it
 
 
 def answer(
@@ -59,7 +61,9 @@ def answer(
         "by_hooke_alone": _lengths(robot, prior, plain),
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed)),
-        "warnings": [*doubts(robot, prior.line), *_contradicted(robot, prior, session, known)],
+        "warnings": to_json(
+            [*_unsure(known, plain), *_contradicted(robot, prior, session, known), *doubts(robot, prior.line)]
+        ),
     }
     return content, calibrated(robot, prior, session, known)
 
@@ -79,8 +83,26 @@ def _poses(robot: Robot, prior: Prior, known: Calibration) -> CalibratedPoses:
     return found
 
 
-def _contradicted(robot: Robot, prior: Prior, session: Session, known: Calibration) -> list[str]:
-    """A sentence for each hold whose requested pose is not where the joint values lead, for any plausible lengths."""
+def _unsure(known: Calibration, plain: Calibration) -> list[Notice]:
+    """That lengths should not be used: the search did not converge, or the model does not explain the readings."""
+    searched = (("the creep model", known), ("Hooke's law alone", plain))
+    astray = [called for called, lengths in searched if not lengths.converged[0]]
+    advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
+    if astray:
+        text = f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}"
+        return [Notice("not-converged", text)]
+    misfit = float(known.misfit[0])
+    if misfit < MISFIT:
+        return []
+    text = (
+        f"the wires cannot explain the readings (mean squared residual {misfit:.3g}, expected about 1): do not use "
+        "these lengths; check --wires, the readings' units and signs, and --tension-sd"
+    )
+    return [Notice("misfit", text)]
+
+
+def _contradicted(robot: Robot, prior: Prior, session: Session, known: Calibration) -> list[Notice]:
+    """A warning for each hold whose requested pose is not where the joint values lead, for any plausible lengths."""
     if not known.converged[0]:
         return []
     shift = np.linalg.norm(known.begun_m[0] - session.position_m, axis=1)
@@ -88,11 +110,12 @@ def _contradicted(robot: Robot, prior: Prior, session: Session, known: Calibrati
     apart = np.maximum(shift, robot.size_m * angle)
     plausible = _FAR * (prior.reference_sd_m + float((known.creep[0] * known.length_m[0]).max()))
     numbers = np.arange(1, len(apart) + 1) if session.number is None else session.number
-    return [
+    texts = [
         f"hold {numbers[i]:g}: the requested pose is {shift[i]:.3g} m and {angle[i]:.2g} rad from the one that its "
         f"joint values lead to, more than errors of the lengths and creep explain ({plausible:.2g} m); check both"
         for i in np.flatnonzero(apart > plausible)
     ]
+    return [Notice("misfit", text) for text in texts]
 
 
 def _lengths(robot: Robot, prior: Prior, known: Calibration) -> EstimatedLengths:

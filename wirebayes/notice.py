@@ -1,0 +1,136 @@
+"""Warnings that a result carries from where they arise to terminal, page and JSON: a kind, and a sentence.
+
+What is advised next and what a page shows first depend on the kinds, never on words in a sentence.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypedDict
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of warning.
+
+    Attributes
+    ----------
+    meaning : str
+        In a sentence.
+    first : bool
+        Whether it changes what the answer is worth: a page shows it before the answer.
+    """
+
+    meaning: str
+    first: bool
+
+
+KINDS = {
+    "model-check": Kind(
+        "The model does not describe the readings it was fitted to: parameters, intervals and all that follows from "
+        "them can be wrong by more than they say.",
+        True,
+    ),
+    "not-converged": Kind("A sampler or a search did not converge: its numbers are not to be used.", True),
+    "misfit": Kind("Readings contradict the model that should explain them by more than their stated errors.", True),
+    "failed": Kind("Something could not be computed at all, for the reason given.", True),
+    "unheld": Kind("No tensions hold the platform at a pose, or not those of every draw.", True),
+    "fall": Kind("The platform falls or loses its hold, or is close to it.", True),
+    "slack": Kind("A wire goes slack, or keeps little of its tension.", True),
+    "gross-error": Kind("A single reading looks wrong, and was set aside where it would have decided.", True),
+    "data": Kind("Readings are not what a bench gives: their order, units, signs or noise.", True),
+    "prior": Kind("The prior decides the answer, or contradicts the readings.", True),
+    "extrapolation": Kind("The answer goes beyond the tensions, times or lengths that were tested.", False),
+    "left-out": Kind("Something that is known of wire or robot has no place in the answer.", False),
+    "geometry": Kind("What is asked does not fit the robot, as more wire than a drum holds.", False),
+    "sag": Kind("A wire's own weight matters, which the statics leaves out.", False),
+    "clock": Kind("It matters when the creep of a moving wire starts anew, which no test of holds shows.", False),
+    "few-draws": Kind("Few posterior draws agree with the readings: the ends of the bands are rough.", False),
+    "budget": Kind("No test fits into the time there is.", False),
+}
+"""The kinds of warnings, gravest first."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A warning.
+
+    Attributes
+    ----------
+    kind : str
+        One of `KINDS`.
+    text : str
+        A sentence without its full stop: what, where, what to change.
+
+    Raises
+    ------
+    ValueError
+        There is no such kind.
+    """
+
+    kind: str
+    text: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"no kind of warning: {self.kind}")
+
+    @property
+    def first(self) -> bool:
+        """Whether a page shows it before the answer."""
+        return KINDS[self.kind].first
+
+    def of(self, name: str) -> "Notice":
+        """The same warning with the name of what it is about before it.
+
+        Parameters
+        ----------
+        name : str
+            Of an experiment, a model or a wire.
+        """
+        return Notice(self.kind, f"{name}: {self.text}")
+
+
+class NoticeJson(TypedDict):
+    """A warning as files hold it."""
+
+    kind: str
+    text: str
+
+
+class Warned(TypedDict):
+    """What every JSON file of results has."""
+
+    warnings: list[NoticeJson]
+
+
+def to_json(notices: Iterable[Notice]) -> list[NoticeJson]:
+    """Warnings as files hold them, the gravest kinds first, each once.
+
+    Parameters
+    ----------
+    notices : iterable of Notice
+    """
+    order = list(KINDS)
+    ranked = sorted(dict.fromkeys(notices), key=lambda notice: order.index(notice.kind))
+    return [{"kind": notice.kind, "text": notice.text} for notice in ranked]
+
+
+def from_json(stored: Sequence[NoticeJson]) -> tuple[Notice, ...]:
+    """Warnings of a file.
+
+    Parameters
+    ----------
+    stored : sequence of dict
+    """
+    return tuple(Notice(entry["kind"], entry["text"]) for entry in stored)
+
+
+def named(parts: Mapping[str, Warned]) -> list[NoticeJson]:
+    """The warnings of several parts of a result, each with the part's name before it.
+
+    Parameters
+    ----------
+    parts : mapping of name to dict
+        Experiments, say; each with its own ``warnings``.
+    """
+    return to_json(notice.of(name) for name, part in parts.items() for notice in from_json(part["warnings"]))
