@@ -56,7 +56,8 @@ EFFECTS = {
     e.name: e
     for e in (
         Effect("strain_stiffening", "material", BOTH, lambda s: 0.45 * s.length_mm / s.stretch_mm, "-"),
-        Effect("toe", "material", UP, lambda s: s.stretch_mm / s.length_mm, "-"),
+        Effect("toe", "material", UP, lambda s: s.stretch_mm, "mm"),
+        Effect("power_strain", "material", BOTH, lambda s: 0.8, "-", shapes={"typical": (0.001, 0.01)}),
         Effect("permanent_creep", "material", UP, lambda s: 1.0, "-"),
         Effect("memory", "material", UP, lambda s: 1.5, "-"),
         Effect(

@@ -40,22 +40,24 @@ def natural_length(bench: Bench, fx: Effects, hold: int, creep: Array, warmth: A
 def tension(k1: Array, stretched: Array, natural: Array, fx: Effects, hold: int) -> Array:
     """Tension (N), shape (n, G), of wires of `stretched` (n, 1) and `natural` (n, G) length in mm; 0 when slack."""
     if not fx.on("fixture_compliance"):
-        return _tension_of_strain(k1, stretched / natural - 1, fx, hold)
+        return _tension_of_strain(k1, stretched / natural - 1, natural, fx, hold)
     give = fx["fixture_compliance"][:, None]
-    answer = _tension_of_strain(k1, stretched / natural - 1, fx, hold)
+    answer = _tension_of_strain(k1, stretched / natural - 1, natural, fx, hold)
     for _ in range(60):  # damped fixed point: the fixture gives way under the very tension sought
         slope = k1[:, None] / natural
-        answer = answer + (_tension_of_strain(k1, (stretched - give * answer) / natural - 1, fx, hold) - answer) / (
-            1 + give * slope
-        )
+        nearer = _tension_of_strain(k1, (stretched - give * answer) / natural - 1, natural, fx, hold)
+        answer = answer + (nearer - answer) / (1 + give * slope)
     return answer
 
 
-def _tension_of_strain(k1: Array, strain: Array, fx: Effects, hold: int) -> Array:
+def _tension_of_strain(k1: Array, strain: Array, natural: Array, fx: Effects, hold: int) -> Array:
     s = np.maximum(strain, 0.0)
-    if fx.on("toe"):
-        c = np.maximum(fx["toe"][:, None], 1e-12)
-        s = s - c * -np.expm1(-s / c)
+    if fx.on("toe"):  # millimetres of the ends that straighten, whatever the sample's length
+        width = np.maximum(fx["toe"][:, None], 1e-12)
+        s = s - width / natural * -np.expm1(-s * natural / width)
+    if fx.on("power_strain"):
+        typical = fx.shape("power_strain.typical")[:, None]
+        s = typical * (s / typical) ** (1 + fx["power_strain"][:, None])
     stiffness = k1[:, None]
     if fx.on("hold_softening"):
         stiffness = stiffness * (1 - fx["hold_softening"][:, None] * hold)

@@ -57,7 +57,7 @@ def test_priors_of_a_chain_are_those_of_single_effects(monkeypatch: pytest.Monke
 def test_information_on_amplitudes_is_that_of_a_regression_beside_everything_else() -> None:
     """Against the dense covariance of the readings; other parameters eliminated with their priors."""
     effects = [named("toe"), named("sensor_nonlinearity")]
-    truth = Truth(WIRE | {"toe.c": 0.001, "sensor_nonlinearity.a": 0.004}, effects)
+    truth = Truth(WIRE | {"toe.w": 1.0, "sensor_nonlinearity.a": 0.004}, effects)
     block = fitted(simulated_tests([Bench()], truth, seed=3), effects, "hooke", "saturating", np.random.default_rng(0))
     target, problem, sample = block.target, block.target.problem, block.target.problem.samples[0]
     z, names = block.modes.z[:1], block.target.problem.names

@@ -62,7 +62,7 @@ def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
 
 
 def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
-    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
+    experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [named("toe")])
     found = answer(experiments)
     assert found["best"] == "toe" and found["effects"][0] == "toe" and "toe" in found["set"]
     size = found["amplitudes"]["toe"]
@@ -91,7 +91,7 @@ def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_
 def test_two_effects_are_both_named_and_each_step_closes_some_of_the_gap(tmp_path: Path) -> None:
     effects = [named("toe"), named("lost_motion")]
     bench = Bench(displacements_mm=UP_AND_DOWN)
-    found = answer(made(tmp_path, [bench], {"toe.c": 0.0015, "lost_motion.w": 0.08}, effects))
+    found = answer(made(tmp_path, [bench], {"toe.w": 1.5, "lost_motion.w": 0.08}, effects))
     assert found["verdict"] == "named" and found["effects"] == found["accepted"] == ["toe", "lost_motion"]
     assert (
         min(found["inclusion"][name] for name in found["effects"]) > 0.9 and found["remainder"]["probability"] < REMAINS
@@ -124,7 +124,7 @@ def test_what_has_a_name_is_named_beside_what_has_none(tmp_path: Path) -> None:
 def test_findings_do_not_depend_on_how_many_processes_there_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    experiments = made(tmp_path, [Bench()], {"toe.c": 0.0015}, [named("toe")])
+    experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [named("toe")])
     kinds = {name: CATALOGUE[name] for name in ("toe", "memory", "steady_creep")}
     reports = []
     for cores in (1, 2):
@@ -246,7 +246,7 @@ def test_an_unknown_name_is_refused() -> None:
 def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp_path: Path) -> None:
     """Projected length at the fitted noise, against generalised least squares written out."""
     block = fitted(
-        made(tmp_path, [Bench()], {"toe.c": 0.001}, [named("toe")]), (), "hooke", "saturating", np.random.default_rng(0)
+        made(tmp_path, [Bench()], {"toe.w": 1.0}, [named("toe")]), (), "hooke", "saturating", np.random.default_rng(0)
     )
     trials = linear_scan.probes(named("strain_stiffening"))
     x = linear_scan.expand(block.target, block.modes.z[:1], trials)

@@ -28,7 +28,7 @@ def plain_fit(bench: Bench, truth: dict[str, float], names: tuple[str, ...]) -> 
     ("truth", "bench"),
     [
         ({"strain_stiffening.c": 6.0, "memory.omega": 0.5}, Bench(displacements_mm=UP_AND_DOWN)),
-        ({"toe.c": 0.001, "sensor_nonlinearity.a": 0.004}, Bench()),
+        ({"toe.w": 1.0, "sensor_nonlinearity.a": 0.004}, Bench()),
     ],
 )
 def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], bench: Bench) -> None:
@@ -55,7 +55,7 @@ def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() ->
     """Against the dense covariance of readings that hold the remainder as noise, its size and the noise's known."""
     from wirebayes.discovery import linear_scan, smooth_credit
 
-    block = plain_fit(Bench(), {"toe.c": 0.001}, ("toe",))[0]
+    block = plain_fit(Bench(), {"toe.w": 1.0}, ("toe",))[0]
     trials, _ = screening.candidate_probes([block], {"toe": CATALOGUE["toe"]})
     x = expand(block.target, block.modes.z[:1], trials)
     ratio, size = 10.0, 8.0

@@ -52,7 +52,7 @@ def test_all_effects_together_at_their_neutral_values_are_the_plain_model_to_the
 
 
 STRENGTH = {
-    "strain_stiffening": {"c": 30.0}, "toe": {"c": 0.001}, "fixture_compliance": {"c": 0.1},
+    "strain_stiffening": {"c": 30.0}, "toe": {"w": 1.5}, "power_strain": {"p": 0.4}, "fixture_compliance": {"c": 0.1},
     "thermal_expansion": {"alpha": 1e-4}, "length_dependence": {"p": 0.5}, "permanent_creep": {"psi": 0.6},
     "memory": {"omega": 0.7}, "second_relaxation": {"A": 0.05, "T2": 40.0}, "steady_creep": {"a": 5e-4},
     "tension_dependent_rate": {"m": 0.8}, "ageing": {"a": 0.5}, "creep_threshold": {"tau_c": 1.0},
@@ -77,7 +77,7 @@ def chain(goal=None, share=None, strain=None, zero=None, drive=None, offset=None
         def tension(e, i, j=j, s0=s0):
             ell = (1000.0 + e) if zero is None else zero(1000.0 + e, j, i)
             s = s0 / ell - 1.0
-            return t["k1"] * max(s if strain is None else strain(s), 0.0)
+            return t["k1"] * max(s if strain is None else strain(s, ell), 0.0)
 
         first = tension(carried, 0)
         driving = first if drive is None else drive(first)
@@ -98,10 +98,14 @@ def chain(goal=None, share=None, strain=None, zero=None, drive=None, offset=None
 k2, N = PLAIN["k2"], PLAIN["N"]
 DIRECTION = [1, 1, 1, -1, 1]
 FORMULAS = {
-    "strain_stiffening": lambda: chain(strain=lambda s: s * (1 + 30 * s)),
-    "toe": lambda: chain(strain=lambda s: s - 0.001 * (1 - np.exp(-max(s, 0) / 0.001))),
+    "strain_stiffening": lambda: chain(strain=lambda s, ell: s * (1 + 30 * s)),
+    "toe": lambda: chain(strain=lambda s, ell: (s * ell - 1.5 * (1 - np.exp(-max(s, 0) * ell / 1.5))) / ell),
+    # k1 is the stiffness at the reference tension
+    "power_strain": lambda: chain(
+        strain=lambda s, ell: REFERENCE / PLAIN["k1"] * (max(s, 0) * PLAIN["k1"] / REFERENCE) ** 1.4
+    ),
     # a spring of 0.1 mm/N in series: τ = k1 (S - 0.1 τ - ℓ) / L0, solved for τ
-    "fixture_compliance": lambda: chain(strain=lambda s: s / (1 + 0.1 * PLAIN["k1"] / 1000.0)),
+    "fixture_compliance": lambda: chain(strain=lambda s, ell: s / (1 + 0.1 * PLAIN["k1"] / 1000.0)),
     "thermal_expansion": lambda: chain(zero=lambda ell, j, i: ell * (1 + 1e-4 * WARMING[j, i])),
     "length_dependence": lambda: plain(k1=PLAIN["k1"] * (1000.0 / LENGTH_REF) ** 0.5),
     "permanent_creep": lambda: chain(goal=lambda a, e, j: a + 0.6 * e),
@@ -233,7 +237,7 @@ class HenckyStrain(Effect):
 def test_a_user_s_own_effect_elastic_law_and_time_law_need_no_change_here():
     assert readings({"softening.d": 0.1}, Softening())[0] == pytest.approx(plain()[0], rel=1e-14)
     assert readings({"softening.d": 0.1}, Softening())[2, 0] < 0.81 * plain()[2, 0]
-    expected = chain(strain=np.log1p)
+    expected = chain(strain=lambda s, ell: np.log1p(s))
     assert readings({"hencky.on": 1.0}, HenckyStrain()) == pytest.approx(expected, rel=1e-12)
     expected = chain(share=lambda t, j, first: np.log1p(k2 * t))
     assert readings({"logarithmic_time.on": 1.0}, LogarithmicTime()) == pytest.approx(expected, rel=1e-12)

@@ -99,6 +99,25 @@ def test_memory_lets_earlier_clocks_run_on():
     assert y[3:] == pytest.approx(wire.k1 * (1002.8 / (1000.0 + creep + more) - 1), abs=1e-6)
 
 
+def test_a_toe_is_as_long_on_a_long_sample():
+    """What pulls of a stretch x is x - w (1 - e^(-x / w)), on 1 m as on 3 m, where nothing creeps."""
+    stretch = np.repeat(np.array([1, 2, 3, 4]) + 0.3, 2)
+    pulls = stretch - 0.8 * (1 - np.exp(-stretch / 0.8))
+    for length in (1000.0, 3000.0):
+        rig = one_wire((1, 2, 3, 4), (0.0, 30.0), dataclasses.replace(ROC, B=1e-12), length=length)
+        candidate = draw(EFFECTS["toe"], rig, np.random.default_rng(0))
+        y = simulate(rig, members=members(rig, [[(candidate, 0.8)]]))[0]
+        assert y == pytest.approx(ROC.k1 * pulls / length, rel=1e-9)
+
+
+def test_a_power_of_the_strain_is_one_beside_the_stiffness():
+    rig = one_wire((1, 2, 3, 4), (0.0, 30.0), dataclasses.replace(ROC, B=1e-12))
+    candidate = draw(EFFECTS["power_strain"], rig, np.random.default_rng(0))
+    y = simulate(rig, members=members(rig, [[(candidate, 0.3)]]))[0]
+    power = 1 + candidate.sign * 0.3
+    assert y / y[0] == pytest.approx(((np.repeat([1, 2, 3, 4], 2) + 0.3) / 1.3) ** power, rel=1e-9)
+
+
 def test_instrument_effects_act_on_the_reading():
     rig = one_wire()
     plain = simulate(rig)[0]

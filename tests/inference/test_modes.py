@@ -171,7 +171,7 @@ def _one_time_constant(data):
         problem = build([experiment])
         return replace(problem, prior=_with_n_fixed(problem.prior))
     bench = Bench(length_mm=1500.0)
-    truth = {"k1": 1550.0, "B": 0.56, "U": 1.1, "k2": 0.032, "N": 0.58, "toe.c": 0.0019, "preload": 3.2}
+    truth = {"k1": 1550.0, "B": 0.56, "U": 1.1, "k2": 0.032, "N": 0.58, "toe.w": 2.85, "preload": 3.2}
     made = draw([bench], Truth(truth | {"setting_sd": 0.015, "sensor_sd": 0.0057}, effects=(named("toe"),)), seed=data)
     problem = build([bench.experiment()])
     seen = with_readings(problem, [s.readings for s in made.problem.samples])

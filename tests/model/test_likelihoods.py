@@ -62,7 +62,7 @@ SINGLE_STATE = [
     "guide_friction", "thermal_expansion",
 ]  # fmt: skip
 STRONG = {
-    "strain_stiffening.c": 20.0, "toe.c": 5e-4, "permanent_creep.psi": 0.6, "tension_dependent_rate.m": 0.5,
+    "strain_stiffening.c": 20.0, "toe.w": 0.5, "permanent_creep.psi": 0.6, "tension_dependent_rate.m": 0.5,
     "ageing.a": 0.3, "creep_threshold.tau_c": 0.7, "grip_slip.w": 0.2, "unrecorded_hold.T": 90.0,
     "reading_delay.t_d": 4.0, "sensor_drift.a": 1e-4, "sensor_nonlinearity.a": 0.01, "clamp_transient.a": 0.03,
     "clamp_transient.T": 10.0, "lost_motion.w": 0.1, "guide_friction.mu": 0.03, "thermal_expansion.alpha": 1e-5,

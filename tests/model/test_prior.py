@@ -93,7 +93,7 @@ NORMAL = {"distribution": "normal", "sd": 0.01}
 def test_a_prior_of_what_is_never_negative_has_no_values_below_zero(name, table, message):
     with pytest.raises(InputError, match=message):
         possible(f"prior.{name}", name, from_table(f"prior.{name}", table))
-    for free in ("preload", "U", "toe.c"):
+    for free in ("preload", "U", "toe.w"):
         assert possible("prior", free, from_table("prior", NORMAL | {"mean": -3.0})).mean() == -3.0
 
 

@@ -386,7 +386,7 @@ def test_the_page_of_an_export_shows_the_creep_and_leads_to_the_files(tmp_path):
 
 def test_the_page_of_a_simulation_tells_the_truth(tmp_path):
     out = tmp_path / "out"
-    assert main(["simulate", "--effect", "toe.c=0.002", "--parameter", "k1=712", "--output", str(out)]) == 0
+    assert main(["simulate", "--effect", "toe.w=2", "--parameter", "k1=712", "--output", str(out)]) == 0
     page = read(write(out))
     assert "Beyond the plain model: toe." in page.words
     assert "712" in page.words and "0.00200" in page.words

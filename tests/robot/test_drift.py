@@ -49,7 +49,9 @@ def _bench_with_the_robots_wire(line, displacement_mm, duration_s, follow):
     [
         None,
         ("strain_stiffening", {"strain_stiffening.c": 8.0}),
-        ("toe", {"toe.c": 4e-4}),
+        ("toe", {"toe.w": 0.4}),
+        ("toe@strain", {"toe.w": 0.4}),
+        ("power_strain", {"power_strain.p": 0.3}),
         ("permanent_creep", {"permanent_creep.psi": 0.3}),
         ("second_relaxation", {"second_relaxation.A": 0.02, "second_relaxation.T2": 25.0}),
         ("steady_creep", {"steady_creep.a": 1e-4}),

@@ -20,7 +20,9 @@ from wirebayes.robot.motion import inverse
 CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
 BENT = [
     ("hooke", "strain_stiffening", {"strain_stiffening.c": 15.0}),
-    ("hooke", "toe", {"toe.c": 0.004}),
+    ("hooke", "toe", {"toe.w": 4.0}),
+    ("modified", "toe", {"toe.w": 4.0}),
+    ("hooke", "power_strain", {"power_strain.p": 0.3}),
     ("modified", None, {}),
     ("modified", "strain_stiffening", {"strain_stiffening.c": 15.0}),
 ]

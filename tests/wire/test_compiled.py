@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.creep import Memory, SteadyCreepCarried
-from wirebayes.effects.elastic import LengthDependence, StrainStiffening
+from wirebayes.effects.elastic import LengthDependence, StrainStiffening, ToeOfStrain
 from wirebayes.effects.instrument import ReadingDelay
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.transform import LogPosterior
@@ -32,7 +32,11 @@ ONE_WAY = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
 
 def forms() -> list[Effect]:
     """Every form of every effect of the catalogue, events at two holds."""
-    out: list[Effect] = [SteadyCreepCarried(), *(LengthDependence(which) for which in ("k1", "B", "U", "N"))]
+    out: list[Effect] = [
+        SteadyCreepCarried(),
+        ToeOfStrain(),
+        *(LengthDependence(which) for which in ("k1", "B", "U", "N")),
+    ]
     for kind in CATALOGUE.values():
         if issubclass(kind, EventEffect):
             out += [kind(hold=1), kind(hold=3)]

@@ -77,13 +77,21 @@ def at_once(s):
     return brentq(lambda e: e + B * (k1 * e) ** U / 1000.0 - s, 0.0, s, xtol=1e-18, rtol=1e-15) if s > 0 else s
 
 
-# Effects that bend the strain.
+# Effects that bend the strain, of a wire of a stretched length where that matters.
 STRAIN = {
     "strain_stiffening": lambda s: s * (1 + 30 * s),
-    "toe": lambda s: s - 0.001 * (1 - np.exp(-s / 0.001)),
+    "toe@strain": lambda s: s - 0.0015 * (1 - np.exp(-s / 0.0015)),
+    "power_strain": lambda s: REFERENCE / k1 * (s * k1 / REFERENCE) ** 1.4,
     "hencky": np.log1p,
     "at_once": at_once,
 }
+
+
+def toe(s, stretched, law):
+    """1.5 mm straighten first; the strain of eq (1) is of the zero-tension length, that of eq (3) of the stretched."""
+    zero = stretched / (1.0 + s) if law == "hooke" else stretched * (1.0 - s)
+    pulls = stretched - zero - 1.5 * (1 - np.exp(-(stretched - zero) / 1.5))
+    return pulls / (zero if law == "hooke" else stretched)
 
 
 def _catalogue():
@@ -118,9 +126,9 @@ def formula(key):
     return CREEP.get(key, eq5)
 
 
-def strain_at(key, tension, law):
-    """Strain, by the law's own formula, at which the wire pulls with a tension."""
-    curve = STRAIN.get(key, lambda s: s)
+def strain_at(key, tension, law, stretched):
+    """Strain, by the law's own formula, at which the wire of a stretched length pulls with a tension."""
+    curve = (lambda s: toe(s, stretched, law)) if key == "toe" else STRAIN.get(key, lambda s: s)
     return brentq(lambda s: k1 * curve(s) - tension, 0.0, 0.5, xtol=1e-17, rtol=1e-15)
 
 
@@ -176,8 +184,8 @@ def test_a_bench_that_begins_at_the_tension_shows_the_same_creep_and_stiffness(k
     preload = brentq(lambda d: readings(d)[0] - LOAD, 0.0, 60.0, xtol=1e-13, rtol=1e-15)
     measured = readings(preload)
     assert measured.min() > 0
-    strains = np.array([strain_at(key, reading * k1 / stiffness, law) for reading in measured])
     stretched = 1000.0 + preload
+    strains = np.array([strain_at(key, reading * k1 / stiffness, law, stretched) for reading in measured])
     zero = stretched / (1.0 + strains) if law == "hooke" else stretched * (1.0 - strains)
     crept = wire.creep_mm(LOAD, held.time_s[0])[:, 0]
     assert zero - 1000.0 == pytest.approx(crept, rel=1e-9, abs=1e-9)

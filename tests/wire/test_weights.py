@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.special import lambertw
 
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols, weights_by_hand
 from tests.wire.test_compiled import FORMS, LAWS_OF_CREEP, by_numpy, drawn, models, same
@@ -57,7 +58,8 @@ def test_compiled_readings_and_derivatives_are_those_of_numpy(p, model, rows, se
     same(alone[..., usual], other[..., usual], 1e3)
 
 
-ELASTIC = ["strain_stiffening", "toe", "fixture_compliance", "thermal_expansion", "grip_slip@2", "length_dependence@k1"]
+ELASTIC = ["strain_stiffening", "toe", "toe@strain", "power_strain", "fixture_compliance", "thermal_expansion",
+           "grip_slip@2", "length_dependence@k1"]  # fmt: skip
 
 
 @pytest.mark.parametrize("law", ["hooke", "modified"])
@@ -136,6 +138,16 @@ def test_a_wire_that_cannot_carry_the_weight_has_no_length(compiled_kernel, monk
     p = protocol([749.0, 751.0], [TIMES] * 2, control="force")
     lengths = simulate(p, softening, Model(effects=(CATALOGUE["strain_stiffening"](),)))
     assert np.isfinite(lengths[0]).all() and np.isnan(lengths[1]).all()
+
+
+@given(st.floats(0.01, 40.0), st.floats(1e-3, 50.0))
+def test_a_toe_under_a_weight_is_lambert_s_w(weight, width):
+    theta = columns(**(PLAIN | {"B": 1e-300, "preload": 0.0, "toe.w": width}))
+    found = simulate(protocol([weight], [TIMES], control="force"), theta, Model(effects=(named("toe"),)))
+    pulls = 1000.0 * weight / PLAIN["k1"]
+    expected = pulls + width * (1.0 + lambertw(-np.exp(-1.0 - pulls / width)).real)
+    # W loses half the digits near its branch
+    assert found[..., 0] == pytest.approx(np.full((1, 4), expected), rel=1e-6)
 
 
 @given(st.floats(1e-6, 1e3), st.floats(1e-5, 10.0), st.floats(-2.0, 50.0))

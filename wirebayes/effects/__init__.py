@@ -15,6 +15,7 @@ CATALOGUE: dict[str, type[Effect]] = {
     for effect in (
         elastic.Toe,
         elastic.StrainStiffening,
+        elastic.PowerStrain,
         elastic.FixtureCompliance,
         elastic.ThermalExpansion,
         elastic.LengthDependence,
@@ -109,8 +110,9 @@ def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
         if variant not in ("k1", "B", "U", "N"):
             raise InputError(f"effect {key}: name the parameter as in {name}@k1 (one of k1, B, U, N)")
         return kind(which=variant)
-    if kind is creep.SteadyCreep and variant == "carried":
-        return creep.SteadyCreepCarried()
+    for form in (creep.SteadyCreepCarried(), elastic.ToeOfStrain()):
+        if key == form.key:
+            return form
     if variant:
         raise InputError(f"effect {key}: {name} takes no '@'")
     return kind()

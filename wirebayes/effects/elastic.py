@@ -1,7 +1,7 @@
 """Effects on the elastic side: strain, zero-tension length, stiffness of the fixture, length of the sample."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,25 +31,78 @@ class StrainStiffening(Effect):
 
 
 class Toe(Effect):
-    """s -> s - c (1 - exp(-s / c)): the line straightens before it pulls."""
+    """The ends straighten first: of a stretch x, x - w (1 - exp(-x / w)) pulls.
+
+    A length of the ends and knots, the same for every sample of a line however long. The inverse is by Lambert's W:
+    x = y + w (1 + W(-exp(-1 - y / w))) for what pulls, y.
+    """
 
     name = "toe"
     place = "strain"
     formula = "toe"
     scope = "material"
-    amplitudes = (Amplitude("c", "-", 0.0, stats.halfnorm(0.0, 0.002)),)
-    sentence = "At low tension the line is still straightening out and pulls less than its stiffness implies."
+    # a few steps of a test are enough to straighten ends and knots; as much as that is seen on short samples of rope
+    amplitudes = (Amplitude("w", "mm", 0.0, stats.halfnorm(0.0, 2.0)),)
+    sentence = "At low tension the ends are still straightening out and the line pulls less than its stiffness implies."
     shows = "deficit at low tension only"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
-        width = own["c"]
-        safe = np.where(width > 0, width, 1.0)
-        straight = np.where(width > 0, -np.expm1(-np.maximum(value.real, 0.0) / safe), 0.0)
-        shortened = value.real - width * straight
-        if not np.iscomplexobj(value):
-            return shortened
-        # The derivative written out: a complex exponential costs ten real ones.
-        return shortened + 1j * value.imag * np.where(width > 0, straight, 1.0)
+        strained = hold.zero_mm if hold.law == "hooke" else hold.zero_mm / (1.0 - value)
+        return value - own["w"] * _straightened(value * strained, own["w"]) / strained
+
+    @classmethod
+    def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
+        """As a strain only where two lengths could say so: at one length it is the same."""
+        return [Toe(), ToeOfStrain()] if _two_lengths(protocols) else [Toe()]
+
+
+class ToeOfStrain(Effect):
+    """The same as a strain: the whole line straightens, s -> s - c (1 - exp(-s / c)) with c = w / L0."""
+
+    name = "toe"
+    place = "strain"
+    formula = "toe_of_strain"
+    scope = "material"
+    amplitudes = (replace(Toe.amplitudes[0], is_elongation=True),)
+    sentence = (
+        "At low tension the line is still straightening out, all along, and pulls less than its stiffness implies."
+    )
+    shows = "deficit at low tension only, in proportion to the length"
+
+    @property
+    def key(self) -> str:
+        return f"{self.name}@strain"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value - own["w"] * _straightened(value * hold.length_mm, own["w"]) / hold.length_mm
+
+
+def _straightened(stretch_mm: NDArray[Any], width_mm: NDArray[Any]) -> NDArray[Any]:
+    """Share of its width that a toe has straightened by at a stretch."""
+    bent = (width_mm.real > 0) & (stretch_mm.real > 0)
+    ratio = np.where(bent, stretch_mm, 0.0) / np.where(bent, width_mm, 1.0)
+    share = -np.expm1(-ratio.real)
+    # the derivative written out: a complex exponential costs ten real ones
+    return share + 1j * ratio.imag * (1.0 - share) if np.iscomplexobj(ratio) else share
+
+
+class PowerStrain(Effect):
+    """τ = k1 s^(1 + p), strain s in units of the typical one, τref / k1: so k1 stays the stiffness at τref."""
+
+    name = "power_strain"
+    place = "strain"
+    formula = "power"
+    scope = "material"
+    # tendons and braids follow powers of 1.2 to 2, plastics below their yield nearly 1, rubber less; at p = -1 the
+    # tension would not depend on the strain
+    amplitudes = (Amplitude("p", "-", 0.0, stats.truncnorm(-3.0, np.inf, loc=0.0, scale=0.3)),)
+    sentence = "The tension follows a power of the strain."
+    shows = "curved in displacement, most at low tension; constant within a hold"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        stretched = value.real > 0
+        typical = hold.tension_ref_N / hold.theta["k1"]
+        return value * np.power(np.where(stretched, value / typical, 1.0), own["p"])
 
 
 class FixtureCompliance(Effect):

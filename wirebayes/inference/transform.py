@@ -385,7 +385,7 @@ class Transformation:
                 continue
             if effect.in_series and "k1" in ridge.shifted:
                 ridge = replace(ridge, fixture=amount)
-            elif effect.amplitudes[0].is_elongation and "B" in ridge.shifted:
+            elif effect.amplitudes[0].is_elongation and effect.place != "strain" and "B" in ridge.shifted:
                 others = {
                     a.name: names.index(c) if c in names else fixed[c]
                     for a, c in zip(effect.amplitudes[1:], columns[1:], strict=True)

@@ -16,12 +16,12 @@ MOST_EFFECTS = _MOST_EFFECTS
 
 # In the order of `FORMULAS`.
 cdef enum Formula:
-    STIFFENING, TOE, SERIES, THERMAL, LENGTH_POWER, PERMANENT, MEMORY, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
+    STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, THERMAL, LENGTH_POWER, PERMANENT, MEMORY, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
     AGEING, THRESHOLD, SLIP, WAIT, DELAY, DRIFT, SQUARE, TRANSIENT, LOST_MOTION, FRICTION
     AT_ONCE, NOT_IN_TIME, LOGARITHMIC, POWER_OF_TIME, TWO_MODES
 
 FORMULAS = (
-    "stiffening", "toe", "series", "thermal", "length_power", "permanent", "memory", "second_mode", "flow",
+    "stiffening", "toe", "toe_of_strain", "power", "series", "thermal", "length_power", "permanent", "memory", "second_mode", "flow",
     "flow_carried", "rate_power", "ageing", "threshold", "slip", "wait", "delay", "drift", "square", "transient",
     "lost_motion", "friction", "at_once", "not_in_time", "logarithmic", "power_of_time", "two_modes",
 )
@@ -55,6 +55,15 @@ cdef inline Dual times(Dual x, double a) noexcept nogil:
 
 cdef inline Dual product(Dual x, Dual y) noexcept nogil:
     return Dual(x.v * y.v, x.s * y.v + x.v * y.s, x.c * y.v + x.v * y.c)
+
+
+cdef inline Dual minus(Dual x, Dual y) noexcept nogil:
+    return Dual(x.v - y.v, x.s - y.s, x.c - y.c)
+
+
+cdef inline Dual quotient(Dual x, Dual y) noexcept nogil:
+    cdef double out = x.v / y.v
+    return Dual(out, (x.s - out * y.s) / y.v, (x.c - out * y.c) / y.v)
 
 
 cdef inline Dual through(Dual x, double value, double slope) noexcept nogil:
@@ -109,6 +118,13 @@ cdef inline Dual zero_of(Wire* wire, Hold* hold, Dual elongation, double warming
     return zero
 
 
+cdef inline Dual without_toe(Dual strain, double width_mm, Dual strained_mm) noexcept nogil:
+    """What pulls of a strain of a length of which a toe straightens first."""
+    cdef Dual stretch = product(strain, strained_mm)
+    cdef double share = -expm1(-stretch.v / width_mm)
+    return minus(strain, quotient(through(stretch, width_mm * share, 1.0 - share), strained_mm))
+
+
 cdef inline Dual bent(Wire* wire, Dual out, Dual zero) noexcept nogil:
     """A strain after all effects on it."""
     cdef double share, width
@@ -119,10 +135,15 @@ cdef inline Dual bent(Wire* wire, Dual out, Dual zero) noexcept nogil:
             width = wire.own[e][0]
             out = through(out, out.v * (1.0 + width * out.v), 1.0 + 2.0 * width * out.v)
         elif wire.formula[e] == TOE:
-            width = wire.own[e][0]
-            if width > 0:
-                share = -expm1(-fmax(out.v, 0.0) / width)
-                out = through(out, out.v - width * share, share)
+            if wire.own[e][0] > 0 and out.v > 0:
+                out = without_toe(out, wire.own[e][0], quotient(zero, minus(constant(1.0), out)) if wire.modified else zero)
+        elif wire.formula[e] == TOE_OF_STRAIN:
+            if wire.own[e][0] > 0 and out.v > 0:
+                out = without_toe(out, wire.own[e][0], constant(wire.length_mm))
+        elif wire.formula[e] == POWER:
+            if out.v > 0:
+                share = pow(out.v * wire.k1 / wire.tension_ref_N, wire.own[e][0])
+                out = through(out, out.v * share, (1.0 + wire.own[e][0]) * share)
         elif wire.formula[e] == SERIES:
             out = times(out, 1.0 / (1.0 + wire.own[e][0] * wire.k1 / wire.length_mm))
         elif wire.formula[e] == AT_ONCE and out.v > 0:
@@ -373,7 +394,7 @@ cdef class Law:
             self.formula[e] = FORMULAS.index(name)
             self.amplitudes[e], self.number[e] = amplitudes, number
         self.choose(&self.at.zero, (THERMAL, SLIP))
-        self.choose(&self.at.strain, (STIFFENING, TOE, SERIES, AT_ONCE))
+        self.choose(&self.at.strain, (STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, AT_ONCE))
         self.choose(&self.at.creep, (MEMORY, FLOW_CARRIED))
         self.choose(&self.at.beside, (SECOND_MODE, FLOW))
         self.choose(&self.at.guide, (FRICTION,))

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.wire.laws import ElasticLaw
 from wirebayes.wire.protocol import Control, Protocol
 
 Place = Literal[
@@ -89,6 +90,8 @@ class HoldContext:
         Zero-tension length at the times of the hold, for effects on the strain.
     past : list of (start_s, amount, k2)
         The clocks of earlier holds.
+    law : {"hooke", "modified"}
+        Which strain it is that effects on it change.
     """
 
     index: int
@@ -109,6 +112,7 @@ class HoldContext:
     carried: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     zero_mm: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     past: list[tuple[float, NDArray[Any], NDArray[Any]]] = field(default_factory=list)
+    law: ElasticLaw = "hooke"
 
     def carrying(self, carried: NDArray[Any]) -> "HoldContext":
         """The same hold with other creep carried into it, (1, n)."""
@@ -242,6 +246,7 @@ def steady_hold(
     length_mm: Any,
     tension_ref_N: float,
     *,
+    law: ElasticLaw = "hooke",
     length_ref_mm: Any = None,
     index: int = 0,
     start_s: float = 0.0,
@@ -257,6 +262,7 @@ def steady_hold(
     length_mm, length_ref_mm : float or array
         The reference is the length itself when left out.
     tension_ref_N : float
+    law : {"hooke", "modified"}
     index, start_s : int, float
         Number of earlier holds, and the time since the first of them began.
     tension_N, carried_mm : array, optional
@@ -280,6 +286,8 @@ def steady_hold(
         theta=dict(theta),
         initial_tension=zero if tension_N is None else tension_N,
         carried=zero if carried_mm is None else carried_mm,
+        zero_mm=np.full((1, 1), 1.0) * length_mm,
+        law=law,
     )
 
 

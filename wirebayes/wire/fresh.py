@@ -82,7 +82,7 @@ class FreshSample:
 
     def _context(self, theta: Theta) -> HoldContext:
         reference = self.model.length_ref_mm or self.length_mm
-        return steady_hold(theta, self.length_mm, self.model.tension_ref_N, length_ref_mm=reference)
+        return steady_hold(theta, self.length_mm, self.model.tension_ref_N, law=self.model.law, length_ref_mm=reference)
 
     def _hold(self, tension_N: float, time_s: Array) -> HoldContext:
         theta = self._wire[1]

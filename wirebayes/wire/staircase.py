@@ -356,6 +356,7 @@ class Walk:
             initial_tension=_NONE,
             carried=_NONE,
             past=self.past,
+            law=self.model.law,
         )
 
 

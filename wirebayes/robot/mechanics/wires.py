@@ -15,6 +15,7 @@ from wirebayes.wire import laws
 from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.effect import Effect, HoldContext, Placed, steady_hold
 from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.inverse import inverse
 from wirebayes.wire.staircase import Model
 
 # nodes and weights exact for polynomials of degree 15; between slack and stretched the laws are smooth
@@ -94,6 +95,7 @@ def hold_context(
         wires.theta,
         length,
         wires.tension_ref_N,
+        law=wires.law,
         index=hold,
         start_s=clock_s,
         tension_N=tension_N,
@@ -101,9 +103,16 @@ def hold_context(
     )
 
 
-def bent_strain(wires: Wires, strain: Floats) -> tuple[Floats, Floats]:
-    """Effective strain whose product with k1 is the tension, and its slope by the strain."""
-    return bent(wires.placed, strain, hold_context(wires))
+def bent_strain(wires: Wires, strain: Floats, zero_m: Floats) -> tuple[Floats, Floats]:
+    """Effective strain whose product with k1 is the tension, and its slope by the strain, at a zero-tension length."""
+    return bent(wires.placed, strain, _hold_at(wires, zero_m))
+
+
+def _hold_at(wires: Wires, zero_m: Floats) -> HoldContext:
+    """A hold in which the wires have these zero-tension lengths."""
+    hold = hold_context(wires)
+    hold.zero_mm = 1e3 * zero_m
+    return hold
 
 
 def tension(wires: Wires, stretched_m: Floats, zero_m: Floats) -> tuple[Floats, Floats]:
@@ -126,7 +135,7 @@ def tension(wires: Wires, stretched_m: Floats, zero_m: Floats) -> tuple[Floats, 
         strain, slope = 1.0 - ratio, ratio / stretched_m
     k1 = wires.theta["k1"]
     if wires.at("strain"):
-        strain, bend = bent_strain(wires, strain)
+        strain, bend = bent_strain(wires, strain, zero_m)
         slope = slope * bend
     taut = strain > 0
     return k1 * np.where(taut, strain, 0.0), k1 * np.where(taut, slope, 0.0)
@@ -170,10 +179,23 @@ def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) ->
     """
     goal = tension_N / wires.theta["k1"]
     effective = goal + np.zeros(np.broadcast_shapes(goal.shape, stretched_m.shape))
-    strain = strain_of(wires.placed, effective, hold_context(wires)) if wires.at("strain") else effective
+    strain = effective
+    if wires.at("strain"):
+        hold = hold_context(wires)
+
+        def bends(strain: Floats) -> Floats:
+            hold.zero_mm = 1e3 * _unstretched(stretched_m, strain, wires.law)
+            return np.asarray(wires.placed.change("strain", strain, hold))
+
+        strain = inverse(bends, effective)
     with np.errstate(invalid="ignore"):
-        length = stretched_m / (1.0 + strain) if wires.law == "hooke" else stretched_m * (1.0 - strain)
+        length = _unstretched(stretched_m, strain, wires.law)
         return np.where(length > 0, length, np.nan)
+
+
+def _unstretched(stretched_m: Floats, strain: Floats, law: laws.ElasticLaw) -> Floats:
+    """Zero-tension length of a wire that has a strain at a stretched length."""
+    return stretched_m / (1.0 + strain) if law == "hooke" else stretched_m * (1.0 - strain)
 
 
 def stretched_length(wires: Wires, zero_m: Floats, tension_N: Floats) -> Floats:
@@ -187,6 +209,9 @@ def stretched_length(wires: Wires, zero_m: Floats, tension_N: Floats) -> Floats:
     Returns
     -------
     (w, n) array
+        NaN where the law cannot reach the tension.
     """
-    unit = zero_tension_length(wires, np.ones_like(zero_m + tension_N), tension_N)
-    return zero_m / unit
+    effective = tension_N / wires.theta["k1"] + 0.0 * zero_m
+    if wires.at("strain"):
+        effective = strain_of(wires.placed, effective, _hold_at(wires, zero_m))
+    return laws.stretched(effective, zero_m, wires.law)
