@@ -104,7 +104,14 @@ def hold_context(
 
 
 def bent_strain(wires: Wires, strain: Floats, zero_m: Floats) -> tuple[Floats, Floats]:
-    """Effective strain whose product with k1 is the tension, and its slope by the strain, at a zero-tension length."""
+    """Effective strain whose product with k1 is the tension, and its slope by the strain.
+
+    Parameters
+    ----------
+    wires : Wires
+    strain, zero_m : (w, n) arrays
+        A toe is a length: the effective strain depends on the zero-tension length, too.
+    """
     return bent(wires.placed, strain, _hold_at(wires, zero_m))
 
 
