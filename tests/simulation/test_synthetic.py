@@ -47,8 +47,8 @@ def test_the_files_hold_what_was_asked_and_the_truth_explains_them(tmp_path):
 def test_noise_and_setting_error_have_the_size_that_was_asked():
     many = Bench(displacements_mm=np.linspace(1, 12, 800), times_s=(0.0, 10.0), resolution_N=0.0)
     made = draw([many], Truth(TRUE | {"sensor_sd": 0.02, "setting_sd": 0.05}), seed=1)
-    noise = made.problem.samples[0].readings[..., 0] - made.noise_free_N[0]
-    assert np.std(made.setting_mm[0]) == pytest.approx(0.05, rel=4 / np.sqrt(2 * 800))
+    noise = made.problem.samples[0].readings[..., 0] - made.noise_free[0]
+    assert np.std(made.setting_error[0]) == pytest.approx(0.05, rel=4 / np.sqrt(2 * 800))
     assert np.std(noise) == pytest.approx(0.02, rel=4 / np.sqrt(2 * 1600))
 
 
@@ -71,7 +71,7 @@ def test_an_effect_is_in_the_readings():
         Truth(TRUE | {"setting_sd": 1e-9, "sensor_sd": 1e-9, "grip_slip.w": 0.5}, (named("grip_slip@7"),)),
         seed=3,
     )
-    gap = slipped.noise_free_N[0][:, 0] - plain.noise_free_N[0][:, 0]
+    gap = slipped.noise_free[0][:, 0] - plain.noise_free[0][:, 0]
     assert np.abs(gap[:6]).max() < 1e-6
     assert gap[6] == pytest.approx(-700.0 * 0.5 / 1000, rel=0.02)
 

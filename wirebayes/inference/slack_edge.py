@@ -87,7 +87,7 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
     Returns
     -------
     SlackEdge or None
-        None where the preload is known, where there are no setting errors, and where the first hold is not clearly seen
+        None where the tension is set, where the preload is known, where there are no setting errors, and where the first hold is not clearly seen
         to be taut and to creep: then it may be slack, and the edge lies amid the posterior.
     """
     prior, protocol, readings = problem.prior, sample.protocol, sample.readings[..., 0]
@@ -96,6 +96,8 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
         column = problem.column(name, sample)
         return problem.names.index(column) if column in problem.names else float(prior.fixed[column])
 
+    if protocol.control == "force":
+        return None
     if problem.likelihood != "chain" or not isinstance(preload := place("preload"), int) or protocol.mask[0].sum() < 2:
         return None
     first, largest = readings[0, protocol.mask[0]], readings[protocol.mask].max()

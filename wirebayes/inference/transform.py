@@ -11,10 +11,11 @@ deviations of their prior. Then, one after the other,
   taken as the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions given, the
   creep is linear in B, so G does not depend on B and takes one pass along the holds. Effects on the amount of creep
   belong to G;
+  Under weights, elongations are read, and this is the elongation gained in a hold: without ``log(k1 / L0)``;
 - the preload becomes what is wide where the first hold hardly creeps (`wirebayes.inference.slack_edge`);
 - log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost / step)``, with the tension lost
   in a hold over the root mean square of the steps between first readings. Where all creep is over before a first
-  reading, the readings see this stiffness alone; where there is little, it is k1;
+  reading, the readings see this stiffness alone; where there is little, it is k1. Under weights it stays log k1;
 - where a fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its fixture, and what creeps
   beside the creep in proportion to a sampled amplitude belongs to the tension lost in a hold; these compliances and
   amplitudes become their shares (`wirebayes.inference.shares`).
@@ -65,7 +66,7 @@ class _Ridge:
 
     `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured. `powers`
     are log hazards and the log U that suits the losses best at each of them. `fixture` is the column of a compliance in
-    series with the wire, and `beside` what creeps beside the creep.
+    series with the wire, and `beside` what creeps beside the creep. `elongations` where these are read, not tensions.
     """
 
     where: dict[str, int]
@@ -84,6 +85,7 @@ class _Ridge:
     powers: tuple[Array, Array]
     fixture: int | None = None
     beside: tuple[Elongation, ...] = ()
+    elongations: bool = False
 
     @property
     def shares(self) -> list[int]:
@@ -110,7 +112,9 @@ class _Ridge:
         return np.interp(z[:, self.where["k2"]], *self.powers)
 
     def log_stiffness(self, theta: Array) -> Array:
-        """(n,) log tension per elongation, N/mm, of the wire with its fixture."""
+        """(n,) log of what is read per elongation: N/mm of the wire with its fixture, 1 where elongations are read."""
+        if self.elongations:
+            return np.zeros(len(theta))
         stiffness = np.log(self.get(theta, "k1")) - self.log_length
         if self.fixture is None:
             return np.asarray(stiffness)
@@ -228,6 +232,8 @@ class Transformation:
                 name: own if (own := f"{name}[{sample.name}]") in unpooled else f"{name}{mark}" for name in MATERIAL
             }
             fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
+            if "k1" not in sample.parameters(problem.likelihood):
+                fixed["k1"] = 1.0  # no reading depends on it
             where = {
                 name: names.index(c) for name, c in columns.items() if c in names and self.log_columns[names.index(c)]
             }
@@ -238,7 +244,7 @@ class Transformation:
                 moved -= {"U"}
             if self.specimens is not None:
                 moved -= {"k1", "U"}  # specimens' values have coordinates of their own
-            if "B" not in moved:
+            if "B" not in moved or sample.protocol.control == "force":
                 moved -= {"k1"}  # the tension lost in a hold is not known
             if "k2" not in moved or sample.model.history != "saturating" or problem.likelihood != "chain":
                 moved -= {"U"}  # every hold creeps anew, or the rate of the creep is not sampled here
@@ -421,10 +427,7 @@ def _ridge(
     sample: Sample,
     effects: tuple[Effect, ...],
 ) -> _Ridge:
-    recorded = np.flatnonzero(sample.protocol.recorded)
-    first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
-    # a slack wire drives no creep; a small share of the largest tension stands in for it
-    tension = np.maximum(first, 0.02 * first.max()) if first.max() > 0 else np.ones_like(first)
+    tension = _driving(sample)
     log_step = 0.5 * float(np.log(np.mean(np.diff(tension, prepend=0.0) ** 2)))
     hold_s = sample.typical_hold_s
     duration = sample.protocol.duration_s
@@ -440,15 +443,26 @@ def _ridge(
     powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s)) if "U" in shifted else _NONE
     return _Ridge(
         where, fixed, shifted, steepest, np.log(tension), log_step, times, which, kept, hold_s, float(np.log(length)),
-        effects, holds, powers,
+        effects, holds, powers, elongations=sample.protocol.control == "force",
     )  # fmt: skip
+
+
+def _driving(sample: Sample) -> Array:
+    """(H,) tensions that drive the creep: as set, or the first readings."""
+    if sample.protocol.control == "force":
+        return sample.protocol.setting
+    recorded = np.flatnonzero(sample.protocol.recorded)
+    first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
+    # a slack wire drives no creep; a small share of the largest tension stands in for it
+    return np.maximum(first, 0.02 * first.max()) if first.max() > 0 else np.ones_like(first)
 
 
 def _powers(problem: Problem, sample: Sample, log_tension: Array, relative_s: Array) -> tuple[Array, Array]:
     """Log hazards and the log U that suits the losses of a sample's holds best at each of them."""
     readings, protocol = sample.readings[..., 0], sample.protocol
     last = readings[np.arange(len(readings)), protocol.last_reading]
-    lost = np.where(protocol.mask.sum(axis=1) > 1, readings[:, 0] - last, np.nan)
+    changed = last - readings[:, 0] if protocol.control == "force" else readings[:, 0] - last
+    lost = np.where(protocol.mask.sum(axis=1) > 1, changed, np.nan)
     power, exponent = (problem.column(name, sample) for name in ("U", "N"))
     low, middle, high = np.log(problem.prior.distributions[power].ppf([_ONE_SD[0], 0.5, _ONE_SD[1]]))
     fixed = problem.prior.fixed

@@ -1,13 +1,16 @@
 """``truth.json``: what synthetic tests were made of."""
 
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import Numbers
 from wirebayes.notice import Warned
 
 
 class TrueWire(TypedDict):
-    """The wire of one test; its setting errors, a value a hold, and its tensions before sensor error and rounding."""
+    """The wire of one test; its setting errors, a value a hold, and its readings before sensor error and rounding.
+
+    Under weights the errors are in N and the readings in mm.
+    """
 
     material: str
     elastic_law: str
@@ -15,8 +18,10 @@ class TrueWire(TypedDict):
     effects: list[str]
     parameters: dict[str, float]
     tension_ref_N: float
-    setting_mm: Numbers
-    noise_free_N: list[Numbers]
+    setting_mm: NotRequired[Numbers]
+    noise_free_N: NotRequired[list[Numbers]]
+    setting_N: NotRequired[Numbers]
+    noise_free_mm: NotRequired[list[Numbers]]
 
 
 class TruthJson(Warned):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from scipy import stats
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
@@ -52,6 +53,13 @@ class Sample:
     readings: Array
     resolution: float
     model: Model
+
+    def parameters(self, likelihood: Likelihood) -> tuple[str, ...]:
+        """The plain parameters that its readings depend on: hold by hold no preload, and under weights no k1."""
+        if likelihood == "chain":
+            return MATERIAL + SAMPLE
+        wire = MATERIAL if self.protocol.control == "displacement" else MATERIAL[1:]
+        return (*wire, "sensor_sd")
 
     @property
     def typical_hold_s(self) -> float:
@@ -101,8 +109,7 @@ class Problem:
             column = self.column(name, sample)
             return columns[column] if column in columns else np.full(n, self.prior.fixed[column])
 
-        wanted = MATERIAL + (SAMPLE if self.likelihood == "chain" else ("sensor_sd",))
-        out = {name: find(name) for name in wanted}
+        out = {name: find(name) for name in sample.parameters(self.likelihood)}
         for effect in sample.model.effects:
             out |= {column: find(column) for column in effect.columns()}
         ratio = sample.protocol.length_mm / (sample.model.length_ref_mm or sample.protocol.length_mm)
@@ -220,22 +227,20 @@ def build(
     """
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
-        if experiment.control == "force":
-            raise InputError(
-                f"{experiment.source}, experiment {experiment.name}: found control = 'force', expected 'displacement'"
-            )
         materials.setdefault(experiment.material, []).append(experiment)
     several = len(experiments) > 1
     distributions: dict[str, Any] = {}
     samples: list[Sample] = []
     for material, members in materials.items():
         mark = f"[{material}]" if len(materials) > 1 else ""
-        distributions |= _material_priors(members, effects, mark, length_exponent)
+        distributions |= _material_priors(members, effects, mark, length_exponent, likelihood)
         samples += _samples(members, effects, law, history)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
         defaults = wire_defaults(experiment.length_mm)
         wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
+        if experiment.control == "force":
+            defaults["preload"] = stats.norm(0.0, 30.0)
         distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
     _apply_tables(distributions, experiments, several)
     fixed = {name: float(d) for name, d in distributions.items() if isinstance(d, int | float)}
@@ -253,11 +258,13 @@ def _reference_length(members: Sequence[Experiment]) -> float:
 
 
 def _material_priors(
-    members: Sequence[Experiment], effects: Sequence[Effect], mark: str, length_exponent: Any
+    members: Sequence[Experiment], effects: Sequence[Effect], mark: str, length_exponent: Any, likelihood: Likelihood
 ) -> dict[str, Any]:
     """Default priors of what the samples of one material share; `mark` distinguishes materials in the names."""
     defaults = wire_defaults(_reference_length(members))
-    out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in MATERIAL}
+    stiff = likelihood == "chain" or any(e.control == "displacement" for e in members)
+    wanted = MATERIAL if stiff else tuple(name for name in MATERIAL if name != "k1")
+    out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
     if len({e.length_mm for e in members}) > 1:
         out[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
     for effect in effects:
@@ -270,16 +277,24 @@ def _samples(
     members: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History
 ) -> list[Sample]:
     """The experiments of one material as the likelihood sees them."""
-    tension = tension_reference(np.concatenate([h.readings for e in members for h in e.holds]))
+    tension = tension_reference(np.concatenate([e.tension()[e.protocol().mask] for e in members]))
     length = _reference_length(members) if len(members) > 1 else 0.0
     out = []
     for e in members:
-        largest = max((float(np.abs(h.readings).max()) for h in e.recorded_holds), default=0.0)
         present = tuple(x for x in effects if not isinstance(x, EventEffect) or x.test in ("", e.name))
         model = Model(law, history, present, tension, length)
-        finest = max(e.resolution, FINEST * largest)
+        finest = max(e.resolution, FINEST * _extent(e))
         out.append(Sample(e.name, e.material, e.protocol(), e.readings()[..., None], finest, model))
     return out
+
+
+def _extent(experiment: Experiment) -> float:
+    """The largest tension that was read, or the range of displacements, whose zero means nothing."""
+    read = [hold.readings for hold in experiment.recorded_holds]
+    if not read:
+        return 0.0
+    values = np.concatenate(read)
+    return float(np.ptp(values) if experiment.control == "force" else np.abs(values).max())
 
 
 def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> None:

@@ -125,7 +125,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
     requested[:trained] = False
     if not requested.any():
         raise ValueError(f"{experiment.name}: all {trained} holds were trained on")
-    tension = experiment.tension()
+    tension = experiment.readings()
     nothing = np.full(len(requested), np.nan)
     past = int(here.protocol.recorded.sum())
     free = None
@@ -207,7 +207,7 @@ def _chain_scores(
 ) -> tuple[Array, Array, float]:
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
     problem, here = fitted.problem, fitted.problem.samples[sample]
-    whole, tension = experiment.protocol(), experiment.tension()[..., None]
+    whole, tension = experiment.protocol(), experiment.readings()[..., None]
     later, one = whole.mask & requested[:, None], np.arange(whole.mask.shape[1]) == 0
     parts: list[tuple[Array, Array, Array]] = []
     theta = thinned(fitted.flat)
@@ -227,9 +227,9 @@ def _chain_scores(
 def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(thinned(fitted.flat), here)
-    own = own | {"preload": 0.0 * own["k1"]}
+    own = own | {"preload": 0.0 * own["B"]}
     variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution)
-    log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.tension()[..., None], variance)
+    log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.readings()[..., None], variance)
     return _log_mean(log_p[requested])
 
 

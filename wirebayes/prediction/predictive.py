@@ -110,7 +110,7 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
         Tensions of all holds of the protocol, N.
     """
     protocol, trained = request.protocol, request.trained
-    n = len(own["k1"])
+    n = len(own["B"])
     setting = rng.normal(size=(len(request.requested), n)) * own["setting_sd"]
     again = setting.copy()
     if trained:

@@ -14,15 +14,17 @@ import numpy as np
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import Hold, frozen
+from wirebayes.io.readings import READ, SET, Hold, frozen
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.typing import Array
 from wirebayes.units import nearest
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.protocol import Control
 from wirebayes.wire.staircase import simulate, tension_reference
 
 FILE, TRUTH = "experiments.toml", "truth.json"
@@ -41,6 +43,10 @@ class Bench:
         Resolution 0 writes tensions as they are.
     displacements_mm : sequence of float
         One a hold; holds are numbered from 1.
+    weights_N : sequence of float
+        One a hold, in place of displacements: tensions are set, and displacements are read.
+    resolution_mm : float
+        With weights; 0 writes displacements as they are.
     times_s : sequence of float, or one such sequence a hold
         Reading times since the hold began.
     unrecorded : set of int
@@ -57,15 +63,32 @@ class Bench:
     times_s: Sequence[float] | Sequence[Sequence[float]] = PAPER_TIMES_S
     unrecorded: frozenset[int] = frozenset()
     temperatures_C: Sequence[float] = ()
+    weights_N: Sequence[float] = ()
+    resolution_mm: float = 0.01
+
+    @property
+    def control(self) -> Control:
+        """What is set."""
+        return "force" if len(self.weights_N) else "displacement"
+
+    @property
+    def settings(self) -> Sequence[float]:
+        """One a hold: displacements, mm, or tensions, N."""
+        return self.weights_N if len(self.weights_N) else self.displacements_mm
+
+    @property
+    def resolution(self) -> float:
+        """Of what is read."""
+        return self.resolution_mm if self.control == "force" else self.resolution_N
 
     def experiment(self) -> Experiment:
-        """The test with tensions still at zero."""
-        count = len(self.displacements_mm)
+        """The test with readings still at zero."""
+        count = len(self.settings)
         several = np.ndim(self.times_s[0]) > 0
         each = [np.array(t) for t in self.times_s] if several else [np.array(self.times_s)] * count
         starts = np.concatenate([[0.0], np.cumsum([t[-1] for t in each])])
         holds = []
-        for i, (displacement, times) in enumerate(zip(self.displacements_mm, each, strict=True)):
+        for i, (setting, times) in enumerate(zip(self.settings, each, strict=True)):
             kept = times if i + 1 not in self.unrecorded else times[:0]
             log = None
             if len(self.temperatures_C):
@@ -73,9 +96,11 @@ class Bench:
                 # logged to a hundredth of a degree, and the wire follows the log
                 log = frozen(np.round(np.interp(starts[i] + kept, moments, self.temperatures_C), 2).tolist())
             number = i + 1 if len(kept) else None
-            holds.append(Hold(number, float(displacement), float(times[-1]), frozen(kept.tolist()),
-                              frozen([0.0] * len(kept)), log, float(starts[i])))  # fmt: skip
-        return Experiment(self.name, self.material, self.length_mm, self.resolution_N, tuple(holds), Path(FILE))
+            holds.append(Hold(number, float(setting), float(times[-1]), frozen(kept.tolist()),
+                              frozen([0.0] * len(kept)), log, float(starts[i]), self.control))  # fmt: skip
+        return Experiment(
+            self.name, self.material, self.length_mm, self.resolution, tuple(holds), Path(FILE), control=self.control
+        )
 
 
 @dataclass(frozen=True)
@@ -107,16 +132,16 @@ class Simulated:
         Holds the simulated readings.
     theta : (1, d) array
         The truth, in the problem's columns.
-    setting_mm : list of (H,) arrays
-        The setting error of every hold, per sample.
-    noise_free_N : list of (H, R) arrays
-        Tension with the setting errors, before sensor error and rounding.
+    setting_error : list of (H,) arrays
+        Of every hold, mm, or N under weights, per sample.
+    noise_free : list of (H, R) arrays
+        Readings with the setting errors, before sensor error and rounding.
     """
 
     problem: Problem
     theta: Array
-    setting_mm: list[Array]
-    noise_free_N: list[Array]
+    setting_error: list[Array]
+    noise_free: list[Array]
 
 
 def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random.SeedSequence = 0) -> Simulated:
@@ -153,11 +178,11 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     for sample in problem.samples:
         own = problem.parameters(theta, sample)
         setting = rng.normal(size=(len(sample.protocol.setting), 1)) * own["setting_sd"]
-        tension = simulate(sample.protocol, own, sample.model, setting)
-        noisy = tension + rng.normal(size=tension.shape) * own["sensor_sd"]
+        exact = simulate(sample.protocol, own, sample.model, setting)
+        noisy = exact + rng.normal(size=exact.shape) * own["sensor_sd"]
         readings.append(np.where(sample.protocol.mask[..., None], rounded(noisy, sample.resolution), 0.0))
         settings.append(setting[:, 0])
-        clean.append(tension[..., 0])
+        clean.append(exact[..., 0])
     return Simulated(with_readings(problem, readings), theta, settings, clean)
 
 
@@ -222,6 +247,8 @@ def number(key: str, text: str) -> float:
 
 def _referred(problem: Problem, theta: Array, sample: Sample) -> Sample:
     """The sample with the reference tension that its own tensions have, found by a few repetitions."""
+    if sample.protocol.control == "force":
+        return sample
     own = problem.parameters(theta, sample)
     for _ in range(5):
         reference = tension_reference(simulate(sample.protocol, own, sample.model)[sample.protocol.mask])
@@ -233,25 +260,27 @@ def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
     step = Decimal(repr(sample.resolution)).normalize()
     digits = max(0, -int(step.as_tuple().exponent)) if step else None
     rows = []
-    for hold, tensions in zip(experiment.holds, sample.readings[..., 0], strict=True):
+    for hold, readings in zip(experiment.holds, sample.readings[..., 0], strict=True):
         for i, time in enumerate(hold.time_s):
-            tension = float(tensions[i]) if digits is None else round(float(tensions[i]), digits)
-            row = [hold.number, hold.displacement_mm, time, tension + 0.0]  # no minus before a zero
+            read = float(readings[i]) if digits is None else round(float(readings[i]), digits)
+            row = [hold.number, hold.setting, time, read + 0.0]  # no minus before a zero
             rows.append(row if hold.temperature_C is None else [*row, hold.temperature_C[i]])
-    header = ["hold", "displacement_mm", "time_s", "tension_N"]
+    header = ["hold", SET[experiment.control], "time_s", READ[experiment.control]]
     write_csv(path, header if len(rows[0]) == 4 else [*header, "temperature_C"], rows)
 
 
 def _table(bench: Bench) -> str:
     lines = ["[[experiment]]", f'name = "{bench.name}"', f'material = "{bench.material}"']
     lines.append(f"length_mm = {float(bench.length_mm)!r}")
-    if bench.resolution_N:
-        lines.append(f"resolution_N = {float(bench.resolution_N)!r}")
+    if bench.control == "force":
+        lines.append('control = "force"')
+    if bench.resolution:
+        lines.append(f"resolution_{READ_UNIT[bench.control]} = {float(bench.resolution)!r}")
     lines.append(f'readings = "{bench.name}.csv"')
     holds = bench.experiment().holds
     gaps = [
         f"{{ before_hold = {next(h.number for h in holds[i:] if h.recorded)}, "
-        f"displacement_mm = {hold.displacement_mm!r}, duration_s = {hold.duration_s!r} }}"
+        f"{SET[bench.control]} = {hold.setting!r}, duration_s = {hold.duration_s!r} }}"
         for i, hold in enumerate(holds) if not hold.recorded
     ]  # fmt: skip
     if gaps:
@@ -261,13 +290,14 @@ def _table(bench: Bench) -> str:
 
 def _truth(made: Simulated, i: int) -> TrueWire:
     sample = made.problem.samples[i]
-    return {
+    control, mask = sample.protocol.control, sample.protocol.mask
+    return {  # type: ignore[misc]
         "material": sample.material,
         "elastic_law": sample.model.law,
         "history": sample.model.history,
         "effects": [effect.key for effect in sample.model.effects],
         "parameters": {name: float(v[0]) for name, v in made.problem.parameters(made.theta, sample).items()},
         "tension_ref_N": sample.model.tension_ref_N,
-        "setting_mm": made.setting_mm[i],
-        "noise_free_N": [row[mask] for row, mask in zip(made.noise_free_N[i], sample.protocol.mask, strict=True)],
+        f"setting_{SET_UNIT[control]}": made.setting_error[i],
+        f"noise_free_{READ_UNIT[control]}": [row[kept] for row, kept in zip(made.noise_free[i], mask, strict=True)],
     }

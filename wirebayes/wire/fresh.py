@@ -63,9 +63,12 @@ class FreshSample:
     def stiffness_N(self, tension_N: float) -> Array:
         """Tangent stiffness at a tension, N per unit strain, ``(n,)``: zero-tension length times dτ/dS.
 
-        k1 where the law is eq (1) and no effect bends the strain. NaN where the wire cannot carry the tension.
+        k1 where the law is eq (1) and no effect bends the strain. NaN where the wire cannot carry the tension, and where
+        nothing is known of k1.
         """
         effects, theta = self._wire
+        if "k1" not in theta:
+            return np.full(len(theta["B"]), np.nan)
         hold = self._hold(tension_N, np.zeros((1, 1)))
         with np.errstate(all="ignore"):
             strain = strain_of(effects, np.asarray(tension_N / theta["k1"])[None], hold)
