@@ -281,9 +281,9 @@ def test_given_first_readings_are_regressed_on_within_their_own_history() -> Non
     for j, known in ((1, [1]), (2, [2]), (3, [2, 3])):
         assert found[j] == pytest.approx(moved(drawn[j], known), abs=1e-9)
         assert (found[j, 0] == first[j]).all()
-    free = replace(request, first_N=np.array([np.nan, np.nan, 1.0, np.nan, np.nan]))
+    free = replace(request, first=np.array([np.nan, np.nan, 1.0, np.nan, np.nan]))
     later = predictive.given_first(drawn.copy(), free)
-    first = free.first_N
+    first = free.first
     assert later[3] == pytest.approx(moved(drawn[3], [2]), abs=1e-9) and np.ptp(later[3, 0]) > 0.1
 
 

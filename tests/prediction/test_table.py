@@ -12,7 +12,7 @@ from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
 from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.prediction.table import HEADER, beyond_tested, dataset, mixture_table, table
+from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
@@ -32,7 +32,16 @@ def test_rows_as_a_dataset_have_names_and_units() -> None:
     assert {name: found[name].values.tolist() for name in ("hold", "time_s", "q95_N")} == {
         "hold": [3, 4], "time_s": [0.0, 30.0], "q95_N": [4.0, 9.0]
     }  # fmt: skip
-    assert [found[name].attrs["units"] for name in HEADER[1:]] == ["1", "mm", "s", "N", "N", "N", "N", "N"]
+    assert [found[name].attrs["units"] for name in header("displacement")[1:]] == [
+        "1",
+        "mm",
+        "s",
+        "N",
+        "N",
+        "N",
+        "N",
+        "N",
+    ]
     assert dataset(rows[:1], {}).attrs["experiment"] == "roc"
 
 
@@ -56,7 +65,7 @@ def test_quantiles_are_those_of_the_known_normal() -> None:
     every = np.ones(3, bool)
     question = PredictionRequest(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
     request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
-    rows = [dict(zip(HEADER, row, strict=True)) for row in table(request, draws=DRAWS)]  # type: ignore[arg-type]
+    rows = [dict(zip(header("displacement"), row, strict=True)) for row in table(request, draws=DRAWS)]  # type: ignore[arg-type]
     r, covariance, hold = normal(protocol, WIRE, Model(), experiment.tension(), 0.02)
     mean, sd = experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))
     assert [row["hold"] for row in rows] == list(hold + 1)
@@ -81,7 +90,7 @@ def test_undecided_models_answer_as_often_as_they_are_probable() -> None:
         members.append((share, SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)))
         r, covariance, _ = normal(protocol, wire, Model(), experiment.tension(), 0.02)
         parts.append((share, experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))))
-    rows = [dict(zip(HEADER, row, strict=True)) for row in mixture_table(members, draws=DRAWS)]  # type: ignore[arg-type]
+    rows = [dict(zip(header("displacement"), row, strict=True)) for row in mixture_table(members, draws=DRAWS)]  # type: ignore[arg-type]
     for i, row in enumerate(rows):
         assert row["mean_N"] == pytest.approx(sum(share * mean[i] for share, mean, _ in parts), abs=0.01)
         for name, level in (("q05_N", 0.05), ("q95_N", 0.95)):

@@ -17,6 +17,7 @@ from wirebayes.json_files.imported import ImportedExperiment
 from wirebayes.json_files.plan import JudgedProtocol
 from wirebayes.json_files.pose import Drift, PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import likely
@@ -192,8 +193,9 @@ def _finding(name: str, report: ExperimentFindings) -> list[str]:
     if like and verdict in ("named", "ambiguous"):
         lines.append(f"  hard to distinguish on this protocol: {', '.join(like)}")
     gain = report["held_out"]
-    if report["effects"] and gain["plain"]["rmse_N"] is not None and gain["final"]["rmse_N"] is not None:
-        lines.append(f"  held-out holds: rmse {gain['plain']['rmse_N']:.3g} -> {gain['final']['rmse_N']:.3g} N")
+    before, after = (read(gain[model], "rmse") for model in ("plain", "final"))
+    if report["effects"] and None not in (before, after):
+        lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}")
     return lines
 
 

@@ -27,10 +27,12 @@ from wirebayes.json_files.comparison import (
     ModelJson,
     PredictionScores,
 )
+from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import Notice, from_json, named, to_json
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
 from wirebayes.typing import Floats
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.workers import workers
 
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
@@ -191,7 +193,8 @@ def run(
 
 
 def _store(task: Task, directory: Path, seed: int, policy: Policy) -> None:
-    write_json(directory / task.file, judge(task, seed, policy))
+    unit = READ_UNIT[task.experiment.control]
+    write_json(directory / task.file, in_unit(judge(task, seed, policy), unit))
 
 
 def side_by_side(models: Sequence[ModelJson], base: str, about: Sequence[Notice] = ()) -> ComparedModels:

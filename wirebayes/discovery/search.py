@@ -40,6 +40,8 @@ from wirebayes.json_files.discovery import (
     Verdict,
 )
 from wirebayes.notice import named, to_json
+from wirebayes.json_files.read_units import in_unit
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
 
@@ -194,13 +196,14 @@ def _own_reports(
     reports: dict[str, HeldOutReport] = {}
     for e, check in zip(block.experiments, checks, strict=True):
         struck = [g for g in gate.struck if g["experiment"] == e.name]
-        reports[e.name] = {
+        own: HeldOutReport = {
             "steps": check.steps,
             "held_out": check.held_out,
             "residual_rms_N": shrinking.left_over(block, e.name),
             "gross_errors": struck,
             "warnings": to_json(map(gross_errors.in_words, struck)),
         }
+        reports[e.name] = in_unit(own, READ_UNIT[e.control])
     return reports
 
 

@@ -87,8 +87,9 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
     Returns
     -------
     SlackEdge or None
-        None where the tension is set, where the preload is known, where there are no setting errors, and where the first hold is not clearly seen
-        to be taut and to creep: then it may be slack, and the edge lies amid the posterior.
+        None where the tension is set, where the preload is known, where there are no setting errors, and where the
+        first hold is not clearly seen to be taut and to creep: then it may be slack, and the edge lies amid the
+        posterior.
     """
     prior, protocol, readings = problem.prior, sample.protocol, sample.readings[..., 0]
 

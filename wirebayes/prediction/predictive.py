@@ -35,14 +35,14 @@ class PredictionRequest:
         How many leading holds belong to the training; 0 for a fresh sample.
     requested : (H,) bool array
         A trained hold that is requested is predicted as a replicate: new noise, new setting error.
-    first_N : (H,) array
-        A hold's first reading where the prediction shall be given it, else NaN.
+    first : (H,) array
+        A hold's first reading, N or mm, where the prediction shall be given it, else NaN.
     """
 
     protocol: Protocol
     trained: int
     requested: NDArray[np.bool_]
-    first_N: Floats
+    first: Floats
 
 
 def predict(
@@ -63,7 +63,7 @@ def predict(
 
     Returns
     -------
-    (H, R, n) array, N
+    (H, R, n) array
         Zero for holds that were not requested. Rounding is continuous: uniform within half a step.
     """
     parts = [
@@ -107,7 +107,7 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
     Returns
     -------
     (H, R, n) array
-        Tensions of all holds of the protocol, N.
+        Readings of all holds of the protocol.
     """
     protocol, trained = request.protocol, request.trained
     n = len(own["B"])
@@ -144,7 +144,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
     Returns
     -------
     (H, n) array
-        mm; one draw of all holds for each draw of the parameters.
+        One draw of all holds for each draw of the parameters.
     """
     line = linearise(sample.protocol, own, sample.model)
     variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
@@ -170,13 +170,13 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
 
 def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: Floats) -> Floats:
     """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
-    given = request.first_N[:, None] - error[:, 0]
+    given = request.first[:, None] - error[:, 0]
     out = np.zeros_like(error)
     for j, course in enumerate(likelihoods.hold_courses(request.protocol, own, model, given)):
         if course is not None and request.requested[j]:
-            tension, _, valid = course
-            out[j] = np.where(valid, tension, 0.0) + error[j]
-            out[j, 0] = request.first_N[j]
+            reading, _, valid = course
+            out[j] = np.where(valid, reading, 0.0) + error[j]
+            out[j, 0] = request.first[j]
     return out
 
 
@@ -186,7 +186,7 @@ def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     Parameters
     ----------
     drawn : (H, R, n) array
-        Joint draws of all readings, N, of a likelihood along the chain; changed in place.
+        Joint draws of all readings of a likelihood along the chain; changed in place.
     request : PredictionRequest
 
     Returns
@@ -194,23 +194,23 @@ def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     (H, R, n) array
         The same array.
     """
-    given = request.requested & np.isfinite(request.first_N)
+    given = request.requested & np.isfinite(request.first)
     for j in np.flatnonzero(request.requested)[::-1]:
         known = np.array([j] if given[j] else [], int)
         if j >= request.trained:
             known = np.flatnonzero(given[request.trained : j + 1]) + request.trained
         if len(known):
-            drawn[j] = _regressed(drawn[j], drawn[known, 0], request.first_N[known])
+            drawn[j] = _regressed(drawn[j], drawn[known, 0], request.first[known])
         if given[j]:
-            drawn[j, 0] = request.first_N[j]  # not only to the last digit
+            drawn[j, 0] = request.first[j]  # not only to the last digit
     return drawn
 
 
-def _regressed(drawn: Floats, first: Floats, observed_N: Floats) -> Floats:
+def _regressed(drawn: Floats, first: Floats, observed: Floats) -> Floats:
     """Joint draws (R, n) moved to where `first` (m, n) takes its observed values (m,)."""
     centred = first - first.mean(axis=1, keepdims=True)
     square, across = centred @ centred.T, centred @ (drawn - drawn.mean(axis=1, keepdims=True)).T
     gain = solve(square, across).T
     if not np.isfinite(gain).all() and np.isfinite(square).all():  # given readings that do not vary, or vary as one
         gain = (np.linalg.pinv(square, hermitian=True) @ across).T
-    return drawn + gain @ (observed_N[:, None] - first)
+    return drawn + gain @ (observed[:, None] - first)

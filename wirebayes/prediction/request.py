@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import protocol_of
-from wirebayes.io.readings import Hold, Table, protocol_holds, protocol_table, shown
+from wirebayes.io.readings import READ, SET, Hold, Table, protocol_holds, protocol_table, shown
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.store import Stored
 from wirebayes.typing import Floats
@@ -45,8 +45,9 @@ def read_request(path: Path, stored: Stored, *, fresh: bool = False) -> Protocol
     Parameters
     ----------
     path : Path
-        Columns ``hold,displacement_mm,time_s``, with ``temperature_C`` where the training data had it, and optionally
-        ``tension_N``, filled only at a hold's first time.
+        Columns ``hold``, what is set (``displacement_mm``, or ``tension_N`` under weights) and ``time_s``, with
+        ``temperature_C`` where the training data had it, and optionally what is read, filled only at a hold's first
+        time.
     stored : Stored
     fresh : bool
         The file is the whole history of another sample. Otherwise its holds are those of the tested sample: repeated
@@ -61,7 +62,7 @@ def read_request(path: Path, stored: Stored, *, fresh: bool = False) -> Protocol
     InputError
         With the file, line, column, what was found and what was expected.
     """
-    return request_of(protocol_table(path), stored, fresh=fresh)
+    return request_of(protocol_table(path, stored.sample.protocol.control), stored, fresh=fresh)
 
 
 def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
@@ -86,11 +87,11 @@ def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> Protocol
         With the line, column, what was found and what was expected.
     """
     trained = stored.sample.protocol
-    file = _File(table, protocol_holds(table, trained.length_mm))
+    file = _File(table, protocol_holds(table, trained.length_mm, trained.control))
     file.check_temperature(trained.reference_C is not None)
     if stored.likelihood == "hold":
         file.check_first_readings()
-    first = np.array([hold.tension_N[0] for hold in file.holds])
+    first = np.array([hold.readings[0] for hold in file.holds])
     if fresh:
         began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
         alone = protocol_of(file.holds, trained.length_mm, began_at)
@@ -173,10 +174,13 @@ class _File:
 
     def check_first_readings(self) -> None:
         for i, hold in enumerate(self.holds):
-            if not hold.tension_N[0] > 0:
+            first, column = hold.readings[0], READ[hold.control]
+            if not np.isfinite(first):
+                expected = "the hold's first reading, because the posterior is hold by hold"
+                raise self.complain(i, 0, column, f"no {column}", expected)
+            if hold.control == "displacement" and first <= 0:
                 expected = "the hold's first reading, above 0 N, because the posterior is hold by hold"
-                found = "no tension_N" if np.isnan(hold.tension_N[0]) else shown(float(hold.tension_N[0]))
-                raise self.complain(i, 0, "tension_N", found, expected)
+                raise self.complain(i, 0, column, shown(float(first)), expected)
 
     def check_repeats(self, trained: Protocol, row_of: dict[int, int]) -> None:
         last = max(row_of)
@@ -189,9 +193,9 @@ class _File:
                     raise self.complain(i, 0, "hold", str(number), expected)
                 continue
             row = row_of[number]
-            if hold.displacement_mm != trained.setting[row]:
+            if hold.setting != trained.setting[row]:
                 expected = f"{trained.setting[row]:g}, as hold {number} was trained on"
-                raise self.complain(i, 0, "displacement_mm", f"{hold.displacement_mm:g}", expected)
+                raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
             times = trained.time_s[row][trained.mask[row]]
             if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
                 times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
@@ -234,6 +238,7 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
         number=np.concatenate([before.number, after.number]),
         warming_K=warming,
         reference_C=before.reference_C,
+        control=before.control,
     )
 
 

@@ -8,17 +8,25 @@ import numpy as np
 import xarray as xr
 
 from wirebayes.inference.fit import seed_of
+from wirebayes.io.readings import READ, SET
 from wirebayes.notice import Notice
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.results.store import Stored
 from wirebayes.typing import Floats
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.protocol import Control
 
-HEADER = ("experiment", "hold", "displacement_mm", "time_s", "mean_N", "sd_N", "q05_N", "q50_N", "q95_N")
 FAR_OFF = 5.0  # standard deviations of a first reading: one in a million by chance, a wrong unit is at hundreds
 FAR_UP, FAR_ON = 2.0, 10.0  # times the largest tested tension, and the longest tested hold: nothing there was tested
 _FEW = 500  # draws, enough for a standard deviation
 DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
+
+
+def header(control: Control) -> tuple[str, ...]:
+    """Columns: what is set, and figures of what is read in its unit."""
+    figures = (f"{name}_{READ_UNIT[control]}" for name in ("mean", "sd", "q05", "q50", "q95"))
+    return ("experiment", "hold", SET[control], "time_s", *figures)
 
 
 def table(request: ProtocolRequest, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
@@ -57,7 +65,7 @@ def mixture_table(
         for k, time in enumerate(hold.time_s):
             about = here[k] - here[k, 0]  # so that a given reading comes back to the last digit
             figures = [here[k, 0] + about.mean(), about.std(ddof=1), *quantiles[:, k]]
-            rows.append([stored.sample.name, hold.number, hold.displacement_mm, float(time), *map(float, figures)])
+            rows.append([stored.sample.name, hold.number, hold.setting, float(time), *map(float, figures)])
     return rows
 
 
@@ -71,19 +79,20 @@ def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: in
     seed : int
     """
     request = members[0][1]
-    given = np.isfinite(request.prediction.first_N) & request.prediction.requested
+    given = np.isfinite(request.prediction.first) & request.prediction.requested
     if request.stored.likelihood == "hold" or not given.any():  # each hold starts from its own reading
         return []
-    blind = [(p, replace(r, prediction=replace(r.prediction, first_N=np.full(len(given), np.nan)))) for p, r in members]
+    blind = [(p, replace(r, prediction=replace(r.prediction, first=np.full(len(given), np.nan)))) for p, r in members]
     first = _drawn(blind, seed, _FEW)[:, 0]
     out = []
     for hold, at in zip(request.holds, np.flatnonzero(request.prediction.requested), strict=True):
-        read, mean, sd = request.prediction.first_N[at], first[at].mean(), first[at].std(ddof=1)
+        read, mean, sd = request.prediction.first[at], first[at].mean(), first[at].std(ddof=1)
         if given[at] and abs(read - mean) > FAR_OFF * sd:
+            unit = READ_UNIT[hold.control]
             text = (
-                f"hold {hold.number}: its first reading, {read:.4g} N, is {abs(read - mean) / sd:.0f} standard "
-                f"deviations from the {mean:.4g} N expected there: check tension_N (in N?) and displacement_mm; what "
-                "follows from it is not to be relied on"
+                f"hold {hold.number}: its first reading, {read:.4g} {unit}, is {abs(read - mean) / sd:.0f} standard "
+                f"deviations from the {mean:.4g} {unit} expected there: check {READ[hold.control]} (in {unit}?) and "
+                f"{SET[hold.control]}; what follows from it is not to be relied on"
             )
             out.append(Notice("data", text))
     return out
@@ -100,9 +109,11 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
         A posterior behind it.
     """
     protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
-    highest, longest = float(readings[protocol.mask].max()), float(protocol.duration_s[protocol.recorded].max())
-    tension = max(row[HEADER.index("q50_N")] for row in rows)
-    time = max(row[HEADER.index("time_s")] for row in rows)
+    names, longest = header(protocol.control), float(protocol.duration_s[protocol.recorded].max())
+    weights = protocol.control == "force"
+    highest = float((protocol.setting[protocol.recorded] if weights else readings[protocol.mask]).max())
+    tension = max(row[names.index("tension_N" if weights else "q50_N")] for row in rows)
+    time = max(row[names.index("time_s")] for row in rows)
     out = []
     if tension > FAR_UP * highest:
         out.append(f"tensions of up to {tension:.4g} N are predicted; none above {highest:.4g} N was tested")
@@ -123,7 +134,9 @@ def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: i
     return np.concatenate(parts, axis=-1)
 
 
-def dataset(rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any]) -> xr.Dataset:
+def dataset(
+    rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any], control: Control = "displacement"
+) -> xr.Dataset:
     """The rows of `table` with units, along the dimension ``reading``.
 
     Parameters
@@ -131,10 +144,13 @@ def dataset(rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any]) -> xr.
     rows : sequence of rows
     attributes : mapping
         Of the dataset; the experiment's name joins them.
+    control : {"displacement", "force"}
     """
-    columns = {name: [row[i] for row in rows] for i, name in enumerate(HEADER)}
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(header(control))}
     experiment = str(columns.pop("experiment")[0])
-    units = {"hold": "1", "displacement_mm": "mm", "time_s": "s"}
-    variables = {name: ("reading", np.array(c), {"units": units.get(name, "N")}) for name, c in columns.items()}
+    units = {"hold": "1", SET[control]: SET_UNIT[control], "time_s": "s"}
+    variables = {
+        name: ("reading", np.array(c), {"units": units.get(name, READ_UNIT[control])}) for name, c in columns.items()
+    }
     coords = {name: variables.pop(name) for name in units}
     return xr.Dataset(variables, coords, {"experiment": experiment, **attributes})

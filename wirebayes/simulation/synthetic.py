@@ -21,7 +21,7 @@ from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.typing import Array
 from wirebayes.units import nearest
-from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Control
@@ -290,14 +290,16 @@ def _table(bench: Bench) -> str:
 
 def _truth(made: Simulated, i: int) -> TrueWire:
     sample = made.problem.samples[i]
-    control, mask = sample.protocol.control, sample.protocol.mask
-    return {  # type: ignore[misc]
+    mask = sample.protocol.mask
+    out: TrueWire = {
         "material": sample.material,
         "elastic_law": sample.model.law,
         "history": sample.model.history,
         "effects": [effect.key for effect in sample.model.effects],
         "parameters": {name: float(v[0]) for name, v in made.problem.parameters(made.theta, sample).items()},
         "tension_ref_N": sample.model.tension_ref_N,
-        f"setting_{SET_UNIT[control]}": made.setting_error[i],
-        f"noise_free_{READ_UNIT[control]}": [row[kept] for row, kept in zip(made.noise_free[i], mask, strict=True)],
     }
+    noise_free = [row[kept] for row, kept in zip(made.noise_free[i], mask, strict=True)]
+    if sample.protocol.control == "force":
+        return {**out, "setting_N": made.setting_error[i], "noise_free_mm": noise_free}
+    return {**out, "setting_mm": made.setting_error[i], "noise_free_N": noise_free}

@@ -63,8 +63,8 @@ class FreshSample:
     def stiffness_N(self, tension_N: float) -> Array:
         """Tangent stiffness at a tension, N per unit strain, ``(n,)``: zero-tension length times dτ/dS.
 
-        k1 where the law is eq (1) and no effect bends the strain. NaN where the wire cannot carry the tension, and where
-        nothing is known of k1.
+        k1 where the law is eq (1) and no effect bends the strain. NaN where the wire cannot carry the tension, and
+        where nothing is known of k1.
         """
         effects, theta = self._wire
         if "k1" not in theta:

@@ -11,7 +11,7 @@ from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.notice import to_json
 from wirebayes.prediction.request import request_of
-from wirebayes.prediction.table import HEADER, beyond_tested, dataset, mixture_table, unlikely_readings
+from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, unlikely_readings
 from wirebayes.results import store
 from wirebayes.results.mixture import members_of
 from wirebayes.results.store import Stored
@@ -43,7 +43,8 @@ def predict(
     posterior : Posterior, Findings, or path of a folder written by fit or discover
     protocol : path of a CSV, DataFrame, or mapping of name to (r,) array
         Columns ``hold``, ``displacement_mm``, ``time_s``, with ``temperature_C`` where the training data had it, and
-        optionally ``tension_N``: a first reading of a hold, which conditions the prediction, else NaN.
+        optionally ``tension_N``: a first reading of a hold, which conditions the prediction, else NaN. Of a test under
+        weights ``tension_N`` and ``displacement_mm`` change places.
     experiment : str, optional
         Which one, where there are several.
     model : {"plain", "final"}, optional
@@ -60,9 +61,10 @@ def predict(
     -------
     xarray.Dataset
         Dimension ``reading``, a row of the protocol each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``,
-        ``q95_N`` with units as attributes. The attribute ``prediction`` says which sample was predicted, given what;
-        ``warnings``, where there is one, what speaks against the posterior, what lies far beyond the tested range, and
-        which given readings are far from what was expected; ``warning_kinds`` has the kind of each.
+        ``q95_N`` (``mean_mm`` … under weights) with units as attributes. The attribute ``prediction`` says which sample
+        was predicted, given what; ``warnings``, where there is one, what speaks against the posterior, what lies far
+        beyond the tested range, and which given readings are far from what was expected; ``warning_kinds`` has the kind
+        of each.
 
     Raises
     ------
@@ -82,10 +84,11 @@ def predict(
     if model is not None:
         check_choice("model", model, ("plain", "final"))
     members = stored_posteriors(posterior, experiment, model, own)
+    control = members[0][1].sample.protocol.control
     if is_table(protocol):
-        cells = protocol_of_columns(protocol)
+        cells = protocol_of_columns(protocol, control)
     elif isinstance(protocol, str | os.PathLike):
-        cells = protocol_table(Path(protocol))
+        cells = protocol_table(Path(protocol), control)
     else:
         raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
     requests = [(probability, request_of(cells, stored, fresh=fresh)) for probability, stored in members]
@@ -96,7 +99,7 @@ def predict(
             raise InputError(f"--output {output}: found the protocol itself, expected another file")
     rows = mixture_table(requests, seed)
     if output is not None:
-        write_csv(Path(output), HEADER, rows)
+        write_csv(Path(output), header(control), rows)
     sentence = requests[0][1].sentence
     if len(requests) > 1:
         sentence += (
@@ -108,7 +111,7 @@ def predict(
     if notices:  # in two attributes, for netCDF holds text but no mappings
         attributes["warnings"] = [notice["text"] for notice in notices]
         attributes["warning_kinds"] = [notice["kind"] for notice in notices]
-    return dataset(rows, attributes)
+    return dataset(rows, attributes, control)
 
 
 def stored_posteriors(

@@ -6,6 +6,7 @@ from typing import Any
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
+from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.report.blocks import (
     Block,
     Page,
@@ -58,12 +59,15 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     blocks += beside_the_answer(table)
     if (folder / name).is_dir() and (pictures := pictures_in(folder / name, _CAPTIONS)):
         blocks.append(Pictures(pictures))
-    header = ["model", "weight", f"elpd − {table['base']}", "standard error", "held out: rms, N"]
-    header += ["given first reading, N", "meaning"]
+    scored = [r["held_out"]["given_first"] for r in good if r["held_out"]]
+    unit = unit_read(scored[0] or {}) if scored else "N"
+    header = ["model", "weight", f"elpd − {table['base']}", "standard error", f"held out: rms, {unit}"]
+    header += [f"given first reading, {unit}", "meaning"]
     lines = []
     for r in good:
         difference, held = r["difference"], r["held_out"]
-        errors = (number(s and s["rmse_N"], 2) for s in ((held["free"], held["given_first"]) if held else (None, None)))
+        both = (held["free"], held["given_first"]) if held else (None, None)
+        errors = (number(s and read(s, "rmse"), 2) for s in both)
         scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
         lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _plain(r.get("meaning") or "")])
     blocks.append(

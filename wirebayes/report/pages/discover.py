@@ -5,6 +5,7 @@ from typing import Any
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
+from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -85,7 +86,7 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         blocks.append(Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)]))
     if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
         blocks.append(Pictures(others))
-    if len(v.get("steps", [])) > 1 and v["steps"][0]["rmse_N"] is not None:
+    if len(v.get("steps", [])) > 1 and read(v["steps"][0], "rmse") is not None:
         figure = waterfall(v)
         caption = (
             "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
@@ -93,10 +94,11 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         )
         blocks.append(Pictures([Picture(drawn(figure), caption, caption)]))
         names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
-        scores = [[number(s[k]) for k in ("rmse_N", "elpd", "coverage_90")] for s in v["steps"]]
+        unit = unit_read(v["steps"][0])
+        scores = [[number(s) for s in (read(x, "rmse"), x["elpd"], x["coverage_90"])] for x in v["steps"]]
         lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
         caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
-        blocks.append(Table(["model", "rms error (N)", "elpd", "readings in 90 % bands"], lines, caption))
+        blocks.append(Table(["model", f"rms error ({unit})", "elpd", "readings in 90 % bands"], lines, caption))
     if v.get("probabilities"):
         ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
         inclusion = v.get("inclusion", {})
@@ -131,8 +133,8 @@ def _spoken(v: ExperimentFindings) -> str:
 
 
 _BEFORE_AND_AFTER = (
-    "Measured minus predicted tension, hold after hold: above under the plain model, below with what was found. Shaded "
-    "holds were kept apart to test the models; both are fitted to all holds here."
+    "Measured minus predicted readings, hold after hold: above under the plain model, below with what was found. "
+    "Shaded holds were kept apart to test the models; both are fitted to all holds here."
 )
 
 
@@ -159,13 +161,13 @@ def _held_out(v: ExperimentFindings) -> str:
     held = v.get("held_out") or {}
     if not held.get("plain") or not held.get("final"):
         return ""
-    plain, final = (number(held[model]["rmse_N"], 2) for model in ("plain", "final"))
+    plain, final = (number(read(held[model], "rmse"), 2) for model in ("plain", "final"))
     holds = listed([str(h) for h in held["holds"]])
-    text = f"On the unused holds {holds} the rms error goes from {plain} to {final} N"
+    text = f"On the unused holds {holds} the rms error goes from {plain} to {final} {unit_read(held['plain'])}"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
     if v.get("accepted") and (flexible := held.get("flexible")):
-        text += f"; a smooth curve instead of a named effect reaches {number(flexible['rmse_N'], 2)}"
+        text += f"; a smooth curve instead of a named effect reaches {number(read(flexible, 'rmse'), 2)}"
     return text + "."
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ModelJson, PredictionScores
+from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel
 
@@ -63,12 +64,13 @@ def differences(name: str, table: ComparedModels) -> Figure:
 def held_out_errors(name: str, table: ComparedModels) -> Figure:
     """Root mean square error on the held-out holds, freely and given the first reading."""
     rows = [(r, held) for r in table["models"] if r["failed"] is None and (held := r["held_out"])]
-    figure, axes = panel("rms error on held-out holds, N", "", name, (5.4, 1.2 + 0.22 * len(rows)))
+    unit = unit_read(rows[0][1]["given_first"] or {}) if rows else "N"
+    figure, axes = panel(f"rms error on held-out holds, {unit}", "", name, (5.4, 1.2 + 0.22 * len(rows)))
     drawn: tuple[tuple[Way, str, str], ...] = (
         ("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")
     )  # fmt: skip
     for way, colour, label in drawn:
-        found = [(place, scores["rmse_N"]) for place, (_, held) in enumerate(rows) if (scores := held[way])]
+        found = [(place, read(scores, "rmse")) for place, (_, held) in enumerate(rows) if (scores := held[way])]
         axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
     logarithmic(axes)
     _names(axes, [row for row, _ in rows])
@@ -84,18 +86,20 @@ def _names(axes: Any, rows: list[ComparedModel]) -> None:
 def bands(title: str, scores: PredictionScores) -> Figure:
     """Measured readings minus the predictive median, in the 50, 90 and 99 % bands."""
     r = {k: np.asarray(v, float) for k, v in scores["readings"].items()}
-    figure, axes = panel("hold (readings in order of time within each)", "measured − predicted, N", title)
+    figure, axes = panel(
+        "hold (readings in order of time within each)", f"measured − predicted, {unit_read(r, 'observed')}", title
+    )
     numbers = list(dict.fromkeys(r["hold"].astype(int).tolist()))
     longest = max(float(r["time_s"].max()), 1e-9)
     place = np.array([numbers.index(int(h)) for h in r["hold"]]) - 0.35 + 0.7 * r["time_s"] / longest
-    q = r["quantiles_N"]
+    q = read(r, "quantiles")
     for i, number in enumerate(numbers):
         here = r["hold"] == number
         for low, high, alpha, label in ((0, 6, 0.12, "99 %"), (1, 5, 0.16, "90 %"), (2, 4, 0.22, "50 %")):
             axes.fill_between(place[here], (q[low] - q[3])[here], (q[high] - q[3])[here], color=CHAIN, alpha=alpha,
                               lw=0, label=label if i == 0 else None)  # fmt: skip
     axes.axhline(0, color=CHAIN, lw=1)
-    axes.scatter(place, r["observed_N"] - q[3], s=14, color=INK, zorder=3, label="measured − median")
+    axes.scatter(place, read(r, "observed") - q[3], s=14, color=INK, zorder=3, label="measured − median")
     axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
     legend_below(figure, axes, 4)
     return figure

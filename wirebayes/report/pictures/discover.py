@@ -10,17 +10,19 @@ from matplotlib.figure import Figure
 
 from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.model import likelihoods
 from wirebayes.report.blocks import save
 from wirebayes.results.store import Stored
 from wirebayes.typing import Array
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.staircase import Linearised, linearise
 
 _MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
 
 
 def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, target: Path) -> None:
-    """Draw measured minus predicted tension for the plain and the final posterior of an experiment.
+    """Draw measured minus predicted readings for the plain and the final posterior of an experiment.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, 
     for axis, stored, title in zip(axes, (plain, final), titles, strict=True):
         _residuals(axis, stored, verdict["held_out"]["holds"])
         axis.set_title(f"{target.stem}: {title}", loc="left", fontsize=10)
-        axis.set_ylabel("measured − predicted (N)")
+        axis.set_ylabel(f"measured − predicted ({READ_UNIT[plain.sample.protocol.control]})")
     axes[1].set_xlabel("hold number; within each hold, time runs to the right")
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
@@ -53,16 +55,17 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     verdict : dict
         The experiment's part of ``discovery.json``, with at least one accepted effect and holds that were held out.
     """
-    steps, floor = verdict["steps"], verdict["held_out"]["floor_N"]
-    heights = [s["rmse_N"] for s in steps if s["rmse_N"] is not None]
+    steps, floor = verdict["steps"], read(verdict["held_out"], "floor")
+    heights = [rmse for s in steps if (rmse := read(s, "rmse")) is not None]
+    unit = unit_read(steps[0])
     names = ["plain model", *(s["model"].replace("_", " ") for s in steps[1:]), "left over", "noise"]
     bars = [(0.0, heights[0], _MEASURED)]
     bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
     bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
     figure = Figure(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
     axis = figure.subplots()
-    labels = [f"{heights[0]:.3g} N", *(f"{b - a:+.2g} N".replace("-", "−") for a, b in pairwise(heights))]
-    labels += [f"{max(heights[-1] - floor, 0.0):.2g} N", f"{floor:.2g} N"]
+    labels = [f"{heights[0]:.3g} {unit}", *(f"{b - a:+.2g} {unit}".replace("-", "−") for a, b in pairwise(heights))]
+    labels += [f"{max(heights[-1] - floor, 0.0):.2g} {unit}", f"{floor:.2g} {unit}"]
     for x, ((low, high, colour), label) in enumerate(zip(bars, labels, strict=True)):
         axis.bar(x, max(high - low, 0.002 * max(heights)), bottom=low, color=colour, width=0.7)
         axis.text(x, high, label, ha="center", va="bottom", fontsize=8)
@@ -70,7 +73,7 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     for x, height in enumerate(ends):
         axis.plot([x + 0.35, x + 0.65], [height, height], color="0.4", lw=0.8)
     axis.set_xticks(range(len(names)), [textwrap.fill(n, 12) for n in names], fontsize=9)
-    axis.set_ylabel("rms error on held-out holds (N)")
+    axis.set_ylabel(f"rms error on held-out holds ({unit})")
     axis.margins(y=0.12)
     axis.spines[["top", "right"]].set_visible(False)
     return figure
@@ -113,7 +116,10 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Pa
         axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.set_xlabel(_LABELS[finding["covariate"]])
-        axis.set_ylabel("measured − plain model (N)" + (",\nless its hold's mean" if within else ""))
+        axis.set_ylabel(
+            f"measured − plain model ({READ_UNIT[sample.protocol.control]})"
+            + (",\nless its hold's mean" if within else "")
+        )
         axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
         axis.legend(fontsize=8, frameon=False)
         save(figure, folder / f"where-{finding['covariate'].replace(' ', '-')}.svg")
