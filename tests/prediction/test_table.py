@@ -50,11 +50,16 @@ def test_what_is_far_beyond_the_tests_is_said(tension: float, time: float, found
     """Twice the largest tension read, ten times the longest hold that was read: no padding, no unrecorded hold."""
     mask = np.array([[True, True, True], [True, False, False], [False, False, False]])
     readings = np.where(mask, 3.0, 99.0)[..., None]
-    protocol = SimpleNamespace(mask=mask, recorded=mask.any(axis=1), duration_s=np.array([120.0, 30.0, 9e9]))
+    protocol = SimpleNamespace(
+        mask=mask, recorded=mask.any(axis=1), duration_s=np.array([120.0, 30.0, 9e9]), control="displacement"
+    )
     stored: Any = SimpleNamespace(sample=SimpleNamespace(protocol=protocol, readings=readings))
     rows = [["wire", 1, 2.0, 5.0, *np.ones(5)], ["wire", 2, 4.0, time, 9.0, 9.0, 9.0, tension, 9.0]]
     sentences = beyond_tested(rows, stored)
     assert [sentence.split(" ")[5] for sentence in sentences] == found
+    protocol.control, protocol.setting = "force", np.array([3.0, 2.0, 99.0])  # a weight of which nothing was read
+    rows = [["wire", 1, 1.0, 5.0, *np.full(5, 99.0)], ["wire", 2, tension, time, *np.full(5, 99.0)]]
+    assert [sentence.split(" ")[5] for sentence in beyond_tested(rows, stored)] == found
 
 
 def test_quantiles_are_those_of_the_known_normal() -> None:
