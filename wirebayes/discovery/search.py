@@ -39,8 +39,8 @@ from wirebayes.json_files.discovery import (
     Remainder,
     Verdict,
 )
-from wirebayes.notice import named, to_json
 from wirebayes.json_files.read_units import in_unit
+from wirebayes.notice import named, to_json
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
