@@ -59,7 +59,7 @@ def test_what_is_far_beyond_the_tests_is_said(tension: float, time: float, found
     assert [sentence.split(" ")[5] for sentence in sentences] == found
     protocol.control, protocol.setting = "force", np.array([3.0, 2.0, 99.0])  # a weight of which nothing was read
     rows = [["wire", 1, 1.0, 5.0, *np.full(5, 99.0)], ["wire", 2, tension, time, *np.full(5, 99.0)]]
-    assert [sentence.split(" ")[5] for sentence in beyond_tested(rows, stored)] == found
+    assert [notice.text.split(" ")[5] for notice in beyond_tested(rows, stored)] == found
 
 
 def test_quantiles_are_those_of_the_known_normal() -> None:

@@ -94,11 +94,14 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         )
         blocks.append(Pictures([Picture(drawn(figure), caption, caption)]))
         names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
-        unit = unit_read(v["steps"][0])
-        scores = [[number(s) for s in (read(x, "rmse"), x["elpd"], x["coverage_90"])] for x in v["steps"]]
+        scores = [[number(k) for k in (read(s, "rmse"), s["elpd"], s["coverage_90"])] for s in v["steps"]]
         lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
         caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
-        blocks.append(Table(["model", f"rms error ({unit})", "elpd", "readings in 90 % bands"], lines, caption))
+        blocks.append(
+            Table(
+                ["model", f"rms error ({unit_read(v['steps'][0])})", "elpd", "readings in 90 % bands"], lines, caption
+            )
+        )
     if v.get("probabilities"):
         ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
         inclusion = v.get("inclusion", {})
