@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, logsumexp
 
-from wirebayes.discovery.settings import MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+from wirebayes.discovery.settings import MORE, UNKNOWN_WEIGHT
 
 from .baselines import gaussian_process
 from .delta import Geometry, derivatives
@@ -171,9 +171,9 @@ def answers(geo: Geometry, directions: Directions, z: Array, rng: np.random.Gene
     without = [np.full((draws, 1), -np.inf)]  # nothing at all is no answer
     for sets in every[1:]:
         size = sets.members.shape[1]
-        prior = (size - 1) * np.log(MORE_EFFECTS) + np.log(len(every[1].effects) / len(sets.effects))
+        prior = (size - 1) * np.log(MORE) + np.log(len(every[1].effects) / len(sets.effects))
         without.append(log_evidence(bare, sets, degrees) + prior)
-    weights = UNKNOWN_WEIGHT, REMAINDER_WEIGHT  # of a remainder alone, and beside one effect
+    weights = UNKNOWN_WEIGHT, MORE  # of a remainder alone, and beside one effect
     beside = [log_evidence(more, sets, degrees) + np.log(w) for sets, w in zip(every, weights, strict=False)]
     alone, remainder = np.concatenate(without, axis=1), np.concatenate(beside, axis=1)
     either = alone.copy()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery.settings import MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+from wirebayes.discovery.settings import MORE, UNKNOWN_WEIGHT
 
 from .cases import TOGETHER
 from .catalogue import EFFECTS
@@ -299,16 +299,16 @@ def calibration(rows: list[Row], weights: Mapping[str, float] = {}) -> list[dict
 def prior_weights(rows: list[Row]) -> dict[str, float]:
     """Weight of a case of each kind with which the kinds are as frequent as the prior of `discover` expects.
 
-    A single name has weight 1, so all n of them have n; all pairs together have `MORE_EFFECTS` of that, all threes as
-    much of the pairs; a remainder beside one name has `REMAINDER_WEIGHT` of what the name has without, and a remainder
+    A single name has weight 1, so all n of them have n; all pairs together have `MORE` of that, all threes as
+    much of the pairs; a remainder beside one name has `MORE` of what the name has without, and a remainder
     alone has `UNKNOWN_WEIGHT`. What the benchmark has no cases of, such as a remainder beside two names, is left out.
     """
     n = len(EFFECTS)
     expected = {
         ("single",): 1.0 * n,
-        ("pair", "two"): MORE_EFFECTS * n,
-        ("three",): MORE_EFFECTS**2 * n,
-        ("mixed",): REMAINDER_WEIGHT * n,
+        ("pair", "two"): MORE * n,
+        ("three",): MORE**2 * n,
+        ("mixed",): MORE * n,
         ("without", "foreign"): UNKNOWN_WEIGHT,
     }
     out: dict[str, float] = {}

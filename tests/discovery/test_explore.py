@@ -9,7 +9,7 @@ import pytest
 from wirebayes.discovery import stepwise
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence
-from wirebayes.discovery.settings import LEFT_OVER, MOST_EFFECTS, MOST_LOOKS, REACH, Settings
+from wirebayes.discovery.settings import LEFT_OVER, MORE, MOST_EFFECTS, MOST_LOOKS, REACH, Settings
 
 NAMES = 20
 ONE = np.ones(1)
@@ -28,6 +28,7 @@ def explored(
     smooth: float = -20.0,
     credits: dict[str, float] | None = None,
     remainders: dict[str, float] | None = None,
+    families: tuple[tuple[str, ...], ...] = (),
 ) -> tuple[stepwise.Explored, list[str]]:
     """What the search makes of sets whose evidence is written down, and the order in which it fitted them."""
     order: list[str] = []
@@ -46,7 +47,7 @@ def explored(
     monkeypatch.setattr(stepwise, "_scanned", lambda block, trials: SimpleNamespace(flexible=np.array([smooth])))
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
     found = stepwise.explore(
-        [None], evidence(singles), [], [], settings, np.random.default_rng(0), map  # type: ignore[list-item]
+        [None], evidence(singles), [], [], families, settings, np.random.default_rng(0), map  # type: ignore[list-item]
     )  # fmt: skip
     return found, order
 
@@ -56,6 +57,15 @@ def test_the_three_most_promising_names_are_fitted_first_then_two_at_a_time(monk
     found, order = explored(monkeypatch, singles)
     assert "".join(order) == "abcdefg" and len(order) == MOST_LOOKS == 7
     assert [s.names for s in found.sets][0] == () and len(found.sets) == 11  # the others keep their evidence
+
+
+def test_each_combination_of_families_is_looked_at_before_look_alikes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seven look-alikes would use up all looks; what only shows beside one of them would never be met."""
+    singles = {name: 20.0 - 0.1 * k for k, name in enumerate("abcdefghij")}
+    found, order = explored(monkeypatch, singles, families=(tuple("abcdefgh"),))
+    assert order == ["a", "i", "j", "b", "c", "d", "e"]
+    beside, _ = explored(monkeypatch, singles, {"a": {"z": 6.0}}, families=(tuple("abcdefgh"),))
+    assert frozenset("az") in beside.fitted
 
 
 def test_what_lies_too_far_below_the_best_is_not_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,8 +109,8 @@ def test_of_two_orders_with_one_evidence_the_weaker_effect_comes_last(
 
 
 def test_a_set_that_is_good_beside_a_remainder_is_fitted_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Alone b is hopeless; beside a remainder, which has half the weight of none, it may come to 25 nats."""
-    promised = {"a": -30.0, "b": 20.0}
+    """Alone b is hopeless; beside a remainder, which has a tenth of the weight of none, it may come to 24.7 nats."""
+    promised = {"a": -30.0, "b": 22.0}
     order = explored(monkeypatch, {"a": 24.0, "b": 1.0}, smooth=5.0, credits=promised)[1]
     assert order == ["b", "a"]
     assert explored(monkeypatch, {"a": 24.0, "b": 1.0}, smooth=5.0, credits={"a": -30.0, "b": 14.0})[1] == ["a"]
@@ -118,7 +128,7 @@ def test_what_further_effects_explain_may_be_a_remainder_that_is_not_smooth(monk
     for value in (5.0, 20.0):
         found, _ = explored(monkeypatch, {"a": 20.0, "b": 18.0}, {"a": {"c": value, "d": 1.0}})
         # the remainder's weight of a half comes on top
-        assert found.left_over == {frozenset("a"): pytest.approx(np.log(1.0 / 0.5) + PAIR + min(value, LEFT_OVER))}
+        assert found.left_over == {frozenset("a"): pytest.approx(np.log(1.0 / MORE) + PAIR + min(value, LEFT_OVER))}
 
 
 def test_a_step_back_finds_a_set_whose_names_are_little_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,12 +171,12 @@ def test_without_a_single_name_there_is_the_plain_model_with_its_remainder(monke
 
 
 def test_a_fitted_set_keeps_its_evidence_and_has_the_remainder_of_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, _ = explored(monkeypatch, {"a": 20.0, "b": 3.0}, {"a": {"b": 2.5}}, remainders={"a": 4.0, "ab": -1.0})
+    found, _ = explored(monkeypatch, {"a": 20.0, "b": 3.0}, {"a": {"b": 2.2}}, remainders={"a": 4.0, "ab": -1.0})
     by_key = {s.key: s for s in found.sets}
     assert list(found.fitted) == [frozenset("a")] and by_key[frozenset("a")] is found.fitted[frozenset("a")].effects
     assert by_key[frozenset("a")].remainder == 4.0 and by_key[frozenset("a")].log_bayes == 20.0
     pair = by_key[frozenset("ab")]
-    assert pair.remainder is None and pair.log_bayes == 22.5 and set(pair.presence) == {"a", "b"}
+    assert pair.remainder is None and pair.log_bayes == 22.2 and set(pair.presence) == {"a", "b"}
 
 
 class Fits:

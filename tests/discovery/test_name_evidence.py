@@ -106,6 +106,48 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
 
 
+def test_an_absurd_value_of_the_scan_takes_no_other_name_off_the_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The path to larger effects gives drift 60 nats, its refit none: toe, at 8, is refitted, and stays."""
+    names = ("sensor_drift", "toe", "strain_stiffening")
+    trials = [probes(named(name))[0] for name in names]
+    candidates = [Candidate(k, name, (0,), True) for k, name in enumerate(names)]
+    own = {"sensor_drift": -3.0, "toe": 7.0, "strain_stiffening": -1.0}
+    asked: list[str] = []
+
+    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float) -> refit.Refit:
+        asked.append(effect.name)
+        return refit.Refit(effect, tuple(which), own[effect.name], 8.0, 1.0, ())
+
+    monkeypatch.setattr(name_evidence, "refit", refitted)
+    monkeypatch.setattr(name_evidence, "_WAVE", 1)
+    pieces = scan_of(np.array([8.0]), False)
+    effects = np.array([[4.0, 12.0, -9.0]])
+    data = Scan(
+        effects, pieces.flexible, np.full((1, 3), 8.0 / NORM), np.full((1, 3), NORM),
+        Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(3, bool)})),
+    )  # fmt: skip
+    further = {candidates[0]: 60.0}
+    found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data], further)  # type: ignore[list-item]
+    # the cut is toe's 7 less 5 and half of it: stiffening, at -12, is below it
+    assert asked == ["sensor_drift", "toe"] and set(found.winners) == {"sensor_drift", "toe"}
+    assert found.log_bayes["toe"] == pytest.approx(7.0) and found.log_bayes["sensor_drift"] == pytest.approx(-3.0)
+
+
+def test_a_form_that_was_not_refitted_counts_for_no_more_than_one_that_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve holds, each 30 nats by the scan; three are refitted and come to 2."""
+    trials = [p for hold in range(1, 13) for p in probes(named(f"grip_slip@{hold}"))[:1]]
+    candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
+    monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
+        effect, tuple(which), 2.0, 8.0, 1.0, ()))  # fmt: skip
+    pieces = scan_of(np.array([8.0]), False)
+    data = Scan(
+        np.full((1, 12), 34.0), pieces.flexible, np.full((1, 12), 8.0 / NORM), np.full((1, 12), NORM),
+        Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
+    )  # fmt: skip
+    found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
+    assert found.log_bayes["grip_slip"] == pytest.approx(2.0)
+
+
 def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its probability is zero; as something that is no number, it made every other probability none either."""
     monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(

@@ -8,7 +8,7 @@ import pytest
 
 from wirebayes.discovery import power
 from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, joined
-from wirebayes.discovery.power import copies, group_of, similarity
+from wirebayes.discovery.power import group_of, similarity
 from wirebayes.discovery.screening import Candidate
 from wirebayes.effects import named
 
@@ -65,15 +65,6 @@ def test_materials_count_as_strongly_as_they_show_an_effect() -> None:
 
 
 @pytest.mark.usefixtures("signatures")
-def test_copies_are_names_with_one_signature_for_every_form() -> None:
-    nearly = (1.0, 0.01)  # cos 0.99995
-    one = block((1.0, 0.0), (2.0, 0.0), (0.0, 1.0), nearly, (0.0, 0.0), (1.0, 0.02))
-    names = ["a", "twin", "b", "b", "none", "near"]
-    found = copies([one], [probe(n) for n in names], [1.0])
-    # b has a form like a's, but also another one; `near` has cos 0.9998 with a and 0.99995 with one form of b
-    assert found == {"a": {"a", "twin"}, "twin": {"a", "twin"}, "b": {"b"}, "near": {"near"}}
-
-
 def test_a_group_holds_what_is_at_least_so_alike() -> None:
     alike = {("a", "b"): 0.96, ("a", "c"): 0.94, ("c", "d"): 0.99, ("a", "a"): 1.0}
     assert group_of(["a"], alike) == ["a", "b"]

@@ -112,7 +112,7 @@ def test_what_has_a_name_is_named_beside_what_has_none(tmp_path: Path) -> None:
     experiments = read_experiments(tmp_path / "cases" / spec.key / "experiment.toml")
     found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=FEW))
     report = found.report["experiments"][experiments[0].name]
-    assert found.report["version"] == 2
+    assert found.report["version"] == 3
     assert report["verdict"] == "partial" and report["accepted"] == report["effects"] == ["toe"]
     assert report["inclusion"]["toe"] > 0.9 and report["remainder"]["probability"] > 0.5
     assert report["remainder"]["where"] and report["remainder"]["p"] < 0.03
@@ -228,7 +228,7 @@ class ScrewWobble(Effect):
     arguments = ["discover", str(tmp_path / "experiments.toml"), "--output", str(out), "--own-effects", str(own)]
     assert cli.main(arguments) == 0
     found = json.loads((out / "discovery.json").read_text())
-    assert found["version"] == 2 and found["experiments"]["simulated"]["best"] == "screw_wobble"
+    assert found["version"] == 3 and found["experiments"]["simulated"]["best"] == "screw_wobble"
     for model in ("plain", "final"):
         assert json.loads((out / "simulated" / model / "summary.json").read_text())["converged"]
     assert "screw_wobble.a" in json.loads((out / "simulated" / "final" / "summary.json").read_text())["parameters"]

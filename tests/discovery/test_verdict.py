@@ -8,10 +8,11 @@ import pytest
 
 from wirebayes.discovery import global_test, held_out, verdict
 from wirebayes.discovery.held_out import LeftOut
+from wirebayes.discovery.judgement import judge
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.settings import Settings
-from wirebayes.discovery.stepwise import Accepted, Explored
-from wirebayes.discovery.verdict import Retest, decide, verdict_of
+from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet
+from wirebayes.discovery.verdict import Retest, accepted_effects, decide, evidence
 
 ONE = np.ones(1)
 UNLIKELIER = -log_prior(2, 20)  # nats by which a set of two has less prior weight than one of one, of twenty names
@@ -25,25 +26,37 @@ def explored(sets: dict[str, float], smooth: float = -20.0) -> Explored:
     for s in known:
         accepted = tuple(Accepted(n, (0,), {0: n}) for n in s.names)  # type: ignore[dict-item]
         fitted[s.key] = SimpleNamespace(effects=s, accepted=accepted, blocks=[SimpleNamespace(effects=s.names)])
-    return Explored((EffectSet((), 0.0, {}, np.array([smooth])), *known), fitted, {})
+    root = EffectSet((), 0.0, {}, np.array([smooth]))
+    return Explored((root, *known), fitted, {}, {}, FittedSet(root, [], (), None, ([], [])))
 
 
 def decided(
-    monkeypatch: pytest.MonkeyPatch, sets: Explored, gains: dict[str, float], p: dict[str, float]
+    monkeypatch: pytest.MonkeyPatch,
+    sets: Explored,
+    gains: dict[str, float],
+    p: dict[str, float],
+    families: list[tuple[str, ...]] = [],  # noqa: B006
 ) -> verdict.Decision:
     """The decision where leaving out a hold, and the second test, give these values for each set."""
 
-    def gain(plain: Any, best: Any, *others: Any) -> np.ndarray:
-        return np.array([gains.get("".join(best.effects.names), 50.0)])
+    def gain(best: Any, *others: Any) -> float:
+        return gains.get("".join(best.effects.names), 50.0)
 
     def retested(best: Any, *others: Any) -> Retest:
         return Retest(p.get("".join(best.effects.names), 0.5), [[]])
 
-    monkeypatch.setattr(verdict, "_gain", gain)
+    monkeypatch.setattr(verdict, "_name_gain", gain)
+    monkeypatch.setattr(verdict, "_family_gain", gain)
     monkeypatch.setattr(verdict, "_retested", retested)
     settings = Settings(kinds=dict.fromkeys("abcdefghijklmnopqrst"))  # type: ignore[arg-type]
     rng = np.random.default_rng(0)
-    return decide([SimpleNamespace()], sets, {}, settings, LeftOut(rng, map), rng, map)  # type: ignore[list-item]
+    plain: Any = [SimpleNamespace(experiments=[SimpleNamespace(recorded_holds=range(12))])]
+    return decide(plain, sets, families, settings, LeftOut(rng, map), rng, map)
+
+
+def verdict_of(found: verdict.Decision, gain: float = 50.0) -> str:
+    """The verdict where a smooth discrepancy gains so much beside what is established."""
+    return judge(evidence(found, 0.01, 0, gain)).verdict
 
 
 def names(found: verdict.Decision) -> str:
@@ -65,7 +78,7 @@ def test_what_fails_the_second_test_leaves_something_over(
     """At .03 a remainder is as likely as none; the odds follow the density of p where more is missing."""
     found = decided(monkeypatch, explored({"a": 20.0}), {}, {"a": p})
     assert (found.posterior.remainder[0] > 0.5) == remains
-    assert verdict_of(found, 0)[0] == ("partial" if remains else "named")
+    assert verdict_of(found) == ("partial" if remains else "named")
     odds = found.posterior.remainder[0] / (1.0 - found.posterior.remainder[0])
     assert odds == pytest.approx((0.03 / p) ** 0.8, rel=1e-3)
 
@@ -86,7 +99,7 @@ def test_a_set_that_leaves_something_over_gives_way_to_one_that_does_not(
     """If it is no more than two nats behind, and passes the test itself."""
     found = decided(monkeypatch, explored({"a": 20.0, "b": 20.0 - behind}), {}, {"a": 0.01, "b": p})
     assert names(found) == best
-    assert verdict_of(found, 0)[0] == ("named" if best == "b" else "partial")
+    assert verdict_of(found) == ("named" if best == "b" else "partial")
 
 
 @pytest.mark.parametrize(("gain", "best"), [(4.1, "bc"), (3.9, "a")])
@@ -102,7 +115,7 @@ def test_the_set_that_passed_the_second_test_is_the_one_that_is_reported(monkeyp
     found = decided(monkeypatch, sets, {}, {"a": 0.01, "b": 0.4})
     assert found.posterior.best.names == ("c",)
     assert names(found) == "b" and found.retest is not None and found.retest.p == 0.4
-    assert list(found.gains) == ["b"]
+    assert list(found.gains) == [("b",)]
 
 
 def test_a_set_known_by_refits_alone_keeps_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,12 +123,12 @@ def test_a_set_known_by_refits_alone_keeps_its_weight(monkeypatch: pytest.Monkey
     del sets.fitted[frozenset("b")]
     found = decided(monkeypatch, sets, {}, {})
     assert names(found) == "a" and found.posterior.inclusion["b"][0] > 0.7
-    assert verdict_of(found, 0)[0] == "ambiguous"
+    assert verdict_of(found) == "ambiguous"
 
 
 def test_a_remainder_alone_needs_no_test(monkeypatch: pytest.MonkeyPatch) -> None:
     found = decided(monkeypatch, explored({"a": 3.0}, smooth=12.0), {}, {})
-    assert found.best is None and verdict_of(found, 0) == ("unknown", [])
+    assert found.best is None and verdict_of(found) == "unknown"
 
 
 def test_a_remainder_in_question_is_tried_on_four_sets_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,7 +145,7 @@ def test_sets_that_failed_the_second_test_lose_their_weight_to_the_one_that_pass
 ) -> None:
     found = decided(monkeypatch, explored({"a": 20.0, "b": 19.0, "c": 18.5}), {}, {"a": 0.01, "b": 0.02})
     assert names(found) == "c"
-    assert set(found.posterior.inclusion) == {"c"} and verdict_of(found, 0)[0] == "named"
+    assert set(found.posterior.inclusion) == {"c"} and verdict_of(found) == "named"
 
 
 def test_nothing_left_to_add_passes_the_second_test() -> None:
@@ -144,94 +157,123 @@ def test_nothing_left_to_add_passes_the_second_test() -> None:
     assert verdict._fails(Retest(0.03, [[]])) and not verdict._fails(Retest(0.0301, [[]]))
 
 
-@pytest.mark.parametrize("before", [True, False])
-def test_the_gain_of_an_effect_is_against_the_model_without_it(before: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the set without it was fitted, against that, else against the plain model; in its own materials alone."""
+class Scored:
+    """Fits that are their own left-out densities, by set."""
+
+    def __init__(self, known: dict[str, list[list[float]]]) -> None:
+        self.known = {frozenset(names): blocks for names, blocks in known.items()}
+
+    def knows(self, key: frozenset[str]) -> bool:
+        return key in self.known
+
+    def of(self, key: frozenset[str]) -> list[list[float]]:
+        return self.known[key]
+
+
+def scored(monkeypatch: pytest.MonkeyPatch) -> LeftOut:
     monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
-    plain = [[1.0], [2.0, 2.0], [3.0]]
-    sets = explored({"a": 1.0, "ab": 2.0})
-    sets.fitted[frozenset("a")].blocks[:] = [[5.0], [6.0, 6.0], [7.0]]
-    best = sets.fitted[frozenset("ab")]
-    best.blocks[:] = [[10.0], [20.0, 20.0], [30.0]]
-    best.accepted = (best.accepted[0], Accepted("b", (1, 2), {}))  # type: ignore[misc]
-    if not before:
-        del sets.fitted[frozenset("a")]
-    found = verdict._gain(plain, best, sets, LeftOut(np.random.default_rng(0), map))  # type: ignore[arg-type]
-    assert found.tolist() == ([0.0, 28.0, 23.0] if before else [0.0, 36.0, 27.0])
+    return LeftOut(np.random.default_rng(0), map)
 
 
-@pytest.mark.parametrize(("names_", "gain"), [("a", 4.0), ("abc", 20.0)])
-def test_the_first_effect_gains_over_the_plain_model_the_third_over_two(
-    names_: str, gain: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: np.array(fit))
-    sets = explored({"a": 1.0, "ab": 2.0, "abc": 3.0})
-    for set_, elpd in (("a", 5.0), ("ab", 10.0), ("abc", 30.0)):
-        sets.fitted[frozenset(set_)].blocks[:] = [[elpd]]  # type: ignore[list-item]
-    best = sets.fitted[frozenset(names_)]
-    left_out = LeftOut(np.random.default_rng(0), map)
-    assert verdict._gain([[1.0]], best, sets, left_out).tolist() == [gain]  # type: ignore[list-item]
+def test_the_gain_of_an_effect_is_against_the_set_without_it_where_it_acts(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits: Any = Scored({"a": [[5.0], [6.0, 6.0], [7.0]]})
+    names = SimpleNamespace(key=frozenset("ab"), names=("a", "b"))
+    accepted = (Accepted("a", (0, 1, 2), {}), Accepted("b", (1, 2), {}))
+    best: Any = SimpleNamespace(effects=names, accepted=accepted, blocks=[[10.0], [20.0, 20.0], [30.0]])
+    assert verdict._name_gain(best, "b", fits, scored(monkeypatch)) == 28.0 + 23.0
 
 
-def test_effects_are_established_in_the_materials_where_they_act(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_gain_of_a_family_is_that_of_the_mixture_over_its_members(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside the others of the set; the weights forget each hold, and a member of less than a twentieth has none."""
+    sets = [EffectSet(tuple(names), 0.0, {}, None) for names in ("ab", "ac", "ad", "b", "e")]
+    weights = np.array([0.6, 0.3, 0.02, 0.05, 0.03])
+    found: Any = SimpleNamespace(sets=sets, without=weights, beside=np.zeros(5))
+    fits: Any = Scored({"a": [[1.0, 2.0]], "ac": [[3.0, 1.0]], "ad": [[90.0, 90.0]], "b": [[9.0, 9.0]]})
+    accepted = (Accepted("a", (0,), {}), Accepted("b", (0,), {}))
+    best: Any = SimpleNamespace(effects=sets[0], accepted=accepted, blocks=[[2.0, 4.0]])
+    gain = verdict._family_gain(best, ("b", "c", "d"), found, fits, scored(monkeypatch))
+    each = [0.9 / (0.6 / np.exp(one) + 0.3 / np.exp(other)) for one, other in ((2.0, 3.0), (4.0, 1.0))]
+    assert gain == pytest.approx(np.log(each).sum() - 3.0)
+
+
+def test_a_mixture_of_one_model_is_that_model_and_otherwise_between_the_two() -> None:
+    elpd = np.array([[1.0, -2.0], [3.0, -9.0]])
+    assert verdict.mixed(np.zeros(1), elpd[:1]) == pytest.approx(elpd[0])
+    found = verdict.mixed(np.log([0.5, 0.5]), elpd)
+    assert (found > elpd.min(axis=0)).all() and (found < elpd.max(axis=0)).all()
+
+
+def test_a_family_whose_mixture_does_not_predict_takes_all_its_sets_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    """b and c are one family: where the mixture beside a gains nothing, neither is kept there."""
+    sets = explored({"a": 10.0, "ab": 30.0, "ac": 29.0})
+    found = decided(monkeypatch, sets, {"ab": 3.9}, {}, [("b", "c")])
+    assert names(found) == "a" and not {"b", "c"} & set(found.posterior.inclusion)
+    alone = decided(monkeypatch, sets, {"ab": 3.9}, {})
+    assert names(alone) == "ac"
+
+
+def test_look_alikes_are_established_together_though_none_of_them_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = explored({"a": 20.0, "b": 19.8, "c": 5.0})
+    found = decided(monkeypatch, sets, {}, {}, [("a", "b"), ("c",)])
+    on_material = evidence(found, 0.01, 0)
+    assert max(found.posterior.inclusion[n][0] for n in "ab") < 0.9
+    assert on_material.families[0].members.keys() == {"a", "b"} and on_material.families[0].is_established
+    assert judge(on_material).verdict == "ambiguous" and judge(on_material).undecided == ("a", "b")
+    assert [a.name for a in accepted_effects(found, on_material, 0)] == ["a"]
+
+
+def test_effects_are_accepted_in_the_materials_where_they_act(monkeypatch: pytest.MonkeyPatch) -> None:
     found = decided(monkeypatch, explored({"a": 30.0, "ab": 60.0}), {"ab": 20.0}, {})
-    assert [a.name for a in verdict.established(found, 0)] == ["a", "b"]
-    assert verdict.established(found, 1) == []  # no effect acts in a second material
-    assert found.gains.keys() == {"a", "b"} and found.gains["b"].tolist() == [20.0]
+    assert found.gains == {("a",): 20.0, ("b",): 20.0}
+    assert [a.name for a in accepted_effects(found, evidence(found, 0.01, 0), 0)] == ["a", "b"]
+    assert accepted_effects(found, evidence(found, 0.01, 0), 1) == []  # no effect acts in a second material
     none = decided(monkeypatch, explored({"a": 3.0}, smooth=12.0), {}, {})
-    assert verdict.established(none, 0) == []
+    assert accepted_effects(none, evidence(none, 0.01, 0), 0) == []
 
 
-def test_the_chain_of_sets_is_reported_effect_by_effect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step whose set was never fitted has no gain of its own."""
-    sets = explored({"a": 20.0, "ab": 40.0, "abc": 60.0})
-    del sets.fitted[frozenset("ab")]
-    assert list(decided(monkeypatch, sets, {}, {}).gains) == ["a", "c"]
+def test_of_a_set_only_established_families_are_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second effect is in the best set, but not beyond doubt."""
+    found = decided(monkeypatch, explored({"a": 30.0, "ab": 31.0 + UNLIKELIER}), {}, {})
+    assert names(found) == "ab"
+    on_material = evidence(found, 0.01, 0)
+    assert [a.name for a in accepted_effects(found, on_material, 0)] == ["a"] and judge(on_material).verdict == "named"
+
+
+def test_too_few_holds_establish_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = explored({"a": 30.0})
+    few: Any = [SimpleNamespace(experiments=[SimpleNamespace(recorded_holds=range(2))])]
+    monkeypatch.setattr(verdict, "_retested", lambda *given: Retest(0.5, [[]]))
+    rng = np.random.default_rng(0)
+    settings = Settings(kinds=dict.fromkeys("abcdefghijklmnopqrst"))  # type: ignore[arg-type]
+    found = decide(few, sets, [], settings, LeftOut(rng, map), rng, map)
+    assert found.gains == {} and verdict_of(found) == "unknown"
+
+
+def alternative_models(weights: dict[str, float]) -> tuple[Any, Any, Any]:
+    """A decision between sets of one material, fits of them, and the fit of one as the final model."""
+    sets = [EffectSet(tuple(n), 0.0, dict.fromkeys(n, ONE), None) for n in weights]
+    space = SimpleNamespace(sets=sets, without=np.array(list(weights.values())), beside=np.zeros(len(weights)))
+
+    def final(names: str) -> Any:
+        return SimpleNamespace(effects=[SimpleNamespace(name=n, key=n) for n in names])
+
+    fits = Scored({n: [final(n)] for n in weights})
+    return SimpleNamespace(posterior=space), fits, final
 
 
 def test_more_models_than_three_beside_the_final_one_are_not_listed() -> None:
-    from wirebayes.discovery.verdict import alternatives
-
-    letters = "abcdef"
-    sets = [EffectSet((n,), 0.0, {}, None) for n in letters]
-    block = {n: SimpleNamespace(effects=[SimpleNamespace(key=n)]) for n in letters}
-    chances = [0.3, 0.2, 0.17, 0.13, 0.11, 0.09]
-    space = SimpleNamespace(sets=sets, without=chances, beside=[0.0] * 6)
-    known = SimpleNamespace(fitted={s.key: SimpleNamespace(blocks=[block[s.names[0]]]) for s in sets})
-    given = SimpleNamespace(posterior=space), known, 0, block["b"]
-    found = alternatives(*given, "named")  # type: ignore[arg-type]
+    decision, fits, final = alternative_models({"a": 0.3, "b": 0.2, "c": 0.17, "d": 0.13, "e": 0.11, "f": 0.09})
+    found = verdict.alternatives(decision, fits, 0, final("b"), "abcdef", False)
     assert [a.block.effects[0].key for a in found] == ["b", "a", "c", "d"]
     assert sum(a.probability for a in found) == pytest.approx(1.0)
-    assert found[1].probability == pytest.approx(0.3 / 0.8)
-    space.without = [0.04, 0.9, 0.03, 0.03, 0.0, 0.0]  # improbable ones are not sampled beside it
-    assert alternatives(*given, "named") == []  # type: ignore[arg-type]
-    space.without = [0.05, 0.9, 0.03, 0.02, 0.0, 0.0]
-    assert len(alternatives(*given, "named")) == 2  # type: ignore[arg-type]
-    space.without = [0.0] * 6
-    assert alternatives(*given, "named") == []  # type: ignore[arg-type]
+    assert found[1].probability == pytest.approx(0.3 / 0.8) and not found[1].remains
 
 
-def stood(inclusion: float = 1.0, gain: float = 50.0, remainder: float = 0.0, nothing: float = 0.0, **more: Any) -> Any:
-    """A decision for one effect in the first of two materials."""
-    found = SimpleNamespace(
-        shares=[more.get("shares", {"a": 1.0}), {"a": 1.0}], inclusion={"a": np.full(2, inclusion)},
-        remainder=np.full(2, remainder), nothing=np.full(2, nothing),
-    )  # fmt: skip
-    best = SimpleNamespace(accepted=(Accepted("a", (0,), {}),))
-    return verdict.Decision(found, best, None, {"a": np.array([gain, 0.0])})  # type: ignore[arg-type]
-
-
-def test_at_a_threshold_exactly() -> None:
-    """Nine tenths establish, a gain of four does not; with even odds nothing is said to be missing or to remain."""
-    assert len(verdict.established(stood(inclusion=0.9), 0)) == 1 and not verdict.established(
-        stood(inclusion=0.8999), 0
-    )
-    assert not verdict.established(stood(gain=4.0), 0) and len(verdict.established(stood(gain=4.0001), 0)) == 1
-    assert verdict_of(stood(nothing=0.5), 0)[0] == "named"
-    assert verdict_of(stood(remainder=0.5), 0)[0] == "named" and verdict_of(stood(remainder=0.5001), 0)[0] == "partial"
-    assert verdict_of(stood(shares={}), 0) == ("nothing-missing", [])
-    assert verdict_of(stood(), 1) == ("unknown", [])  # the only effect acts in the other material
-    assert verdict_of(stood(remainder=0.9), 1) == ("unknown", [])
+def test_improbable_models_and_those_that_differ_elsewhere_are_not_sampled_beside_it() -> None:
+    decision, fits, final = alternative_models({"a": 0.04, "b": 0.9, "c": 0.06, "bd": 0.5})
+    found = verdict.alternatives(decision, fits, 0, final("b"), "abc", True)
+    assert [a.block.effects[0].key for a in found] == ["b", "c"] and all(a.remains for a in found)
+    assert verdict.alternatives(decision, fits, 0, final("b"), "ab", False) == []
 
 
 def test_an_effect_that_gains_exactly_four_does_not_predict(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -305,45 +347,12 @@ def test_a_remainder_that_fails_the_test_may_leave_no_effect(monkeypatch: pytest
     sets = explored({"a": 20.0}, smooth=19.0)
     found = decided(monkeypatch, sets, {}, {"a": 1e-6})
     assert found.best is None and found.retest is not None and found.retest.p == 1e-6 and found.gains == {}
-    assert verdict_of(found, 0) == ("unknown", [])
+    assert verdict_of(found) == "unknown"
 
 
 def test_where_every_set_fails_to_predict_the_remainder_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     found = decided(monkeypatch, explored({"ab": 30.0, "ac": 29.0}), {"ab": 1.0, "ac": 1.0}, {})
     assert found.best is None and found.retest is None and found.posterior.best.names == ()
-
-
-def alternative_models(**weights: tuple[float, float]) -> tuple[Any, Any, dict[str, Any]]:
-    sets = [EffectSet(tuple(names), 0.0, {}, np.zeros(1) if names == "b" else None) for names in weights]
-    block = {n: SimpleNamespace(effects=[SimpleNamespace(key=key) for key in n]) for n in weights}
-    space: Any = SimpleNamespace(
-        sets=sets, without=[w[0] for w in weights.values()], beside=[w[1] for w in weights.values()]
-    )
-    known: Any = SimpleNamespace(fitted={s.key: SimpleNamespace(blocks=[None, block["".join(s.names)]]) for s in sets})
-    return SimpleNamespace(posterior=space), known, block
-
-
-def test_a_remainder_that_is_in_another_material_does_not_remain_here() -> None:
-    """Of the weight beside b as much as the remainder is probable in this material: a half, alone, of even odds."""
-    decision, known, block = alternative_models(a=(0.4, 0.0), b=(0.2, 0.4))
-    known.fitted[frozenset("b")].effects = None
-    subsets = {"b": 0.25}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(verdict, "over_subsets", lambda remainder: (0.0, np.array([9.0, subsets["b"]]), []))
-        found = verdict.alternatives(decision, known, 1, block["a"], "named")
-    shares = [(a.block.effects[0].key, a.remains, a.probability) for a in found]
-    assert [s[:2] for s in shares] == [("a", False), ("b", False), ("b", True)]
-    assert [s[2] for s in shares] == pytest.approx([0.4, 0.2 + 0.4 * 0.75, 0.4 * 0.25])
-
-
-def test_sets_that_are_one_model_in_this_material_add_up_and_the_final_one_may_be_none_of_them() -> None:
-    decision, known, block = alternative_models(ab=(0.3, 0.0), ba=(0.2, 0.0), c=(0.5, 0.0))
-    known.fitted[frozenset("ab")].blocks[1] = block["ab"]
-    found = verdict.alternatives(decision, known, 1, block["c"], "named")
-    assert [round(a.probability, 9) for a in found] == [0.5, 0.5]
-    other: Any = SimpleNamespace(effects=[SimpleNamespace(key="z")])
-    found = verdict.alternatives(decision, known, 1, other, "named")
-    assert found[0].block is other and found[0].probability == 0.0 and not found[0].remains
 
 
 def test_of_sets_that_were_fitted_the_most_probable_one_stands_for_the_best(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,13 +4,15 @@ A set is evaluated together with the remainder, so an effect is credited for wha
 probability of a remainder is part of the answer.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
-from wirebayes.discovery.settings import IN_SET, MORE_EFFECTS, REMAINDER_WEIGHT, UNKNOWN_WEIGHT
+from wirebayes.discovery.families import Family
+from wirebayes.discovery.settings import IN_SET, MORE, UNKNOWN_WEIGHT
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.typing import Array
 
@@ -60,7 +62,11 @@ class ModelPosterior:
     remainder : (b,) array
         Probability of a remainder in a material.
     inclusion : dict of name to (b,) array
-        Probability that an effect, under this name or that of a copy, acts in a material.
+        Probability that an effect acts in a material.
+    families : sequence of tuple of str
+        Names that these tests cannot tell apart; a name in none of them stands alone.
+    together : list of (b,) array
+        For each family the probability that any of its members acts in a material.
     shares : list of dict
         For each material, the probability of each name to be the effect with the largest share of the disagreement, and
         of *unknown*, a remainder and no effect; given that something is missing there.
@@ -72,56 +78,73 @@ class ModelPosterior:
     nothing: Array
     remainder: Array
     inclusion: dict[str, Array]
+    families: tuple[Family, ...]
+    together: list[Array]
     shares: list[dict[str, float]]
+
+    def family(self, name: str) -> Family:
+        """The family of a name."""
+        return family_of(name, self.families)
 
     @property
     def best(self) -> EffectSet:
-        """The most probable set of those that begin with the most probable first name, with or without a remainder."""
-        weights = self.without + self.beside
-        first: dict[str, float] = {}
-        for s, weight in zip(self.sets, weights, strict=True):
-            first[s.first] = first.get(s.first, 0.0) + float(weight)
-        leading = max(first, key=lambda name: first[name])
-        return max(zip(weights, self.sets, strict=True), key=lambda item: item[0] * (item[1].first == leading))[1]
+        """The most probable set of those that begin with the most probable first family, and in it the first name."""
+        sets = list(zip((self.without + self.beside).tolist(), self.sets, strict=True))
+        for kind in (lambda s: self.family(s.first), lambda s: s.first):
+            weights: dict[Any, float] = {}
+            for weight, s in sets:
+                weights[kind(s)] = weights.get(kind(s), 0.0) + weight
+            leading = max(weights, key=lambda k: weights[k])
+            sets = [(weight, s) for weight, s in sets if kind(s) == leading]
+        return max(sets, key=lambda item: item[0])[1]
 
 
-def log_prior(size: int, names: int) -> float:
-    """Log weight of one set of `size` effects of a catalogue of `names`; that of a single effect is zero.
+def family_of(name: str, families: Sequence[Family]) -> Family:
+    """The family that a name belongs to, itself alone where it is in none."""
+    return next((f for f in families if name in f), (name,))
 
-    All sets of one size together have `MORE_EFFECTS` times the weight of those that are one smaller.
+
+def log_prior(size: int, kinds: int) -> float:
+    """Log weight of one set of `size` of so many kinds of effect; that of a single one is zero.
+
+    All sets of one size together have `MORE` times the weight of those that are one smaller.
     """
     if size < 2:
         return 0.0
-    sets = gammaln(names + 1) - gammaln(size + 1) - gammaln(names - size + 1)
-    return float((size - 1) * np.log(MORE_EFFECTS) + np.log(names) - sets)
+    kinds = max(kinds, size)
+    sets = gammaln(kinds + 1) - gammaln(size + 1) - gammaln(kinds - size + 1)
+    return float((size - 1) * np.log(MORE) + np.log(kinds) - sets)
 
 
 def log_weights(
     sets: Sequence[EffectSet],
     names: int,
-    copies: Mapping[str, Collection[str]],
+    families: Sequence[Family] = (),
     other: Mapping[frozenset[str], float] = {},
 ) -> tuple[Array, Array]:
     """(s,) unnormalised log probabilities of each set without a remainder and with one.
+
+    Families are alike before the test, and in each of them its members: a family of five is as likely as one of one.
 
     Parameters
     ----------
     sets : sequence of EffectSet
     names : int
         Names in the catalogue.
-    copies : mapping of name to set of names
-        The names that leave the same signature in these tests, itself included; they share the weight of one.
+    families : sequence of tuple of str
+        Names that these tests cannot tell apart.
     other : mapping of set to float
         Log Bayes factor of a remainder that is not smooth, beside a set.
     """
+    kinds = names - sum(len(f) - 1 for f in families)
     without, beside = [], []
     for s in sets:
-        prior = log_prior(len(s.names), names) - sum(np.log(len(copies.get(n, {n}))) for n in s.names)
+        prior = log_prior(len(s.names), kinds) - sum(np.log(len(family_of(n, families))) for n in s.names)
         smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
         if s.names:
             without.append(prior + s.log_bayes)
             more = np.logaddexp(smooth, other.get(s.key, -np.inf))
-            beside.append(prior + s.log_bayes + np.log(REMAINDER_WEIGHT) + more)
+            beside.append(prior + s.log_bayes + np.log(MORE) + more)
         else:
             without.append(-np.inf)  # nothing at all: the global test has excluded it
             beside.append(np.log(UNKNOWN_WEIGHT) + smooth)
@@ -133,7 +156,7 @@ def posterior(
     without: Array,
     beside: Array,
     blocks: int,
-    copies: Mapping[str, Collection[str]] = {},
+    families: Sequence[Family] = (),
 ) -> ModelPosterior:
     """Normalise, and sum over the sets for each material.
 
@@ -144,14 +167,16 @@ def posterior(
         As `log_weights` returns them.
     blocks : int
         Number of materials.
-    copies : mapping of name to set of names
-        As for `log_weights`. A name is included where one of its copies is: they are one effect.
+    families : sequence of tuple of str
+        As for `log_weights`.
     """
     total = logsumexp([*without, *beside])
     p_without, p_beside = np.exp(without - total), np.exp(beside - total)
     nothing, remainder = np.zeros(blocks), np.zeros(blocks)
     own = dict.fromkeys(name for s in sets for name in s.names)
     inclusion = {name: np.zeros(blocks) for name in own}
+    every = tuple(dict.fromkeys(family_of(name, families) for name in own))
+    together = [np.zeros(blocks) for _ in every]
     shares: list[dict[str, float]] = [{} for _ in range(blocks)]
     for s, bare, more in zip(sets, p_without, p_beside, strict=True):
         remains = np.ones(blocks) if s.remainder is None else over_subsets(s.remainder)[1]
@@ -162,16 +187,18 @@ def posterior(
             for b in range(blocks):
                 shares[b][name] = shares[b].get(name, 0.0) + float((bare + more) * idle[b] * acts[b])
             idle = idle * (1.0 - acts)
-        for name in own:
-            absent = np.prod([1.0 - s.presence[n] for n in s.names if n in copies.get(name, {name})], axis=0)
-            inclusion[name] = inclusion[name] + (bare + more) * (1.0 - absent)
+        for name in s.names:
+            inclusion[name] = inclusion[name] + (bare + more) * s.presence[name]
+        for family, probability in zip(every, together, strict=True):
+            absent = np.prod([1.0 - s.presence[n] for n in s.names if n in family], axis=0)
+            probability += (bare + more) * (1.0 - absent)
         nothing += bare * idle + more * (1.0 - remains) * idle
         for b in range(blocks):
             shares[b]["unknown"] = shares[b].get("unknown", 0.0) + float(more * remains[b] * idle[b])
     for b, here in enumerate(shares):
         missing = sum(here.values())
         shares[b] = {n: v / missing for n, v in sorted(here.items(), key=lambda item: -item[1])} if missing > 0 else {}
-    return ModelPosterior(tuple(sets), p_without, p_beside, nothing, remainder, inclusion, shares)
+    return ModelPosterior(tuple(sets), p_without, p_beside, nothing, remainder, inclusion, every, together, shares)
 
 
 def smallest_set(shares: Mapping[str, float], level: float = IN_SET) -> list[str]:

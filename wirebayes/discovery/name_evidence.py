@@ -19,6 +19,7 @@ from wirebayes.workers import ParallelMap
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
 Correction = Callable[[Refit], float]
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
+_WAVE = 4  # names refitted at once, whatever the number of cores
 _HOPELESS = -2.0  # nats: a block whose scan speaks against an effect is not refitted with it
 
 
@@ -84,28 +85,42 @@ def weigh_names(
     correction : function of Refit
         Added to the log Bayes factor of every refit (see `wirebayes.discovery.stepwise`).
     most, forms_a_name : int
-        Forms that are refitted at the most, and of one name.
+        Names that are refitted at the most, those not counted that came out hopeless, and forms of one name.
     """
     forms = _forms(trials, candidates, scans, further)
-    ranked = sorted(forms, key=lambda f: -f.promise)
-    top = ranked[0].promise
-    names = {f.effect.name for f in ranked[:most] if f.promise >= top - _MARGIN - _SHARE * max(top, 0.0)}
-    tasks: dict[_Place, tuple[Effect, float, float]] = {}
-    tried: list[str] = []
-    for form in ranked:
-        name = form.effect.name
-        # A name that stands a chance is refitted in its other forms too: the scan may have taken the wrong one.
-        if name not in names or tried.count(name) >= forms_a_name:
-            continue
-        tried.append(name)
+    by_name: dict[str, list[_Form]] = {}
+    for form in sorted(forms, key=lambda f: -f.promise):
+        by_name.setdefault(form.effect.name, []).append(form)
+    waiting = list(by_name)  # the most promising first
+    found: dict[_Place, Refit] = {}
+    values: list[float] = []  # of the names refitted so far
+    while waiting:
+        # Refitted values alone set the cut: one that the scan has wrong would take every other name off the list.
+        top = max(values, default=-np.inf)
+        least = top - _MARGIN - _SHARE * max(top, 0.0)
+        stood = sum(value >= least for value in values)
+        wave = [n for n in waiting[:_WAVE] if by_name[n][0].promise >= least][: max(most - stood, 0)]
+        if not wave:
+            break
+        waiting = waiting[len(wave) :]
+        tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], scans)
+        done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
+        found |= zip(tasks, done, strict=True)
+        summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks), correction)
+        values += [summed.log_bayes[n] for n in wave]
+    return _summed(forms, found, len(blocks), correction)
+
+
+def _tasks(forms: Sequence[_Form], scans: Sequence[Scan]) -> dict[_Place, tuple[Effect, float, float]]:
+    """What is refitted of some forms: at each place the effect, the amplitude per δ, and a guess of it."""
+    tasks = {}
+    for form in forms:
         best = max(form.linear)
         for place, value, probe in zip(form.places, form.linear, form.probes, strict=True):
             if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
-                _, guess, per_delta = log_bayes(Candidate(probe, name, place[1], True), scans)
+                _, guess, per_delta = log_bayes(Candidate(probe, form.effect.name, place[1], True), scans)
                 tasks[place] = form.effect, float(per_delta[0]), float(guess[0])
-    done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
-    found = dict(zip(tasks, done, strict=True))
-    return _summed(forms, found, len(blocks), correction)
+    return tasks
 
 
 def _forms(
@@ -139,10 +154,17 @@ def _corrected(found: Refit, correction: Correction) -> float:
 def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int, correction: Correction) -> NameEvidence:
     """Add up the forms of every name: its variants equally, its blocks by `over_subsets`."""
     parts: dict[str, list[tuple[float, Array, list[Refit]]]] = {}
+    known = {place: _corrected(r, correction) for place, r in found.items()}
+    refitted_best: dict[str, float] = {}
+    for place, value in known.items():
+        name = found[place].effect.name
+        refitted_best[name] = max(refitted_best.get(name, -np.inf), value)
     for form in forms:
         refits = [found.get(place) for place in form.places]
-        pairs = zip(refits, form.linear, strict=True)
-        values = np.array([linear if r is None else _corrected(r, correction) for r, linear in pairs])
+        # what was not refitted counts for no more than the best of its name that was
+        most = refitted_best.get(form.effect.name, np.inf)
+        pairs = zip(form.places, form.linear, strict=True)
+        values = np.array([known.get(place, min(linear, most)) for place, linear in pairs])
         total, each, chosen = over_subsets(values)
         presence = np.zeros(blocks)
         for share, (_, on) in zip(each, form.places, strict=True):

@@ -8,7 +8,7 @@ from scipy import stats
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
 from wirebayes.discovery.refit import LARGEST, occam
 from wirebayes.discovery.screening import Candidate, GlobalTest
-from wirebayes.discovery.settings import ALPHA, NEARLY_ONE
+from wirebayes.discovery.settings import ALPHA
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
@@ -104,49 +104,30 @@ def similarity(
     return out
 
 
-def copies(
-    expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]
-) -> dict[str, frozenset[str]]:
-    """The names that are one and the same in these tests, itself included, by name.
-
-    Two names are where each form of either has a form of the other with the same signature.
-
-    Parameters
-    ----------
-    expansions : sequence of Expansion
-        One a block.
-    trials : sequence of Probe
-    ratios : sequence of float
-        As in `similarity`.
-
-    Returns
-    -------
-    dict of name to set of names
-        Only names that show at all.
-    """
-    same = _cosines(expansions, trials, ratios) > NEARLY_ONE
-    forms: dict[str, list[int]] = {}
-    for k, trial in enumerate(trials):
-        if same[k, k]:  # it shows at all
-            forms.setdefault(trial.effect.name, []).append(k)
-    both = {
-        (a, b): same[np.ix_(i, j)].any(axis=1).all() and same[np.ix_(i, j)].any(axis=0).all()
-        for a, i in forms.items()
-        for b, j in forms.items()
-    }
-    return {a: frozenset(b for b in forms if both[a, b]) for a in forms}
-
-
 def _cosines(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> Array:
     """(m, m) |cos| of the projected signatures, zero for one that does not show."""
     parts = [projected(x, r) for x, r in zip(expansions, ratios, strict=True)]
+    is_material = np.array([t.effect.scope == "material" for t in trials], bool)
+    return cosines(parts, is_material & (len(expansions) > 1))
+
+
+def cosines(parts: Sequence[Array], has_own: Array) -> Array:
+    """(m, m) |cos| of signatures over several blocks, zero for one that does not show.
+
+    Parameters
+    ----------
+    parts : sequence of (N, m) arrays
+        Projected signatures, one array a block.
+    has_own : (m,) array of bool
+        Signatures that may have any size on each block.
+    """
     lengths = np.array([(p**2).sum(axis=0) for p in parts])
     products = np.array([p.T @ p for p in parts])
-    material = np.array([t.effect.scope == "material" for t in trials]) & (len(expansions) > 1)
+    total = lengths.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        together = products.sum(axis=0) ** 2 / (lengths.sum(axis=0)[:, None] * lengths.sum(axis=0)[None])
-        loose = (products**2 / lengths[:, None, :]).sum(axis=0) / lengths.sum(axis=0)[:, None]
-    square = np.nan_to_num(np.where(material[None, :], loose, together))
+        together = products.sum(axis=0) ** 2 / (total[:, None] * total[None])
+        loose = np.nan_to_num(products**2 / lengths[:, None, :]).sum(axis=0) / total[:, None]
+    square = np.nan_to_num(np.where(has_own[None, :], loose, together))
     return np.sqrt(np.minimum(np.maximum(square, square.T), 1.0))
 
 

@@ -13,15 +13,24 @@ from typing import Any
 import numpy as np
 
 from wirebayes.discovery import gross_errors, next_measurement, power, residual_patterns, shrinking
+from wirebayes.discovery.families import Family, block_ratio, called, families_of, noise_ratio, refitted_probe
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
-from wirebayes.discovery.linear_scan import Expansion, expand
+from wirebayes.discovery.judgement import Evidence, FamilyEvidence, Judgement, judge
+from wirebayes.discovery.linear_scan import Expansion
 from wirebayes.discovery.model_space import smallest_set
-from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
 from wirebayes.discovery.screening import GlobalTest
-from wirebayes.discovery.settings import ALPHA, Settings
-from wirebayes.discovery.stepwise import Accepted, Explored, explore
-from wirebayes.discovery.verdict import Alternative, Decision, alternatives, decide, verdict_of
+from wirebayes.discovery.settings import ALPHA, REMAINS, Settings
+from wirebayes.discovery.stepwise import Accepted, Explored, Fits, explore
+from wirebayes.discovery.verdict import (
+    Alternative,
+    Decision,
+    accepted_effects,
+    alternatives,
+    decide,
+    evidence,
+)
 from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
@@ -34,6 +43,7 @@ from wirebayes.json_files.discovery import (
     Disagreement,
     DiscoveryJson,
     ExperimentFindings,
+    FamilyReport,
     HeldOutReport,
     Outlook,
     Remainder,
@@ -139,15 +149,15 @@ def investigate(
         for p, d, n, b in zip(gate.patterns, gate.data, gate.nulls, gate.blocks, strict=True)
     ]
     expansions = [_only(x, len(gate.trials)) for x in gate.expansions]
-    decision, explored = None, None
+    past: _Named | None = None
     left_out = LeftOut(rng, parallel_map)
     if gate.test.p <= ALPHA:
         report("naming", 0, 1)
-        explored, decision = _named(gate, expansions, settings, left_out, rng, parallel_map)
+        past = _named(gate, expansions, settings, left_out, rng, parallel_map)
         report("naming", 1, 1)
-    answers = [_answer(gate.blocks, decision, explored, i, where[i], rng) for i in range(len(gate.blocks))]
+    answers = [_answer(gate, past, i, where[i], left_out, rng, parallel_map) for i in range(len(gate.blocks))]
     final = [a.stages[-1] if a.stages else block for a, block in zip(answers, gate.blocks, strict=True)]
-    ratios = [float(expand(f.target, f.modes.z[:1], []).ratio[0]) for f in final]
+    ratios = [block_ratio(f) for f in final]
     alike = power.similarity(expansions, gate.trials, ratios)
     out: dict[str, ExperimentFindings] = {}
     for i, block in enumerate(gate.blocks):
@@ -158,12 +168,21 @@ def investigate(
             out[name] = {**common, **outlook, **own}
     report("held-out holds", len(gate.blocks), len(gate.blocks))
     undecided = [
-        alternatives(decision, explored, i, last, answer.verdict)
-        if decision is not None and explored is not None and answer.verdict in ("ambiguous", "partial")
+        alternatives(past.decision, past.fits, i, last, answer.judgement.undecided, answer.remains)
+        if past is not None and answer.judgement.undecided and answer.stages
         else []
         for i, (answer, last) in enumerate(zip(answers, final, strict=True))
     ]
-    return Findings({"version": 2, "experiments": out, "warnings": named(out)}, tuple(final), tuple(undecided))
+    return Findings({"version": 3, "experiments": out, "warnings": named(out)}, tuple(final), tuple(undecided))
+
+
+@dataclass(frozen=True)
+class _Named:
+    """What was found past the global test: the sets of effects, what they say, and blocks with any of them."""
+
+    explored: Explored
+    decision: Decision
+    fits: Fits
 
 
 def _named(
@@ -173,12 +192,38 @@ def _named(
     left_out: LeftOut,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
-) -> tuple[Explored, Decision]:
+) -> _Named:
     """The sets of effects that were looked at, past the global test, and what they say."""
     found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map)
-    explored = explore(gate.blocks, found, expansions, gate.trials, settings, rng, parallel_map)
-    copies = power.copies(expansions, gate.trials, [float(x.ratio[0]) for x in gate.expansions])
-    return explored, decide(gate.blocks, explored, copies, settings, left_out, rng, parallel_map)
+    alike = _families_of_singles(gate.blocks, found)
+    explored = explore(gate.blocks, found, expansions, gate.trials, alike, settings, rng, parallel_map)
+    families = _families(gate.blocks, explored)
+    decision = decide(gate.blocks, explored, families, settings, left_out, rng, parallel_map)
+    return _Named(explored, decision, Fits(gate.blocks, explored, settings, rng))
+
+
+def _families_of_singles(plain: list[LaplaceFit], found: NameEvidence) -> list[Family]:
+    """Families of effects refitted one at a time, in the noise that the best of them leaves."""
+    ranked = sorted(found.winners, key=lambda name: -found.log_bayes[name])
+    if not ranked:
+        return []
+    probed = {n: {b: refitted_probe(plain[b], r, b) for b, r in found.amplitudes(n).items()} for n in ranked}
+    best = found.amplitudes(ranked[0])
+    ratios = [noise_ratio(block, best[b], b) if b in best else block_ratio(block) for b, block in enumerate(plain)]
+    return families_of(plain, probed, ratios)
+
+
+def _families(plain: list[LaplaceFit], explored: Explored) -> list[Family]:
+    """Families of all effects that were refitted, each where it had the most evidence, in the noise of the best set."""
+    refits = explored.refits()
+    probed = {
+        name: {b: refitted_probe(parent.blocks[b], r, b) for b, r in found.items()}
+        for name, (parent, found) in refits.items()
+    }
+    if not probed:
+        return []
+    best = max(explored.fitted.values(), key=lambda s: s.effects.log_bayes) if explored.fitted else explored.root
+    return families_of(plain, probed, [block_ratio(block) for block in best.blocks])
 
 
 def _own_reports(
@@ -190,9 +235,8 @@ def _own_reports(
     parallel_map: ParallelMap,
 ) -> dict[str, HeldOutReport]:
     """What the report says of each experiment of a block apart from the others."""
-    remains = answer.verdict in ("partial", "unknown")
     names = [a.name for a in answer.accepted]
-    checks = shrinking.shrinking(block, answer.stages, names, remains, left_out, rng, parallel_map)
+    checks = shrinking.shrinking(block, answer.stages, names, answer.remains, left_out, rng, parallel_map)
     reports: dict[str, HeldOutReport] = {}
     for e, check in zip(block.experiments, checks, strict=True):
         struck = [g for g in gate.struck if g["experiment"] == e.name]
@@ -253,25 +297,34 @@ class _Answer:
 
     Attributes
     ----------
-    verdict : str
+    judgement : Judgement
     accepted : list of Accepted
     stages : list of LaplaceFit
         Its block with the first accepted effect, the first two, and so on.
-    shares : dict
-        Probability of each name, and of *unknown*, to have the largest share; empty where nothing is missing.
-    inclusion : dict
+    found : Evidence or None
+        None where only the global test was requested.
     remainder : dict
-    nothing : float or None
-        Probability that nothing is missing; None where only the global test was requested.
     """
 
-    verdict: Verdict
+    judgement: Judgement
     accepted: list[Accepted]
     stages: list[LaplaceFit]
-    shares: dict[str, float]
-    inclusion: dict[str, float]
+    found: Evidence | None
     remainder: Remainder
-    nothing: float | None
+
+    @property
+    def verdict(self) -> Verdict:
+        return self.judgement.verdict
+
+    @property
+    def remains(self) -> bool:
+        """Whether the final model has a discrepancy."""
+        return self.verdict in ("partial", "unknown")
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Probability of each name, and of *unknown*, to have the largest share; empty where nothing is missing."""
+        return {} if self.found is None or self.verdict == "nothing-missing" else dict(self.found.shares)
 
     @property
     def best(self) -> str | None:
@@ -281,36 +334,71 @@ class _Answer:
 
     @property
     def set(self) -> list[str]:
+        if self.verdict == "ambiguous":
+            return list(self.judgement.undecided)
         members = smallest_set(self.shares)
         return members if self.verdict != "unknown" or "unknown" in members else [*members, "unknown"]
 
 
+_NO_REMAINDER: Remainder = {"probability": 0.0, "where": [], "p": None, "leave_one_hold_out": None}
+
+
 def _answer(
-    plain: list[LaplaceFit], decision: Decision | None, explored: Explored | None, i: int,
-    where: list[Disagreement], rng: np.random.Generator,
+    gate: Gate, past: _Named | None, i: int, where: list[Disagreement], left_out: LeftOut,
+    rng: np.random.Generator, parallel_map: ParallelMap,
 ) -> _Answer:  # fmt: skip
     """The verdict on block `i`, and its fits with what was accepted."""
-    if decision is None or explored is None:
-        return _Answer("nothing-missing", [], [], {}, {}, {"probability": 0.0, "where": [], "p": None}, None)
-    verdict, accepted = verdict_of(decision, i)
-    found, retest = decision.posterior, decision.retest
+    if past is None:
+        return _Answer(Judgement("nothing-missing"), [], [], None, _NO_REMAINDER)
+    p, plain = gate.test.p, gate.blocks[i]
+    before = evidence(past.decision, p, i)
+    accepted = accepted_effects(past.decision, before, i)
+    stages = _stages(plain, accepted, past.explored, i, rng)
+    gain = None
+    if before.remainder > REMAINS:
+        base = stages[-1] if before.established else plain
+        gain = shrinking.discrepancy_gain(base, left_out, rng, parallel_map)
+    found = replace(before, remainder_gain=gain)
+    judgement = judge(found)
+    if judgement.verdict in ("nothing-missing", "unknown"):
+        accepted, stages = [], []
     # beside the effects where some are accepted, else what the plain model leaves over
+    retest = past.decision.retest
     beside = retest.where[i] if retest is not None else []
-    patterns = {"partial": beside, "unknown": where}.get(verdict, [])
+    patterns = {"partial": beside, "unknown": where}.get(judgement.verdict, [])
     remainder: Remainder = {
-        "probability": float(found.remainder[i]),
+        "probability": found.remainder,
         "where": [w["covariate"] for w in patterns if w["p"] <= _VISIBLE],
         "p": None if retest is None else retest.p,
+        "leave_one_hold_out": gain,
     }
+    return _Answer(judgement, accepted, stages, found, remainder)
+
+
+def _stages(
+    plain: LaplaceFit, accepted: Sequence[Accepted], explored: Explored, i: int, rng: np.random.Generator
+) -> list[LaplaceFit]:
+    """Block `i` with the first accepted effect, the first two, and so on; fitted here where the search has not."""
     stages: list[LaplaceFit] = []
     for k in range(len(accepted)):
         effects = tuple(a.effects[i] for a in accepted[: k + 1])
         ready = [s.blocks[i] for s in explored.fitted.values() if s.blocks[i].effects == effects]
-        own, base = ready[0] if ready else None, plain[i]
-        stages.append(own or fitted(base.experiments, effects, base.law, base.history, rng))
-    inclusion = {name: float(p[i]) for name, p in sorted(found.inclusion.items(), key=lambda item: -item[1][i])}
-    shares = {} if verdict == "nothing-missing" else found.shares[i]
-    return _Answer(verdict, accepted, stages, shares, inclusion, remainder, float(found.nothing[i]))
+        base = stages[-1] if stages else plain
+        own = ready[0] if ready else fitted(base.experiments, effects, plain.law, plain.history, rng)
+        stages.append(own)
+    return stages
+
+
+def _family(family: FamilyEvidence) -> FamilyReport:
+    """What is said of a family."""
+    members = tuple(family.members)
+    return {
+        "name": called(members),
+        "members": list(members),
+        "inclusion": family.inclusion,
+        "leave_one_hold_out": family.gain,
+        "established": family.is_established,
+    }
 
 
 def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
@@ -319,6 +407,12 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
     low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
     hold = effect.hold if isinstance(effect, EventEffect) else None
     return {"mean": mean, "q05": low, "q95": high, "unit": main.unit, "hold": hold}
+
+
+def _inclusion(found: Evidence | None) -> dict[str, float]:
+    """Probability of each name to be missing, the most probable first."""
+    each = {} if found is None else {n: p for family in found.families for n, p in family.members.items()}
+    return dict(sorted(each.items(), key=lambda item: -item[1]))
 
 
 def _common(
@@ -332,15 +426,17 @@ def _common(
     shared = [n for a in answer.accepted for b in a.blocks if b != i for n in plain[b].names]
     return {
         "verdict": answer.verdict,
-        "effects": names if answer.verdict in ("named", "partial") else named if answer.verdict == "ambiguous" else [],
+        "effects": {"ambiguous": list(answer.judgement.undecided)}.get(answer.verdict, names),
         "best": answer.best,
         "set": members,
         "group": (power.group_of(named, alike) if named else []) + (["unknown"] if "unknown" in members else []),
         "accepted": names,
         "amplitudes": {a.name: _amplitude(answer.stages[-1], a.effects[i]) for a in answer.accepted},
         "probabilities": answer.shares,
-        "probability_nothing": answer.nothing,
-        "inclusion": answer.inclusion,
+        "probability_nothing": None if answer.found is None else answer.found.nothing,
+        "inclusion": _inclusion(answer.found),
+        "families": [] if answer.found is None else [_family(f) for f in answer.found.families],
+        "parameters": {},
         "remainder": answer.remainder,
         "p_global": test.p,
         "p_interval": list(test.p_interval),
@@ -363,7 +459,7 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
     pair, weakest = None, None
     if answer.verdict in ("ambiguous", "named", "partial"):
-        rivals = [n for n in answer.shares if n in best_probe]
+        rivals = [n for n in answer.judgement.undecided or answer.shares if n in best_probe]
         group = [n for n in rivals if n == rivals[0] or alike.get((rivals[0], n), 0.0) > power.ALIKE]
         rivals = [n for n in rivals if n in answer.set or n in group]
         if len(rivals) > 1:
@@ -381,8 +477,10 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
             )
 
         weakest = trials[best_probe[max(best_probe, key=hiddenness)]]
-    if answer.verdict in ("partial", "unknown"):
+    if answer.remains:
         proposal = next_measurement.next_for_remainder(answer.stages[-1] if answer.stages else block)
+        if answer.judgement.undecided and pair is not None:
+            proposal = f"{next_measurement.next_measurement(block, pair, None)} {proposal}"
     else:
         proposal = next_measurement.next_measurement(block, pair, weakest)
     return {"power": seen, "not_identifiable": hidden, "next_measurement": proposal}

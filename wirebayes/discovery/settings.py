@@ -17,14 +17,13 @@ UPPER = 0.2  # share of them that a line is fitted to
 ONE_NAT = 100.0  # of these that the prior of its slope is worth, one nat to a factor of e
 ABOVE_COUNT = 1.0  # nats that the line may lie above the count, as where one exceeds a value that three should
 
-# Prior over models. A single effect of any name has weight 1.
-UNKNOWN_WEIGHT = 1.0  # a remainder and no effect, to one name: a person who finds a gap is as ready for either
-MORE_EFFECTS = 0.1  # all sets of k + 1 names, to all sets of k: one thing missing is ten times likelier than two
-REMAINDER_WEIGHT = 0.5  # a remainder beside effects, to none beside the same effects
+# Prior over models. A single family of effects has weight 1, which its members share.
+UNKNOWN_WEIGHT = 1.0  # a remainder and no effect, to one family: a person who finds a gap is as ready for either
+# One thing more than what is missing already, to nothing more: all further families together, or a remainder.
+MORE = 0.5
 # Lengths of a remainder's processes, in steps of three: neighbours explain nearly the same.
 HOLD_LENGTHS = (1.5, 4.0, 10.0)  # holds: from what one shares with the next to the whole test
 TIME_LENGTHS = (0.7, 2.0, 50.0)  # of the logarithm of time: from a part of a hold to all of it
-NEARLY_ONE = 0.9999  # |cos| of signatures from which two names are one, and share its weight
 
 # Which sets are looked at.
 MOST_EFFECTS = 4  # more than four did not pay in any simulated test
@@ -48,8 +47,10 @@ P_SLOPE = 0.8  # below it the odds grow as p to the power -0.8, the density of p
 
 # What may be called established.
 KEEP_ELPD = 4.0  # gain of leaving out one hold at a time that an effect must bring
-INCLUSION = 0.9  # probability that the effect is missing
+LEAST_HOLDS = 3  # of a test, below which leaving one out says nothing
+INCLUSION = 0.9  # probability that one of a family is missing
 REMAINS = 0.5  # probability of a remainder from which the verdict says so
+IN_FAMILY = 0.9  # of a family's probability, that one of its members must have to be its name
 IN_SET = 0.9  # probability that the set of possible names holds together
 MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 3, 0.05  # undecided models sampled beside the final one, and their probability
 

@@ -7,7 +7,7 @@ from itertools import repeat
 import numpy as np
 
 from wirebayes.discovery import held_out
-from wirebayes.discovery.settings import KEEP_ELPD
+from wirebayes.discovery.settings import KEEP_ELPD, LEAST_HOLDS
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
@@ -164,6 +164,36 @@ def _gain(elpd: Sequence[Array], named: int, n: int, remains: bool) -> _Gain:
     difference = (np.concatenate(elpd[-n:]) if remains else elpd[1]) - plain
     spread = float(difference.std(ddof=1) * np.sqrt(len(difference)))
     return _Gain(float(difference.sum()), spread, float((smooth - plain).sum()))
+
+
+def discrepancy_gain(
+    base: LaplaceFit, left_out: held_out.LeftOut, rng: np.random.Generator, parallel_map: ParallelMap
+) -> float | None:
+    """What a smooth discrepancy gains beside a block's effects by leaving out one hold at a time.
+
+    Parameters
+    ----------
+    base : LaplaceFit
+        With the effects that are established.
+    left_out : LeftOut
+        Scores the fits.
+    rng : numpy Generator
+    parallel_map : function
+        The built-in `map`, or one over processes.
+
+    Returns
+    -------
+    float or None
+        None where a test has too few holds to say.
+    """
+    if any(len(e.recorded_holds) < LEAST_HOLDS for e in base.experiments):
+        return None
+    n = len(base.experiments)
+    added = parallel_map(with_discrepancy, repeat(base), base.experiments, rng.spawn(n))
+    alone_, laws = [(e,) for e in base.experiments], (repeat(base.law), repeat(base.history))
+    beside = list(parallel_map(fitted, alone_, list(added), *laws, rng.spawn(n)))
+    before, *after = (float(v.sum()) for v in left_out.of([base, *beside]))
+    return sum(after) - before
 
 
 def _compared(

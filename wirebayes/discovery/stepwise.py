@@ -15,20 +15,21 @@ import numpy as np
 
 from wirebayes.discovery import screening, smooth_reference
 from wirebayes.discovery.amplitude_prior import corrections
+from wirebayes.discovery.families import Family
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
-from wirebayes.discovery.model_space import EffectSet, log_prior
+from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
-from wirebayes.discovery.refit import occam
+from wirebayes.discovery.refit import Refit, occam
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import (
     FIRST_LOOK,
     LEFT_OVER,
     LEFT_OVER_WEIGHT,
+    MORE,
     MOST_BESIDE,
     MOST_EFFECTS,
     MOST_LOOKS,
     REACH,
-    REMAINDER_WEIGHT,
     SAME_EVIDENCE,
     WORTH_A_REFIT,
     WORTH_ADDING,
@@ -96,11 +97,75 @@ class Explored:
         Those that were fitted in full.
     left_over : dict of set to float
         Log Bayes factor of a remainder that is not smooth beside a set, from what a further effect would explain.
+    parents : dict of set to (set, name)
+        The fitted set, the plain one included, beside which one more effect was refitted, and that effect.
+    root : FittedSet
+        The plain one.
     """
 
     sets: tuple[EffectSet, ...]
     fitted: dict[Key, FittedSet]
     left_over: dict[Key, float]
+    parents: dict[Key, tuple[Key, str]]
+    root: FittedSet
+
+    def refits(self) -> dict[str, tuple[FittedSet, dict[int, Refit]]]:
+        """Each name where it was refitted with the most evidence: beside which set, and how; the best name first."""
+        best: dict[str, tuple[float, float, FittedSet, dict[int, Refit]]] = {}
+        for parent in (self.root, *self.fitted.values()):
+            further = parent.further
+            for name in further.winners if further is not None else ():
+                assert further is not None
+                own = further.log_bayes[name]
+                value = parent.effects.log_bayes + own
+                if name not in best or value > best[name][0]:
+                    best[name] = value, own, parent, further.amplitudes(name)
+        # of names that are best together the one that explains most is better
+        order = sorted(best, key=lambda name: (-best[name][0], -best[name][1]))
+        return {name: best[name][2:] for name in order}
+
+
+class Fits:
+    """Blocks with sets of effects, those that the search did not fit in full fitted when they are asked for.
+
+    Parameters
+    ----------
+    plain : list of LaplaceFit
+    explored : Explored
+    settings : Settings
+    rng : numpy.random.Generator
+    """
+
+    def __init__(
+        self, plain: list[LaplaceFit], explored: Explored, settings: Settings, rng: np.random.Generator
+    ) -> None:
+        self._explored, self._settings, self._rng = explored, settings, rng
+        self._known: dict[Key, list[LaplaceFit]] = {frozenset(): plain}
+        self._known |= {key: s.blocks for key, s in explored.fitted.items()}
+
+    def knows(self, key: Key) -> bool:
+        """Whether the set was fitted, or refitted beside one that was."""
+        return key in self._known or key in self._explored.parents
+
+    def of(self, key: Key) -> list[LaplaceFit]:
+        """The blocks with the effects of a set; its forms are those of the refit, or of a set that has them."""
+        if key not in self._known:
+            self._known[key] = self._from_parent(key) if key in self._explored.parents else self._from_larger(key)
+        return self._known[key]
+
+    def _from_parent(self, key: Key) -> list[LaplaceFit]:
+        before, name = self._explored.parents[key]
+        parent = self._explored.fitted.get(before, self._explored.root)
+        return added(parent, name, self._settings, self._rng)[0]
+
+    def _from_larger(self, key: Key) -> list[LaplaceFit]:
+        larger = min((s for k, s in self._explored.fitted.items() if k > key), key=lambda s: len(s.effects.names))
+        out = []
+        for plain, block in zip(self._known[frozenset()], larger.blocks, strict=True):
+            effects = [effect for effect in block.effects if effect.name in key]
+            base = block if effects else plain
+            out.append(fitted(base.experiments, effects, plain.law, plain.history, self._rng) if effects else plain)
+        return out
 
 
 @dataclass
@@ -108,6 +173,7 @@ class _Frontier:
     """Sets known by evidence alone, and which of them have been fitted."""
 
     names: int
+    families: Sequence[Family] = ()
     known: dict[Key, EffectSet] = field(default_factory=dict)
     fitted: dict[Key, FittedSet] = field(default_factory=dict)
     parents: dict[Key, tuple[Key, str]] = field(default_factory=dict)
@@ -145,8 +211,37 @@ class _Frontier:
 
     def promise(self, key: Key) -> float:
         """The largest log weight that a set may come to, by what is known so far."""
-        with_remainder = self.credit[key] + np.log(REMAINDER_WEIGHT)
+        with_remainder = self.credit[key] + np.log(MORE)
         return log_prior(len(key), self.names) + float(np.logaddexp(self.known[key].log_bayes, with_remainder))
+
+    def kinds(self, key: Key) -> tuple[Family, ...]:
+        """The families of a set's names."""
+        return tuple(sorted(family_of(name, self.families) for name in key))
+
+    def next_looks(self, most: int) -> list[Key]:
+        """Sets to be fitted next: of those close enough to the best one each combination of families first.
+
+        Look-alikes would use up all looks, and what only shows beside one of them would never be met.
+
+        Parameters
+        ----------
+        most : int
+            How many at most.
+        """
+        promises = {key: self.promise(key) for key in self.known}
+        best = max(promises.values(), default=-np.inf)
+        near = [k for k, promise in promises.items() if k not in self.fitted and promise > best - REACH]
+        near.sort(key=lambda k: (-promises[k], sorted(k)))
+        looked = [self.kinds(key) for key in self.fitted]
+        rank = {}
+        for key in near:
+            rank[key] = looked.count(self.kinds(key))
+            looked.append(self.kinds(key))
+        near.sort(key=lambda k: rank[k])  # the order within a rank stays
+        waiting = [k for k in self.towards if k not in self.fitted]
+        # as many at once whatever the number of cores, so that the sets are the same
+        wave = list(dict.fromkeys([*waiting, *near]))[:most]
+        return wave or [k for k in near if promises[k] == best][:1]  # the best set is always fitted
 
     def step_back(self, key: Key) -> None:
         """Go towards the sets that lack one effect of a fitted set and that no step forward has met."""
@@ -162,6 +257,7 @@ def explore(
     found: NameEvidence,
     expansions: Sequence[Expansion],
     trials: Sequence[Probe],
+    families: Sequence[Family],
     settings: Settings,
     rng: np.random.Generator,
     parallel_map: ParallelMap,
@@ -175,6 +271,8 @@ def explore(
         Of single effects.
     expansions, trials
         Of the plain blocks, as the global test has them.
+    families : sequence of tuple of str
+        Names that look alike, by their refits as single effects.
     settings : Settings
     rng : numpy Generator
     parallel_map : function
@@ -182,7 +280,7 @@ def explore(
     """
     smooth = np.array([float(_scanned(block, []).flexible[0]) for block in plain])
     root = EffectSet((), 0.0, {}, smooth)
-    frontier = _Frontier(len(settings.kinds))
+    frontier = _Frontier(len(settings.kinds), families)
     credits = _credits(expansions, trials)
     for name in found.winners:
         credit = float(np.maximum(smooth + credits.get(name, -np.inf), 0.0).sum()) if name in credits else -np.inf
@@ -190,15 +288,7 @@ def explore(
     done = frontier.fitted
     start = FittedSet(root, plain, (), found, ([], []))
     while True:
-        promises = {key: frontier.promise(key) for key in frontier.known}
-        best = max(promises.values(), default=-np.inf)
-        open_ = [k for k, promise in promises.items() if k not in done and promise > best - REACH]
-        open_ = sorted(open_, key=lambda k: (-promises[k], sorted(k)))
-        # as many at once whatever the number of cores, so that the sets are the same
-        open_ = list(dict.fromkeys([k for k in frontier.towards if k not in done] + open_))
-        wave = open_[: FIRST_LOOK if not done else 2][: max(MOST_LOOKS - len(done), 0)]
-        if not wave:
-            wave = [k for k in open_ if promises[k] == best][:1]  # the best set is always fitted
+        wave = frontier.next_looks(max(min(FIRST_LOOK if not done else 2, MOST_LOOKS - len(done)), 0))
         if not wave:
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]
@@ -219,13 +309,13 @@ def explore(
             for further in new.further.winners:
                 if new.further.log_bayes[further] > 0.0:
                     frontier.add(done[key].effects, further, new.further)
-    one_more = np.log(LEFT_OVER_WEIGHT / REMAINDER_WEIGHT)
+    one_more = np.log(LEFT_OVER_WEIGHT / MORE)
     left_over = {
         key: one_more + log_prior(len(key) + 1, frontier.names) - log_prior(len(key), frontier.names)
         + min(max(s.further.log_bayes[n] for n in s.further.winners), LEFT_OVER)
         for key, s in done.items() if s.further is not None and s.further.winners
     }  # fmt: skip
-    return Explored((root, *frontier.known.values()), done, left_over)
+    return Explored((root, *frontier.known.values()), done, left_over, frontier.parents, start)
 
 
 def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[str, Array]:
@@ -238,8 +328,19 @@ def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[s
     return out
 
 
-def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator) -> FittedSet:
-    """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
+def added(
+    parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator
+) -> tuple[list[LaplaceFit], dict[int, Effect]]:
+    """The parent's blocks refitted with one more effect in its best form, and that form by block.
+
+    Parameters
+    ----------
+    parent : FittedSet
+    name : str
+        Of an effect that was refitted beside it.
+    settings : Settings
+    rng : numpy.random.Generator
+    """
     assert parent.further is not None
     blocks, effects = list(parent.blocks), {}
     refits = parent.further.amplitudes(name)
@@ -250,6 +351,12 @@ def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Genera
         blocks[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near)
     if any(len(r.blocks) > 1 for r in refits.values()):
         blocks = informed(blocks, effects, rng)
+    return blocks, effects
+
+
+def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator) -> FittedSet:
+    """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
+    blocks, effects = added(parent, name, settings, rng)
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
     scans = [_scanned(block, trials) for block in blocks]
     further = None

@@ -18,11 +18,46 @@ class Amplitude(TypedDict):
 
 
 class Remainder(TypedDict):
-    """What is left beside the accepted effects, and the p-value of the global test with them in the model."""
+    """What is left beside the accepted effects, and the p-value of the global test with them in the model.
+
+    `leave_one_hold_out` is what a smooth discrepancy beside the established effects gains; None where a remainder is
+    not likely, and it was not asked.
+    """
 
     probability: float
     where: list[str]
     p: float | None
+    leave_one_hold_out: float | None
+
+
+class FamilyReport(TypedDict):
+    """Effects that these tests cannot tell apart, the most probable first.
+
+    `inclusion` is the probability that any of them is missing; `leave_one_hold_out` what the mixture over them gains
+    against the model without them, None where they are not in the best model.
+    """
+
+    name: str
+    members: list[str]
+    inclusion: float
+    leave_one_hold_out: float | None
+    established: bool
+
+
+class Interval(TypedDict):
+    """A parameter in one model."""
+
+    mean: float
+    q05: float
+    q95: float
+
+
+class ParameterReport(TypedDict):
+    """A parameter before and after; None where a model does not have it."""
+
+    unit: str
+    plain: Interval | None
+    final: Interval | None
 
 
 class Disagreement(TypedDict):
@@ -51,6 +86,8 @@ class Answer(TypedDict):
     probabilities: dict[str, float]
     probability_nothing: float | None
     inclusion: dict[str, float]
+    families: list[FamilyReport]
+    parameters: dict[str, ParameterReport]
     remainder: Remainder
     p_global: float
     p_interval: list[float]

@@ -18,7 +18,8 @@ from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.run_folder import open_run, read_json, write_json
-from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.discovery import Interval
+from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.notice import from_json, named, to_json
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
@@ -146,6 +147,7 @@ def write_findings(found: search.Findings, output: Path, own_effects: Path | Non
     _mixtures(found, output)
     _pictures(found, output, own_effects)
     _posterior_amplitudes(found, output)
+    _parameters(found, output)
     _warnings(found, output)
     write_json(output / "discovery.json", found.report)
 
@@ -209,6 +211,22 @@ def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
             column = next(c for c in parameters if c.startswith(f"{name}."))
             of_posterior = parameters[column]
             amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
+
+
+def _parameters(found: search.Findings, output: Path) -> None:
+    """Every parameter before and after, as the two posteriors have it."""
+    for name, report in found.report["experiments"].items():
+        plain, final = (read_json(output / name / model / "summary.json")["parameters"] for model in ("plain", "final"))
+        units = {column: entry["unit"] for column, entry in (plain | final).items()}
+        report["parameters"] = {
+            column: {"unit": unit, "plain": _interval(plain.get(column)), "final": _interval(final.get(column))}
+            for column, unit in units.items()
+        }
+
+
+def _interval(entry: Parameter | None) -> Interval | None:
+    """A parameter of a model, None where the model has no such parameter."""
+    return None if entry is None else {"mean": entry["mean"], "q05": entry["q05"], "q95": entry["q95"]}
 
 
 def _warnings(found: search.Findings, output: Path) -> None:

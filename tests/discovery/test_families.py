@@ -1,0 +1,58 @@
+"""Families: names that look alike, by their likeness to the best of them."""
+
+import numpy as np
+import pytest
+
+from tests.simulated import simulated_tests
+from wirebayes.discovery import screening
+from wirebayes.discovery.families import block_ratio, called, families_of, grouped, refitted_probe
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.simulation.synthetic import Bench, Truth
+
+WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
+
+
+def likeness(pairs: dict[tuple[int, int], float], m: int) -> np.ndarray:
+    out = np.eye(m)
+    for (i, j), cos in pairs.items():
+        out[i, j] = out[j, i] = cos
+    return out
+
+
+def test_members_are_alike_to_the_best_and_not_to_each_other_s_neighbours() -> None:
+    """a is like b, b like c; c, which is not like a, begins a family of its own and does not take b along."""
+    cosine = likeness({(0, 1): 0.96, (1, 2): 0.97, (2, 3): 0.951}, 4)
+    assert grouped("abcd", cosine) == [("a", "b"), ("c", "d")]
+    assert grouped("bacd", cosine[np.ix_([1, 0, 2, 3], [1, 0, 2, 3])]) == [("b", "a", "c"), ("d",)]
+
+
+@pytest.mark.parametrize(("cos", "families"), [(0.9501, [("a", "b")]), (0.95, [("a",), ("b",)])])
+def test_alike_means_more_than_the_threshold(cos: float, families: list[tuple[str, ...]]) -> None:
+    assert grouped("ab", likeness({(0, 1): cos}, 2)) == families
+
+
+def test_a_family_is_called_by_what_its_members_have_in_common() -> None:
+    assert called(("toe", "strain_stiffening")) == "elastic curve" and called(("toe",)) == "toe"
+    assert called(("screw_wobble", "toe")) == "screw_wobble"  # a user's own effect has no other name
+    assert {n for n in CATALOGUE if called((n, n)) == n} == set()
+
+
+def test_a_bent_line_and_a_bent_sensor_are_one_family_and_a_delay_is_another() -> None:
+    """Refitted on the paper's protocol, where the two differ by a few degrees."""
+    effect = named("strain_stiffening")
+    experiments = simulated_tests([Bench()], Truth(WIRE | {"strain_stiffening.c": 12.0}, [effect]), seed=3)
+    plain = [fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))]
+    kinds = {name: CATALOGUE[name] for name in ("strain_stiffening", "sensor_nonlinearity", "reading_delay")}
+    trials, candidates = screening.candidate_probes(plain, kinds)
+    data = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]
+    found = weigh_names(plain, trials, candidates, data)
+    order = [n for n in ("strain_stiffening", "sensor_nonlinearity", "reading_delay") if n in found.winners]
+    probed = {n: {0: refitted_probe(plain[0], found.winners[n][0], 0)} for n in order}
+    families = families_of(plain, probed, [block_ratio(plain[0])])
+    assert families[0] == ("strain_stiffening", "sensor_nonlinearity")
+    assert [f for f in families if "reading_delay" in f] in ([], [("reading_delay",)])
+    amplitude = probed["strain_stiffening"][0].own["strain_stiffening.c"]
+    assert amplitude == pytest.approx(found.winners["strain_stiffening"][0].amplitude)

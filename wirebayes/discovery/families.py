@@ -1,0 +1,124 @@
+"""Families: effects that these tests cannot tell apart are judged together first, then each within its family.
+
+Two effects are alike where the signatures that they leave beside the model's own parameters, at their refitted
+amplitudes and shapes, have |cos| > `ALIKE`. Every member is alike to the best of its family: a chain of neighbours
+would join effects that look nothing like each other.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from wirebayes.discovery.linear_scan import Probe, expand, moving_columns, projected, tangent
+from wirebayes.discovery.power import ALIKE, cosines
+from wirebayes.discovery.refit import Refit
+from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.typing import Array
+
+Family = tuple[str, ...]
+# What a person who tests lines would call what several effects have in common: the pattern, and the sentence of it.
+PATTERNS = {
+    "elastic curve": "the elastic curve is bent",
+    "course of a hold": "the course within a hold differs",
+    "creep from hold to hold": "the creep changes from hold to hold",
+    "step at a hold": "the level steps at a hold",
+    "slow drift": "the readings drift",
+    "way back": "loading and unloading differ",
+    "position of the screw": "the position is off periodically",
+    "length of the sample": "samples of different lengths differ",
+}
+_OF = {
+    "strain_stiffening": "elastic curve", "toe": "elastic curve", "power_strain": "elastic curve",
+    "sensor_nonlinearity": "elastic curve",
+    "second_relaxation": "course of a hold", "steady_creep": "course of a hold", "reading_delay": "course of a hold",
+    "late_clock": "course of a hold", "clamp_transient": "course of a hold",
+    "tension_dependent_rate": "creep from hold to hold", "memory": "creep from hold to hold",
+    "superposition": "creep from hold to hold", "ageing": "creep from hold to hold",
+    "creep_threshold": "creep from hold to hold", "prior_creep": "creep from hold to hold",
+    "permanent_creep": "creep from hold to hold",
+    "grip_slip": "step at a hold", "unrecorded_hold": "step at a hold",
+    "sensor_drift": "slow drift", "thermal_expansion": "slow drift",
+    "lost_motion": "way back", "guide_friction": "way back",
+    "screw_error": "position of the screw",
+    "fixture_compliance": "length of the sample", "length_dependence": "length of the sample",
+}  # fmt: skip
+
+
+def families_of(
+    plain: Sequence[LaplaceFit], found: Mapping[str, Mapping[int, Probe]], ratios: Sequence[float]
+) -> list[Family]:
+    """Names in families, best first.
+
+    Parameters
+    ----------
+    plain : sequence of LaplaceFit
+        One a material, without effects: their parameters are what signatures are projected on.
+    found : mapping of name to mapping of int to Probe
+        Each name as it was refitted, by block; the best name first.
+    ratios : sequence of float
+        Size of the setting errors against the sensor's, ρ, of each block.
+
+    Returns
+    -------
+    list of tuple of str
+        Each name in one family, the family's best first.
+    """
+    names = list(found)
+    parts = []
+    for b, (block, ratio) in enumerate(zip(plain, ratios, strict=True)):
+        here = [i for i, name in enumerate(names) if b in found[name]]
+        seen = projected(expand(block.target, block.modes.z[:1], [found[names[i]][b] for i in here]), ratio)
+        part = np.zeros((seen.shape[0], len(names)))
+        part[:, here] = seen
+        parts.append(part)
+    is_material = [next(iter(found[name].values())).effect.scope == "material" for name in names]
+    return grouped(names, cosines(parts, np.array(is_material, bool) & (len(plain) > 1)))
+
+
+def grouped(names: Sequence[str], cosine: Array) -> list[Family]:
+    """Names, best first, in families by the (m, m) likeness of their signatures."""
+    left, out = list(range(len(names))), []
+    while left:
+        members = [i for i in left if i == left[0] or cosine[left[0], i] > ALIKE]
+        out.append(tuple(names[i] for i in members))
+        left = [i for i in left if i not in members]
+    return out
+
+
+def refitted_probe(block: LaplaceFit, found: Refit, b: int) -> Probe:
+    """An effect at the amplitude and the shapes at which it was refitted in block number `b`.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+        The block that it was refitted in.
+    found : Refit
+    b : int
+    """
+    names = [name.split("[")[0] for name in block.problem_with(found.effect).names]
+    theta = dict(zip(names, found.theta[found.blocks.index(b)].tolist(), strict=True))
+    own = {column: theta[column] for column in found.effect.columns()}
+    main = found.effect.amplitudes[0]
+    step = abs(found.amplitude - main.neutral) or found.sd
+    away = found.amplitude if found.amplitude != main.neutral else main.neutral + step
+    return Probe(found.effect, own | {found.effect.columns()[0]: away}, step, False)
+
+
+def block_ratio(block: LaplaceFit) -> float:
+    """Size of the setting errors against the sensor's, ρ, in a fitted block."""
+    target = block.target
+    return float(tangent(target, block.modes.z[:1], None, moving_columns(target.problem)).ratio[0])
+
+
+def noise_ratio(block: LaplaceFit, found: Refit, b: int) -> float:
+    """The same where an effect was refitted in the block, number `b` of the refit's."""
+    problem = block.problem_with(found.effect)
+    target = LogPosterior(problem, for_draws=False)
+    z = target.coordinates.to_sampled(found.theta[found.blocks.index(b)][None])
+    return float(tangent(target, z, None, moving_columns(problem)).ratio[0])
+
+
+def called(family: Family) -> str:
+    """The family's name: what its members have in common, or the effect itself where it is alone."""
+    return _OF.get(family[0], family[0]) if len(family) > 1 else family[0]
