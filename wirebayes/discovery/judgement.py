@@ -111,6 +111,7 @@ def judge(found: Evidence) -> Judgement:
     if established:
         return Judgement("ambiguous", undecided) if undecided else Judgement("named")
     predicts = found.best_gain is not None and found.best_gain > KEEP_ELPD
-    if predicts and found.shares.get("unknown", 0.0) <= 1.0 - IN_SET:
-        return Judgement("ambiguous", tuple(name for name in smallest_set(found.shares) if name != "unknown"))
+    likely = tuple(name for name in smallest_set(found.shares) if name != "unknown")
+    if predicts and likely and found.shares.get("unknown", 0.0) <= 1.0 - IN_SET:
+        return Judgement("ambiguous", likely)
     return Judgement("unknown")
