@@ -112,7 +112,15 @@ def block_ratio(block: LaplaceFit) -> float:
 
 
 def noise_ratio(block: LaplaceFit, found: Refit, b: int) -> float:
-    """The same where an effect was refitted in the block, number `b` of the refit's."""
+    """The same where an effect was refitted in the block.
+
+    Parameters
+    ----------
+    block : LaplaceFit
+    found : Refit
+    b : int
+        The block's number, as the refit counts them.
+    """
     problem = block.problem_with(found.effect)
     target = LogPosterior(problem, for_draws=False)
     z = target.coordinates.to_sampled(found.theta[found.blocks.index(b)][None])
