@@ -340,6 +340,7 @@ class _Answer:
         return members if self.verdict != "unknown" or "unknown" in members else [*members, "unknown"]
 
 
+# of a material that the global test has cleared
 _NO_REMAINDER: Remainder = {"probability": 0.0, "where": [], "p": None, "leave_one_hold_out": None}
 
 
