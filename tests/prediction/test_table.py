@@ -56,7 +56,7 @@ def test_what_is_far_beyond_the_tests_is_said(tension: float, time: float, found
     stored: Any = SimpleNamespace(sample=SimpleNamespace(protocol=protocol, readings=readings))
     rows = [["wire", 1, 2.0, 5.0, *np.ones(5)], ["wire", 2, 4.0, time, 9.0, 9.0, 9.0, tension, 9.0]]
     sentences = beyond_tested(rows, stored)
-    assert [sentence.split(" ")[5] for sentence in sentences] == found
+    assert [notice.text.split(" ")[5] for notice in sentences] == found
     protocol.control, protocol.setting = "force", np.array([3.0, 2.0, 99.0])  # a weight of which nothing was read
     rows = [["wire", 1, 1.0, 5.0, *np.full(5, 99.0)], ["wire", 2, tension, time, *np.full(5, 99.0)]]
     assert [notice.text.split(" ")[5] for notice in beyond_tested(rows, stored)] == found

@@ -236,18 +236,20 @@ _MOST_LINES = 10  # of outliers, on a terminal
 
 def _checked(name: str, test: CheckedExperiment) -> list[str]:
     recorded = f"{test['recorded_holds']} holds, {test['readings']} readings in {test['duration_s'] / 60.0:.3g} min"
-    steps = f", written in steps of {test['resolution_N']:g} N" if test["resolution_N"] else ""
+    unit = unit_read(test, "resolution")
+    step = read(test, "resolution")
+    steps = f", written in steps of {step:g} {unit}" if step else ""
     lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
     if test["temperature_C"]:
         lines.append("  temperature from {:.3g} to {:.3g} °C".format(*test["temperature_C"]))
-    lines.append(f"  {'hold':>4} {'displacement':>13} {'begins':>9} {'lasts':>9}  readings")
+    weights = test["control"] == "force"
+    lines.append(f"  {'hold':>4} {'weight' if weights else 'displacement':>13} {'begins':>9} {'lasts':>9}  readings")
     for hold in test["holds"]:
         course = "none: held, not recorded"
         if hold["number"] is not None:
-            course = (
-                f"{hold['readings']} from {hold['first_s']:g} s on, {hold['first_N']:.4g} to {hold['last_N']:.4g} N"
-            )
-        place = f"{hold['displacement_mm']:g} mm"
+            first, last = read(hold, "first"), read(hold, "last")
+            course = f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
+        place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
         begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
         number = "-" if hold["number"] is None else hold["number"]
         lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")

@@ -20,6 +20,7 @@ from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import of_posterior
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
+from wirebayes.wire.protocol import Control
 
 SIMULATIONS = 199  # the level that one in twenty-five passes by chance is then the eighth largest
 UNUSUAL = 2.0  # standard deviations of an effect's prior: few wires show it as large
@@ -78,25 +79,26 @@ def _range(draws: Array, before: Array) -> ParameterRange:
 def _effects(block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> dict[str, EffectSize]:
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
     trials, candidates = screening.candidate_probes([block], kinds)
+    control = block.experiments[0].control
     if expand(block.target, block.modes.z[:1], []).degrees < 1:
-        return {name: _hidden(kind, "fewer readings than parameters") for name, kind in kinds.items()}
+        return {name: _hidden(kind, "fewer readings than parameters", control) for name, kind in kinds.items()}
     if not candidates:
-        return {name: _hidden(kind, kind.shows) for name, kind in kinds.items()}
+        return {name: _hidden(kind, kind.shows, control) for name, kind in kinds.items()}
     null = screening.replicated(block, trials, SIMULATIONS, rng).scan
     found = power.detectable(null, trials, candidates, screening.chance_level(candidates, [null]))
     return {
-        name: _shown(kind, found[name][1]) if name in found else _hidden(kind, kind.shows)
+        name: _shown(kind, found[name][1], control) if name in found else _hidden(kind, kind.shows, control)
         for name, kind in kinds.items()
     }
 
 
-def _shown(kind: type[Effect], amplitude: float | None) -> EffectSize:
+def _shown(kind: type[Effect], amplitude: float | None, control: Control) -> EffectSize:
     if amplitude is None:
-        return _hidden(kind, "taken up by the model's own parameters")
+        return _hidden(kind, "taken up by the model's own parameters", control)
     main = kind.amplitudes[0]
     shows = "yes" if amplitude <= UNUSUAL * float(main.prior.std()) else "if unusually large"
-    return {"shows": shows, "amplitude_80": amplitude, "unit": main.unit, "reason": None}
+    return {"shows": shows, "amplitude_80": amplitude, "unit": kind.unit_under(main, control), "reason": None}
 
 
-def _hidden(kind: type[Effect], reason: str) -> EffectSize:
-    return {"shows": "no", "amplitude_80": None, "unit": kind.amplitudes[0].unit, "reason": reason}
+def _hidden(kind: type[Effect], reason: str, control: Control) -> EffectSize:
+    return {"shows": "no", "amplitude_80": None, "unit": kind.unit_under(kind.amplitudes[0], control), "reason": reason}

@@ -407,7 +407,8 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
     main = effect.amplitudes[0]
     low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
     hold = effect.hold if isinstance(effect, EventEffect) else None
-    return {"mean": mean, "q05": low, "q95": high, "unit": main.unit, "hold": hold}
+    unit = effect.unit_under(main, final.experiments[0].control)
+    return {"mean": mean, "q05": low, "q95": high, "unit": unit, "hold": hold}
 
 
 def _inclusion(found: Evidence | None) -> dict[str, float]:
@@ -450,11 +451,13 @@ def _common(
 def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float]) -> Outlook:
     """What could have been seen in block `i`, what cannot be, and what to measure next."""
     block, trials, candidates = gate.blocks[i], gate.trials, gate.candidates
+    control = block.experiments[0].control
     found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)
     best_probe = {name: k for name, (k, _) in found.items()}
     seen: dict[str, DetectableAmplitude] = {
-        name: {"amplitude_80": amplitude, "unit": trials[k].effect.amplitudes[0].unit}
+        name: {"amplitude_80": amplitude, "unit": effect.unit_under(effect.amplitudes[0], control)}
         for name, (k, amplitude) in found.items()
+        for effect in (trials[k].effect,)
     }
     possible = [c.name for c in candidates if i in c.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import times_run_on
+from wirebayes.io.readings import READ, times_run_on
 from wirebayes.notice import Notice
 from wirebayes.typing import Floats
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.protocol import Control, Protocol
 
 RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
 NEGATIVE = 0.05  # share of the largest tension; sensors drift by less
@@ -36,23 +37,23 @@ class Readings:
     Attributes
     ----------
     protocol : Protocol
-    tension_N : (H, R) array
-        Padded as the protocol is.
-    resolution_N : float
+    values : (H, R) array
+        What was read, N, or mm where the tension was set; padded as the protocol is.
+    resolution : float
         0 where it is not stated.
     """
 
     protocol: Protocol
-    tension_N: Floats
-    resolution_N: float
+    values: Floats
+    resolution: float
 
     @property
     def each(self) -> list[Floats]:
         """The readings of each recorded hold."""
-        return [row[mask] for row, mask in zip(self.tension_N, self.protocol.mask, strict=True) if mask.any()]
+        return [row[mask] for row, mask in zip(self.values, self.protocol.mask, strict=True) if mask.any()]
 
     @property
-    def displacement_mm(self) -> Floats:
+    def setting(self) -> Floats:
         """Of each recorded hold."""
         return self.protocol.setting[self.protocol.recorded]
 
@@ -62,40 +63,47 @@ class Readings:
         return self.protocol.number[self.protocol.recorded]
 
     @property
-    def means_N(self) -> Floats:
+    def unit(self) -> str:
+        """Of what was read."""
+        return READ_UNIT[self.protocol.control]
+
+    @property
+    def means(self) -> Floats:
         """Of each recorded hold."""
         return np.array([row.mean() for row in self.each])
 
     @property
-    def noise_N(self) -> float:
+    def noise(self) -> float:
         """Standard deviation of a reading beside the course of its hold; rounding at least."""
         bends = [np.diff(row, 2) / np.sqrt(6.0) for row in self.each if len(row) > 2]
         spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
-        return max(spread, self.resolution_N / np.sqrt(12.0))
+        return max(spread, self.resolution / np.sqrt(12.0))
 
 
-def warnings(protocol: Protocol, tension_N: Floats, resolution_N: float) -> list[Notice]:
+def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Notice]:
     """What is suspicious about the readings of one test.
 
     Parameters
     ----------
     protocol : Protocol
-    tension_N : (H, R) array
-    resolution_N : float
+    values : (H, R) array
+        What was read.
+    resolution : float
+        Of what was read, 0 where it is not stated.
 
     Returns
     -------
     list of Notice
         What, where, what to change; empty for readings as a bench gives them.
     """
-    readings = Readings(protocol, tension_N, resolution_N)
-    found = (check(readings) for check in CHECKS)
+    readings = Readings(protocol, values, resolution)
+    found = (check(readings) for check in CHECKS[protocol.control])
     return [Notice("data", sentence) for sentence in found if sentence]
 
 
 def of_experiment(experiment: Experiment) -> list[Notice]:
     """The warnings of one test."""
-    return warnings(experiment.protocol(), experiment.tension(), experiment.resolution_N)
+    return warnings(experiment.protocol(), experiment.readings(), experiment.resolution)
 
 
 def run_on_times(readings: Readings) -> str:
@@ -114,7 +122,7 @@ def negative_tension(readings: Readings) -> str:
     lowest = np.array([row.min() for row in readings.each])
     worst = int(lowest.argmin())
     largest = max(float(np.abs(row).max()) for row in readings.each)
-    spread = FLAT * max(readings.noise_N, float(np.ptp(readings.each[worst])))  # too few readings may hide the noise
+    spread = FLAT * max(readings.noise, float(np.ptp(readings.each[worst])))  # too few readings may hide the noise
     if -lowest[worst] <= max(NEGATIVE * largest, spread):
         return ""
     return (
@@ -123,23 +131,23 @@ def negative_tension(readings: Readings) -> str:
     )
 
 
-def falls(displacement_mm: Floats, tension_N: Floats) -> bool:
-    """Whether the tension of holds, each (H,), falls as the displacement rises."""
-    changes = np.ptp(displacement_mm) > 0 and np.ptp(tension_N) > 0
-    return bool(changes and np.corrcoef(displacement_mm, tension_N)[0, 1] < FALLS)
+def falls(setting: Floats, readings: Floats) -> bool:
+    """Whether the readings of holds, each (H,), fall as what is set rises."""
+    changes = np.ptp(setting) > 0 and np.ptp(readings) > 0
+    return bool(changes and np.corrcoef(setting, readings)[0, 1] < FALLS)
 
 
 def response(readings: Readings) -> str:
     """Tension that does not follow the displacement, or follows it the wrong way."""
-    means, place = readings.means_N, readings.displacement_mm
+    means, place = readings.means, readings.setting
     if np.ptp(place) == 0:
         return "all holds have the same displacement_mm: without a step the stiffness cannot be known"
-    if max(row.max() for row in readings.each) <= FLAT * readings.noise_N:
+    if max(row.max() for row in readings.each) <= FLAT * readings.noise:
         return (
-            f"no reading stands out from the scatter within the holds ({readings.noise_N:.2g} N): the wire was slack "
+            f"no reading stands out from the scatter within the holds ({readings.noise:.2g} N): the wire was slack "
             "throughout, or rows of other tests are mixed in"
         )
-    if np.ptp(means) <= FLAT * readings.noise_N:
+    if np.ptp(means) <= FLAT * readings.noise:
         return (
             f"tension stays at {means.mean():.4g} N while the displacement changes by {np.ptp(place):g} mm: "
             "check that tension_N is this wire's, and the wire's clamps"
@@ -151,9 +159,25 @@ def response(readings: Readings) -> str:
     return ""
 
 
+def elongation(readings: Readings) -> str:
+    """Displacements that do not follow the weights, or follow them the wrong way."""
+    means, weights = readings.means, readings.setting
+    if np.ptp(weights) == 0:
+        return "all holds have the same tension_N: without another weight the stiffness cannot be known"
+    if falls(weights, means):
+        return "the displacement falls as the weight rises: check the sign of displacement_mm"
+    if np.ptp(means) <= FLAT * readings.noise:
+        return (
+            f"the displacement stays at {means.mean():.4g} mm while the weight changes by {np.ptp(weights):g} N: "
+            "check that displacement_mm is this wire's, and the gauge"
+        )
+    return ""
+
+
 def strain_scale(readings: Readings) -> str:
     """Displacements so small or large beside the length that one of the two is in another unit."""
-    strain = np.ptp(readings.displacement_mm) / readings.protocol.length_mm
+    place = readings.means if readings.protocol.control == "force" else readings.setting
+    strain = np.ptp(place) / readings.protocol.length_mm
     if strain == 0.0 or LEAST_STRAIN <= strain <= LARGEST_STRAIN:
         return ""
     much = "only " if strain < LEAST_STRAIN else ""
@@ -185,19 +209,19 @@ def outlier(readings: Readings) -> str:
     worst = int(distance.argmax())
     hold, at = where[worst]
     others = np.concatenate([np.delete(row, at) if j == hold else row for j, row in enumerate(readings.each)])
-    usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise_N)
+    usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise)
     if distance[worst] <= max(ISOLATED * usual, GROSS * np.ptp(others)):
         return ""
-    time = readings.protocol.time_s[readings.protocol.recorded][hold, at]
+    time, unit = readings.protocol.time_s[readings.protocol.recorded][hold, at], readings.unit
     return (
-        f"the reading of {readings.each[hold][at]:.5g} N in hold {readings.number[hold]} at {time:g} s is "
-        f"{distance[worst]:.3g} N from its neighbours: check it, correct a misprint or leave its row out"
+        f"the reading of {readings.each[hold][at]:.5g} {unit} in hold {readings.number[hold]} at {time:g} s is "
+        f"{distance[worst]:.3g} {unit} from its neighbours: check it, correct a misprint or leave its row out"
     )
 
 
 def rising(readings: Readings) -> str:
     """Tension that rises within holds on loading, where creep lets it fall."""
-    place, each, noise = readings.displacement_mm, readings.each, readings.noise_N
+    place, each, noise = readings.setting, readings.each, readings.noise
     # a hold that begins below the end of the one before has creep to give back
     loading = [
         row
@@ -220,14 +244,15 @@ def rising(readings: Readings) -> str:
 def off_grid(readings: Readings) -> str:
     """Readings finer than the resolution they are said to have."""
     changes = np.concatenate([np.abs(np.diff(row)) for row in readings.each])
-    if not readings.resolution_N or len(changes) < 3:
+    if not readings.resolution or len(changes) < 3:
         return ""
-    finer = (changes > 0.01 * readings.resolution_N) & (changes < 0.5 * readings.resolution_N)
-    if finer.mean() <= OFF_GRID and not 0.0 < np.ptp(np.concatenate(readings.each)) <= readings.resolution_N:
+    finer = (changes > 0.01 * readings.resolution) & (changes < 0.5 * readings.resolution)
+    if finer.mean() <= OFF_GRID and not 0.0 < np.ptp(np.concatenate(readings.each)) <= readings.resolution:
         return ""
+    key = f"resolution_{readings.unit}"
     return (
-        f"readings change by less than resolution_N = {readings.resolution_N:g}: check resolution_N, and that both it "
-        "and tension_N are in N"
+        f"readings change by less than {key} = {readings.resolution:g}: check {key}, and that both it and "
+        f"{READ[readings.protocol.control]} are in {readings.unit}"
     )
 
 
@@ -238,14 +263,14 @@ def repeated(readings: Readings) -> str:
         if len(set(row.tolist())) < COPIED:
             continue
         first = known.setdefault(tuple(row.tolist()), j)
-        if readings.displacement_mm[first] != readings.displacement_mm[j]:
+        if readings.setting[first] != readings.setting[j]:
             a, b = readings.number[first], readings.number[j]
-            return (
-                f"holds {a} and {b} have the same {len(row)} readings at two displacements: check that none is a copy"
-            )
+            what = "weights" if readings.protocol.control == "force" else "displacements"
+            return f"holds {a} and {b} have the same {len(row)} readings at two {what}: check that none is a copy"
     return ""
 
 
-CHECKS: tuple[Callable[[Readings], str], ...] = (
-    run_on_times, negative_tension, response, strain_scale, outlier, rising, off_grid, repeated,
-)  # fmt: skip
+CHECKS: dict[Control, tuple[Callable[[Readings], str], ...]] = {
+    "displacement": (run_on_times, negative_tension, response, strain_scale, outlier, rising, off_grid, repeated),
+    "force": (run_on_times, elongation, strain_scale, outlier, off_grid, repeated),
+}

@@ -1,22 +1,25 @@
 """``check.json``: what was understood of an experiment, and what such a test can determine."""
 
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import Quantiles
 from wirebayes.notice import Warned
 
 
 class HoldUnderstood(TypedDict):
-    """A hold; an unrecorded one has no first reading."""
+    """A hold, a step or a weight; an unrecorded one has no first reading."""
 
     number: int | None
-    displacement_mm: float
+    displacement_mm: NotRequired[float]
+    tension_N: NotRequired[float]
     start_s: float
     duration_s: float
     readings: int
     first_s: float | None
-    first_N: float | None
-    last_N: float | None
+    first_N: NotRequired[float | None]
+    last_N: NotRequired[float | None]
+    first_mm: NotRequired[float | None]
+    last_mm: NotRequired[float | None]
 
 
 class Understood(TypedDict):
@@ -24,7 +27,9 @@ class Understood(TypedDict):
 
     material: str
     length_mm: float
-    resolution_N: float | None
+    control: str
+    resolution_N: NotRequired[float | None]
+    resolution_mm: NotRequired[float | None]
     holds: list[HoldUnderstood]
     recorded_holds: int
     unrecorded_holds: int

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 Content = TypeVar("Content")
 
-_OF_READINGS = ("rmse", "observed", "mean", "sd", "quantiles", "floor", "residual_rms", "first", "last")
+_OF_READINGS = ("rmse", "observed", "mean", "sd", "quantiles", "floor", "residual_rms", "first", "last", "resolution")
 _IN_N = {f"{name}_N": name for name in _OF_READINGS}
 
 

@@ -15,7 +15,7 @@ from wirebayes.json_files.summary import ExtrapolatedCreep
 from wirebayes.report.blocks import unit_text
 from wirebayes.results.store import unit_of
 from wirebayes.typing import Array
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.protocol import Control, Protocol
 
 CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
 COLOURS = {"chain": CHAIN, "hold": HOLD}
@@ -75,22 +75,24 @@ def legend_below(figure: Figure, axes: Any, columns: int = 2) -> None:
     )
 
 
-def measured(protocol: Protocol, tension_N: Array, title: str) -> Figure:
-    """Tension against displacement: each hold's readings from the first (dark) to the last (light).
+def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
+    """What was read against what was set: each hold's readings from the first (dark) to the last (light).
 
     Parameters
     ----------
     protocol : Protocol
-    tension_N : (H, R) array
+    readings : (H, R) array
     """
-    figure, axes = panel("displacement, mm", "tension, N", title)
+    weights = protocol.control == "force"
+    across, upward = ("weight, N", "displacement, mm") if weights else ("displacement, mm", "tension, N")
+    figure, axes = panel(across, upward, title)
     first = True
     for j in range(len(protocol.setting)):
         x, seen = protocol.setting[j], protocol.mask[j]
         if not seen.any():
             axes.axvline(x, color=QUIET, ls=":", lw=1.2, label="held, not recorded")
             continue
-        y = tension_N[j][seen]
+        y = readings[j][seen]
         axes.plot([x] * len(y), y, color=QUIET, lw=1.5, zorder=1)
         axes.scatter([x], y[:1], s=22, color=CHAIN, zorder=3, label="when the hold begins" if first else None)
         if len(y) > 1:
@@ -98,7 +100,8 @@ def measured(protocol: Protocol, tension_N: Array, title: str) -> Figure:
             axes.scatter([x] * (len(y) - 1), y[1:], s=11, color=HOLD, zorder=2, label=label)
         first = False
     legend(axes, loc="lower right")
-    axes.set_ylim(bottom=0)
+    if not weights:
+        axes.set_ylim(bottom=0)
     return figure
 
 
@@ -125,9 +128,16 @@ def joint(
     return figure
 
 
-def named(name: str, effects: tuple[Any, ...] = ()) -> str:
-    """A parameter with its unit, as an axis says it."""
-    unit = unit_text(unit_of(name, effects))
+def named(name: str, effects: tuple[Any, ...] = (), control: Control = "displacement") -> str:
+    """A parameter with its unit, as an axis says it.
+
+    Parameters
+    ----------
+    name : str
+    effects : tuple of Effect
+    control : {"displacement", "force"}
+    """
+    unit = unit_text(unit_of(name, effects, (control,)))
     return f"{name}, {unit}" if unit else name
 
 
@@ -147,7 +157,10 @@ def logarithmic(axes: Any, which: str = "x") -> None:
 
 
 def marginals(
-    draws: Mapping[str, Array], prior: Mapping[str, Array] | None = None, effects: tuple[Any, ...] = ()
+    draws: Mapping[str, Array],
+    prior: Mapping[str, Array] | None = None,
+    effects: tuple[Any, ...] = (),
+    control: Control = "displacement",
 ) -> list[tuple[str, Figure]]:
     """One histogram a parameter, the prior behind it.
 
@@ -168,7 +181,7 @@ def marginals(
     for name, values in draws.items():
         if np.ptp(values) == 0:
             continue  # fixed by the user's prior
-        figure, axes = panel(named(name, effects), "density", size=(3.4, 2.4))
+        figure, axes = panel(named(name, effects, control), "density", size=(3.4, 2.4))
         figure.set_layout_engine(None)  # its labels have the same size always: nothing to measure
         figure.subplots_adjust(left=0.1, right=0.96, bottom=0.22, top=0.97)
         low, high = np.quantile(values, [0.0005, 0.9995])
@@ -194,7 +207,9 @@ def marginals(
     return out
 
 
-def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure | None:
+def corner(
+    draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: Control = "displacement"
+) -> Figure | None:
     """Every pair of parameters: the regions that hold 50 and 90 % of the draws; on the diagonal, each alone.
 
     Parameters
@@ -229,7 +244,7 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = ()) -> Figure 
         stairs = bottom + 0.92 * _SIDE * heights / heights.max()
         axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
         ticks, labels = _few_ticks(values, is_log)
-        words = "\n".join(_narrow(line) for line in named(name, effects).replace(", ", ",\n").split("\n"))
+        words = "\n".join(_narrow(line) for line in named(name, effects, control).replace(", ", ",\n").split("\n"))
         axes.text(i + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
         _ticks(axes, [(i + _SIDE * t, 0.0) for t in ticks], (0.0, -_TICK))
         for t, label in zip(ticks, labels, strict=True):

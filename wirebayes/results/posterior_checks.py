@@ -12,6 +12,7 @@ from wirebayes.io import data_checks
 from wirebayes.model.problem import FINEST, Sample
 from wirebayes.notice import Notice
 from wirebayes.typing import Floats
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
 
 LOOSE_STEPS = 0.5  # setting error over the typical step: the displacements hardly order the holds then
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
@@ -68,9 +69,11 @@ def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     step, low = float(np.median(steps[steps > 0])), float(np.quantile(own["setting_sd"], 0.05))
     if low <= LOOSE_STEPS * step:
         return ""
+    unit = SET_UNIT[sample.protocol.control]
+    settings, read = ("weights", "displacements") if unit == "N" else ("displacements", "tensions")
     return (
-        f"setting_sd is at least {low:.2g} mm while the test steps by {step:.3g} mm: the displacements do not explain "
-        "the tensions; look for holds in the wrong order, readings of two wires mixed, or another unit"
+        f"setting_sd is at least {low:.2g} {unit} while the test steps by {step:.3g} {unit}: the {settings} do not "
+        f"explain the {read}; look for holds in the wrong order, readings of two wires mixed, or another unit"
     )
 
 
@@ -79,21 +82,25 @@ def noise(own: Mapping[str, Floats], sample: Sample) -> str:
     readings = sample.readings[..., 0][sample.protocol.mask]
     signal = float(np.ptp(readings))
     low, high = np.quantile(own["sensor_sd"], [0.05, 0.95])
+    unit = READ_UNIT[sample.protocol.control]
     if signal > 0 and low > NOISY * signal:
         return (
-            f"sensor_sd is at least {low:.2g} N while the readings differ by {signal:.3g} N in all: no wire of this "
-            "model gives them; look for a misprint among them, mixed-up rows, or another unit"
+            f"sensor_sd is at least {low:.2g} {unit} while the readings differ by {signal:.3g} {unit} in all: no wire "
+            "of this model gives them; look for a misprint among them, mixed-up rows, or another unit"
         )
-    if max(high, sample.resolution) < QUIET * np.abs(readings).max():
+    largest = signal if unit == "mm" else np.abs(readings).max()  # where displacements begin means nothing
+    if max(high, sample.resolution) < QUIET * largest:
         return (
-            f"the readings carry no noise (sensor_sd below {high:.1g} N): they were computed or smoothed, and the "
-            "intervals are far narrower than a bench's; state resolution_N, and fit what the sensor wrote"
+            f"the readings carry no noise (sensor_sd below {high:.1g} {unit}): they were computed or smoothed, and the "
+            f"intervals are far narrower than a bench's; state resolution_{unit}, and fit what the sensor wrote"
         )
     return ""
 
 
 def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     """A stiffness that the prior all but excludes."""
+    if "k1" not in own:
+        return ""
     middle, logs = float(np.median(own["k1"])), np.log(prior["k1"])
     spread = float(logs.std())
     if not spread or abs(np.log(middle) - np.median(logs)) <= FAR_OUT * spread:

@@ -30,7 +30,7 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
     ]:
         if value not in known:
             raise ValueError(f"{what} {value!r}")
-    needed = ["k1", "B", "U", "k2", "N", "sensor_sd", *(["preload", "setting_sd"] if likelihood == "chain" else [])]
+    needed = [*sample.parameters(likelihood)]  # type: ignore[arg-type]
     needed += [column for effect in model.effects for column in effect.columns()]
     missing = [name for name in needed if name not in draws]
     if missing:

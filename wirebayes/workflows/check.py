@@ -7,10 +7,12 @@ from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of
 from wirebayes.io import data_checks
-from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment import Experiment, Hold
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
+from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import named, to_json
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.workers import computing
 from wirebayes.workflows.options import PathLike, Progress, Source, check_seed, experiments_of, path_of, silent
 from wirebayes.workflows.results import CHECKED, Check, Place
@@ -97,23 +99,28 @@ def check(
 
 def _understood(e: Experiment) -> Understood:
     """What the files say, as plain values."""
-    holds: list[HoldUnderstood] = [
-        {
-            "number": hold.number, "displacement_mm": hold.displacement_mm, "start_s": hold.start_s,
-            "duration_s": hold.duration_s, "readings": int(hold.time_s.size),
-            "first_s": float(hold.time_s[0]) if hold.recorded else None,
-            "first_N": float(hold.tension_N[0]) if hold.recorded else None,
-            "last_N": float(hold.tension_N[-1]) if hold.recorded else None,
-        }
-        for hold in e.holds
-    ]  # fmt: skip
+    holds = [_hold(hold) for hold in e.holds]
     recorded = e.recorded_holds
     temperatures = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
-    return {
-        "material": e.material, "length_mm": e.length_mm, "resolution_N": e.resolution_N or None,
+    found: Understood = {
+        "material": e.material, "length_mm": e.length_mm, "control": e.control, "resolution_N": e.resolution or None,
         "holds": holds, "recorded_holds": len(recorded), "unrecorded_holds": len(e.holds) - len(recorded),
         "readings": sum(hold.time_s.size for hold in recorded),
         "duration_s": sum(hold.duration_s for hold in e.holds),
         "temperature_C": [float(min(map(np.min, temperatures))), float(max(map(np.max, temperatures)))]
         if temperatures else None,
     }  # fmt: skip
+    return in_unit(found, READ_UNIT[e.control])
+
+
+def _hold(hold: Hold) -> HoldUnderstood:
+    out: HoldUnderstood = {
+        "number": hold.number, "start_s": hold.start_s,
+        "duration_s": hold.duration_s, "readings": int(hold.time_s.size),
+        "first_s": float(hold.time_s[0]) if hold.recorded else None,
+        "first_N": float(hold.readings[0]) if hold.recorded else None,
+        "last_N": float(hold.readings[-1]) if hold.recorded else None,
+    }  # fmt: skip
+    if hold.control == "force":
+        return {**out, "tension_N": hold.setting}
+    return {**out, "displacement_mm": hold.setting}

@@ -6,6 +6,7 @@ from typing import Any
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
+from wirebayes.json_files.read_units import read
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -95,12 +96,14 @@ def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
     ]
     caption = "The smallest amplitude of each effect that discover would detect in four tests of five like this one."
     blocks.append(Table(["effect", "amplitude", "unit", "shows"], seen, caption))
+    weights = e["control"] == "force"
     holds = [
-        [str(h["number"] or "–"), number(h["displacement_mm"]), number(h["start_s"]), number(h["duration_s"]),
-         str(h["readings"]), number(h["first_N"]), number(h["last_N"])]
+        [str(h["number"] or "–"), number(h["tension_N" if weights else "displacement_mm"]), number(h["start_s"]),
+         number(h["duration_s"]), str(h["readings"]), number(read(h, "first")), number(read(h, "last"))]
         for h in e["holds"]
     ]  # fmt: skip
-    header = ["hold", "displacement (mm)", "begins (s)", "lasts (s)", "readings", "first (N)", "last (N)"]
+    what, unit = ("weight (N)", "mm") if weights else ("displacement (mm)", "N")
+    header = ["hold", what, "begins (s)", "lasts (s)", "readings", f"first ({unit})", f"last ({unit})"]
     blocks.append(Table(header, holds, "The holds as they were read; one without a number was not recorded."))
     return blocks
 
@@ -110,5 +113,5 @@ def _picture(folder: Path, name: str) -> list[Block]:
     if file is None:
         return []
     alt = f"Displacement and tension of {name} over the whole test."
-    caption = "Displacement above, tension below, over the whole test. Shading marks every second hold."
+    caption = "What was set above, what was read below, over the whole test. Shading marks every second hold."
     return [Pictures([Picture(embedded(file), alt, caption, wide=True)])]

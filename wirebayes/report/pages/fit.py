@@ -7,6 +7,7 @@ import numpy as np
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.summary import SummaryJson
+from wirebayes.model.problem import Sample
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
@@ -90,18 +91,23 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}
     trusted = summary["converged"] and _passed(summary) is not False
     blocks: list[Block] = _cautions(summary)
-    blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample.model.effects, trusted)]))
-    alt = f"Measured minus predicted tension of {sample.name}, hold after hold, inside the 90 % band."
+    blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample, trusted)]))
+    alt = f"Measured minus predicted readings of {sample.name}, hold after hold, inside the 90 % band."
     measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
-    alt_measured = f"Tension of {sample.name} against displacement."
-    pictures = [Picture(drawn(measured), alt_measured, _READ)]
+    weights = sample.protocol.control == "force"
+    alt_measured = (
+        f"Displacement of {sample.name} against weight."
+        if weights
+        else (f"Tension of {sample.name} against displacement.")
+    )
+    pictures = [Picture(drawn(measured), alt_measured, _GREW if weights else _READ)]
     pictures.append(Picture(drawn(_residuals(stored)), alt, _LEFT))
     blocks.append(Pictures(pictures))
-    blocks.append(_parameters(draws, shrunk, sample.model.effects))
-    named = figures.marginals(draws, prior, sample.model.effects)
+    blocks.append(_parameters(draws, shrunk, sample))
+    named = figures.marginals(draws, prior, sample.model.effects, sample.protocol.control)
     marginals = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
     blocks.append(Pictures(marginals, small=True))
-    pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects)
+    pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects, sample.protocol.control)
     if pairs is not None:
         alt = f"Posterior of {sample.name}, every pair of parameters."
         blocks.append(Pictures([Picture(drawn(pairs), alt, _PAIRS, wide=True)]))
@@ -127,6 +133,7 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
 
 
 _READ = "What was read: within each hold the tension falls from the dark point downwards."
+_GREW = "What was read: under each weight the wire grows from the dark point upwards; under a smaller one it recovers."
 _LEFT = (
     "What the model leaves over. Where the readings lie outside the band, or show a pattern within it, the model "
     "misses something."
@@ -165,24 +172,26 @@ def _sampled(summary: SummaryJson) -> str:
 
 
 def _measured(stored: Stored) -> Points:
-    protocol, tension = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
+    protocol, read = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
+    weights = protocol.control == "force"
+    tension = protocol.setting[protocol.recorded] if weights else read
     holds = int(protocol.recorded.sum())
     unrecorded = len(protocol.recorded) - holds
     points = [
         f"{stored.sample.material}, {protocol.length_mm:g} mm.",
-        f"{holds} holds{f' and {unrecorded} not recorded' if unrecorded else ''}, {len(tension)} readings.",
-        f"Tensions from {tension.min():.2f} to {tension.max():.2f} N.",
+        f"{holds} holds{f' and {unrecorded} not recorded' if unrecorded else ''}, {len(read)} readings.",
+        f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
     ]
     return Points("What was measured", points)
 
 
-def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...], trusted: bool) -> list[Points]:
+def _known(draws: dict[str, Array], shrunk: dict[str, float], sample: Sample, trusted: bool) -> list[Points]:
     """What the readings determine and what they do not; only the model's own words where it is not to be trusted."""
     known: list[str] = []
     undetermined: list[str] = []
     for name, share in shrunk.items():
-        unit = unit_text(unit_of(name, effects))
+        unit = _unit(name, sample)
         interval = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
         (known if share >= MOST else undetermined).append(interval)
     if not trusted:
@@ -194,13 +203,17 @@ def _known(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any
     ]
 
 
-def _parameters(draws: dict[str, Array], shrunk: dict[str, float], effects: tuple[Any, ...]) -> Table:
+def _unit(name: str, sample: Sample) -> str:
+    return unit_text(unit_of(name, sample.model.effects, (sample.protocol.control,)))
+
+
+def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sample) -> Table:
     lines = []
     for name, values in draws.items():
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
         share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
-        unit = unit_text(unit_of(name, effects)) or "–"
-        lines.append([name, unit, number(middle), span(low, high), share, _means(name, effects)])
+        unit = _unit(name, sample) or "–"
+        lines.append([name, unit, number(middle), span(low, high), share, _means(name, sample.model.effects)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
         "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "

@@ -52,13 +52,18 @@ def _section(e: Experiment, truth: TrueWire) -> Section:
     effects = truth.get("effects", [])
     beyond = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
     picture = Picture(
-        drawn(figures.measured(e.protocol(), e.tension(), e.name)),
-        f"Tension of {e.name} against displacement.",
-        "Within each hold the tension falls from the dark point downwards.",
+        drawn(figures.measured(e.protocol(), e.readings(), e.name)),
+        f"Readings of {e.name} against what was set.",
+        "Within each hold the readings go from the dark point to the light ones.",
     )
     known = tuple(named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
     lines = [
-        [name, number(value), unit_text(unit_of(name, known)) or "–", SYMBOLS.get(name, "size of an effect")]
+        [
+            name,
+            number(value),
+            unit_text(unit_of(name, known, (e.control,))) or "–",
+            SYMBOLS.get(name, "size of an effect"),
+        ]
         for name, value in truth["parameters"].items()
     ]
     blocks: list[Block] = [

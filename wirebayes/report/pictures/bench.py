@@ -1,4 +1,4 @@
-"""Pictures of what was understood: the displacement and the tension of a test over its time, hold by hold."""
+"""Pictures of what was understood: what was set and what was read over the time of a test, hold by hold."""
 
 from pathlib import Path
 from typing import Any
@@ -28,11 +28,13 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     """
     figure = Figure(figsize=(9.0, 5.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.0))
+    steps = experiment.control == "displacement"
     starts = [hold.start_s for hold in experiment.holds] if recording is None else recording.start_s.tolist()
     last = max(start + hold.duration_s for start, hold in zip(starts, experiment.holds, strict=True))
     scale, unit = (60.0, "min") if last > _MINUTES else (1.0, "s")
     if recording is not None:
-        for axes, values in ((upper, recording.displacement_mm), (lower, recording.tension_N)):
+        of_both = [recording.displacement_mm, recording.tension_N]
+        for axes, values in zip((upper, lower), of_both if steps else of_both[::-1], strict=True):
             axes.plot(recording.time_s / scale, values, color=QUIET, lw=1.0, zorder=1, label="recorded")
     labels = {"held": "held", "gap": "held, not recorded", "kept": "reading"}
     row = 0
@@ -41,7 +43,7 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
         ends = np.array([start, start + hold.duration_s]) / scale
         style = {"color": HOLD, "lw": 2.2} if hold.recorded else {"color": INK, "lw": 1.6, "ls": ":"}
         key = "held" if hold.recorded else "gap"
-        upper.plot(ends, [hold.displacement_mm] * 2, zorder=3, label=labels.pop(key, None), **style)
+        upper.plot(ends, [hold.setting] * 2, zorder=3, label=labels.pop(key, None), **style)
         if not hold.recorded:
             lower.axvspan(*ends, color=QUIET, alpha=0.3, lw=0)
             continue
@@ -52,11 +54,12 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
             upper.annotate(str(hold.number), (float(ends.mean()), 1.02), xycoords=("data", "axes fraction"),
                            ha="center", va="bottom", fontsize=7.5, color=INK)  # fmt: skip
         time = (start + hold.time_s) / scale
-        lower.plot(time, hold.tension_N, color=QUIET, lw=1.0, zorder=2)
-        lower.plot(time, hold.tension_N, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))
+        lower.plot(time, hold.readings, color=QUIET, lw=1.0, zorder=2)
+        lower.plot(time, hold.readings, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))
         row += 1
-    upper.set_ylabel("displacement, mm")
-    lower.set_ylabel("tension, N")
+    labels_of_axes = ["displacement, mm", "tension, N"]
+    for axes, label in zip((upper, lower), labels_of_axes if steps else labels_of_axes[::-1], strict=True):
+        axes.set_ylabel(label)
     lower.set_xlabel(f"time of the test, {unit}" + ("" if recording is not None else " (moves take none)"))
     what = f"{experiment.name}: {experiment.length_mm:g} mm of {verbatim(experiment.material)}"
     upper.set_title(f"{what}; hold numbers above",
