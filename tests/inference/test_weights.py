@@ -1,0 +1,60 @@
+"""One wire under steps and under weights: both find it, and together they know it better."""
+
+import numpy as np
+import pytest
+
+from tests.simulated import simulated_tests
+from wirebayes.inference import rough_draws
+from wirebayes.inference.laplace_fit import fitted
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.problem import build
+from wirebayes.simulation.synthetic import Bench, Truth
+
+TIMES = (0.0, 15.0, 30.0, 60.0, 120.0, 300.0)
+WIRE = {"k1": 900.0, "B": 0.2, "U": 0.8, "k2": 0.03, "N": 0.8}
+STEPS = Bench("steps", "line", displacements_mm=(1, 2, 3, 4, 5, 6, 4), times_s=TIMES, resolution_N=0.001)
+WEIGHTS = Bench("weights", "line", weights_N=(1, 2, 3, 4, 5, 2), times_s=TIMES, resolution_mm=0.001)
+ERRORS = {
+    "steps": {"preload": 0.4, "sensor_sd": 0.006, "setting_sd": 0.02},
+    "weights": {"preload": -3.0, "sensor_sd": 0.006, "setting_sd": 0.02},
+}
+
+
+@pytest.fixture(scope="module")
+def both() -> dict[str, Experiment]:
+    made = [simulated_tests([b], Truth(WIRE | ERRORS[b.name]), seed) for seed, b in enumerate((STEPS, WEIGHTS), 1)]
+    return {tests[0].name: tests[0] for tests in made}
+
+
+def draws(experiments: list[Experiment]) -> dict[str, np.ndarray]:
+    """Of the first experiment's parameters, by the normal approximation weighted by the posterior."""
+    rng = np.random.default_rng(0)
+    block = fitted(experiments, (), "hooke", "saturating", rng)
+    problem = block.target.problem
+    return problem.parameters(rough_draws.draws(block.target, block.modes, rng), problem.samples[0])
+
+
+def test_a_pair_of_tests_agrees_with_the_wire_and_is_sharper_together(both: dict[str, Experiment]) -> None:
+    sd = {}
+    for name, chosen in (("steps", ["steps"]), ("weights", ["weights"]), ("together", ["steps", "weights"])):
+        found = draws([both[key] for key in chosen])
+        for parameter, value in WIRE.items():
+            logs = np.log(found[parameter]) - np.log(value)
+            assert abs(logs.mean()) < 3.0 * logs.std(), (name, parameter)
+            sd[name, parameter] = logs.std()
+    for parameter in WIRE:
+        assert sd["together", parameter] < min(sd["steps", parameter], sd["weights", parameter]), parameter
+
+
+def test_hold_by_hold_a_test_under_weights_has_neither_stiffness_nor_preload(both: dict[str, Experiment]) -> None:
+    problem = build([both["weights"]], likelihood="hold")
+    assert problem.names == ("B", "U", "k2", "N", "sensor_sd")
+    theta = np.array([[WIRE["B"], WIRE["U"], WIRE["k2"], WIRE["N"], 0.006]])
+    assert np.isfinite(problem.log_likelihood(theta)).all()
+    assert build([both["steps"]], likelihood="hold").names[0] == "k1"
+
+
+def test_a_law_whose_wire_cannot_carry_the_weights_has_no_likelihood(both: dict[str, Experiment]) -> None:
+    problem = build([both["weights"]], law="modified")
+    theta = np.array([[k1, 0.2, 0.8, 0.03, 0.8, -3.0, 0.006, 0.02] for k1 in (4.9, 900.0)])
+    assert np.isfinite(problem.log_likelihood(theta)).tolist() == [False, True]
