@@ -70,8 +70,8 @@ def coverage(tests: int, seed: int) -> None:
     converged = 0
     for i in range(tests):
         rng = np.random.default_rng([seed, i])
-        truth, *about = wire(rng)
-        bench, own = under_weights(truth, *about, rng)
+        truth, length, tension, hold_s = wire(rng)
+        bench, own = under_weights(truth, length, tension, hold_s, rng)
         done = fit(build([measured(bench, truth | own, i)]), i)
         converged += done.chains.converged
         low, high = np.quantile(done.flat, [0.05, 0.95], axis=0)
