@@ -204,7 +204,7 @@ class Fits:
             for b, place in zip(on, places, strict=True)
         }
         self.evidence = None if refitted is None else evidence(refitted)
-        further = SimpleNamespace(amplitudes=lambda name: refits)
+        further = SimpleNamespace(amplitudes=lambda name: refits, reach={})
         self.parent: Any = stepwise.FittedSet(
             EffectSet(("a",), 7.0, {}, None), self.blocks, ("first",), further, ([], [], [])  # type: ignore[arg-type]
         )  # fmt: skip
@@ -218,7 +218,7 @@ class Fits:
             self.did.append(("informed", effects))
             return blocks
 
-        def weighed(blocks: Any, *given: Any, correction: Any, most: int, forms_a_name: int) -> Any:
+        def weighed(blocks: Any, *given: Any, reach: Any, most: int, forms_a_name: int) -> Any:
             self.did.append(("weighed", most, forms_a_name))
             return self.evidence
 

@@ -65,7 +65,12 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
     per_delta = 0.1 * float(effect.amplitudes[0].prior.std())
     top = 9.0 * per_delta
 
+    one_sided = effect.amplitudes[0].prior.support()[0] >= effect.amplitudes[0].neutral
+    low = 0.0 if one_sided else -40.0 * per_delta
+
     class Curve:
+        prior = stats.uniform(low, 40.0 * per_delta - low)  # of δ up to 40
+
         def __init__(self, block: Any, effect: Any) -> None:
             pass
 
@@ -82,7 +87,6 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(refit, "Pinned", Curve)
     found = refit.refit([SimpleNamespace(log_evidence=0.0)], (0,), effect, per_delta, 8.0 * per_delta)  # type: ignore[list-item]
     assert found.amplitude == pytest.approx(top, rel=0.02) and found.sd == pytest.approx(per_delta, rel=1e-3)
-    one_sided = effect.amplitudes[0].prior.support()[0] >= effect.amplitudes[0].neutral
     assert one_sided == (name == "toe")
     assert found.log_bayes == pytest.approx(log_evidence(9.0, one_sided), abs=0.02)
 
@@ -92,7 +96,7 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     trials = [p for hold in range(1, 13) for p in probes(named(f"grip_slip@{hold}"))[:1]]
     candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
 
-    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float) -> refit.Refit:
+    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float) -> refit.Refit:
         return refit.Refit(effect, tuple(which), 9.0 if effect.hold == 7 else -30.0, 8.0, 1.0, ())
 
     monkeypatch.setattr(name_evidence, "refit", refitted)
@@ -114,7 +118,7 @@ def test_an_absurd_value_of_the_scan_takes_no_other_name_off_the_list(monkeypatc
     own = {"sensor_drift": -3.0, "toe": 7.0, "strain_stiffening": -1.0}
     asked: list[str] = []
 
-    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float) -> refit.Refit:
+    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float) -> refit.Refit:
         asked.append(effect.name)
         return refit.Refit(effect, tuple(which), own[effect.name], 8.0, 1.0, ())
 
@@ -153,10 +157,8 @@ def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypat
     monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
         effect, tuple(which), -np.inf, 0.0, 1.0, ()))  # fmt: skip
     data, trials = scan_of(np.array([8.0]), True), probes(named("toe"))[:1]
-    found = name_evidence.weigh_names(
-        [SimpleNamespace()], trials, [Candidate(0, "toe", (0,), True)], [data],  # type: ignore[list-item]
-        correction=lambda r: pytest.fail("there are no parameters to correct it at"),
-    )  # fmt: skip
+    candidates = [Candidate(0, "toe", (0,), True)]
+    found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["toe"] == -np.inf and found.presence["toe"] == pytest.approx([0.0])
 
 

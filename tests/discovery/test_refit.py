@@ -14,12 +14,27 @@ from wirebayes.effects import named
 TWO_SIDED = named("strain_stiffening")
 
 
+class Flat:
+    """A density of one over a width, wherever it is asked: δ of 40, on one side or on both."""
+
+    def __init__(self, width: float) -> None:
+        self.width = width
+
+    def logpdf(self, amplitude: np.ndarray) -> np.ndarray:
+        return np.full(len(amplitude), -np.log(self.width))
+
+    def cdf(self, amplitude: float) -> float:
+        return float(amplitude > 0)
+
+
 def refitted(monkeypatch: pytest.MonkeyPatch, tops: list[float], effect: Any = TWO_SIDED, guess: float = 3.0) -> Any:
     """Refitted on blocks whose evidence is normal in δ about these tops; δ = 1 is a thousandth of the amplitude."""
 
     class Curve:
         def __init__(self, block: Any, effect: Any) -> None:
             self.top = block.top
+            main = effect.amplitudes[0]
+            self.prior = Flat(0.04 if main.prior.support()[0] >= main.neutral else 0.08)
 
         def starts(self) -> np.ndarray:
             return np.zeros((2, 1))
@@ -57,7 +72,7 @@ def test_blocks_that_share_an_amplitude_add_their_evidence(monkeypatch: pytest.M
     """Tops at 4 and 6: the shared amplitude is 5, known √2 times as well, and half a nat a block is lost."""
     found = refitted(monkeypatch, [4.0, 6.0])
     assert found.amplitude == pytest.approx(5e-3, rel=0.02) and found.sd == pytest.approx(1e-3 / np.sqrt(2), rel=1e-6)
-    assert found.log_bayes == pytest.approx(0.5 * (4.0**2 + 6.0**2) - 1.0 + occam(False), abs=0.02)
+    assert found.log_bayes == pytest.approx(0.5 * (4.0**2 + 6.0**2) - 1.0 + occam(False) - 0.5 * np.log(2), abs=0.02)
     assert found.blocks == (0, 1) and len(found.theta) == 2
 
 
@@ -66,6 +81,29 @@ def test_an_amplitude_that_cannot_be_negative_ends_at_zero(monkeypatch: pytest.M
     assert 0.0 <= found.amplitude < 0.2e-3
     assert found.log_bayes < occam(True)
     assert refitted(monkeypatch, [9.0], named("toe")).log_bayes == pytest.approx(40.5 + occam(True), abs=0.05)
+
+
+@pytest.mark.parametrize("sd", [0.5, 5.0, 500.0])
+def test_the_prior_is_the_catalogue_s_as_far_as_it_reaches_and_integrates_to_one(sd: float) -> None:
+    """A wide one is uniform over the reach, a narrow one is itself, and an amplitude beyond both is impossible."""
+    grid = np.linspace(-3.0, 3.0, 60001)
+    density = np.exp(refit.within(stats.norm(0.0, sd), 0.0, 2.0)(grid))
+    assert np.trapezoid(density, grid) == pytest.approx(1.0, abs=1e-4)
+    assert (density[np.abs(grid) > 2.0001] == 0.0).all()
+    expected = stats.norm(0.0, sd).pdf(grid) / (2 * stats.norm(0.0, sd).cdf(2.0) - 1.0)
+    inside = np.abs(grid) < 2.0
+    assert density[inside] == pytest.approx(expected[inside])
+    one = refit.within(stats.halfnorm(0.0, sd), 0.0, np.inf)(np.array([0.3, 99.0]))
+    assert one == pytest.approx(stats.halfnorm(0.0, sd).logpdf([0.3, 99.0]))
+
+
+def test_an_amplitude_that_is_hardly_possible_pays_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A normal likelihood about 9 in units of δ, a normal prior of sd 2 about none: the two integrated by hand."""
+    monkeypatch.setattr(Flat, "logpdf", lambda self, a: stats.norm(0.0, 2e-3).logpdf(a))
+    found = refitted(monkeypatch, [9.0])
+    assert found.amplitude / 1e-3 == pytest.approx(9.0 * 4.0 / 5.0, abs=0.2)
+    expected = 0.5 * 9.0**2 + np.log(np.sqrt(2 * np.pi)) + stats.norm(0.0, np.sqrt(5.0)).logpdf(9.0)
+    assert found.log_bayes == pytest.approx(expected, abs=0.05)
 
 
 def width(value: list[float], grid: Any = (0.0, 1.0, 3.0, 4.0, 9.0)) -> float:
@@ -101,9 +139,9 @@ def tried(monkeypatch: pytest.MonkeyPatch, top: float, effect: Any = TWO_SIDED, 
     rounds: list[Any] = []
     climbed = refit._climbed
 
-    def watched(pinned: Any, reference: float, amplitudes: np.ndarray, begin: Any) -> Any:
+    def watched(pinned: Any, added: Any, amplitudes: np.ndarray, begin: Any) -> Any:
         rounds.append(amplitudes / 1e-3)
-        return climbed(pinned, reference, amplitudes, begin)
+        return climbed(pinned, added, amplitudes, begin)
 
     monkeypatch.setattr(refit, "_climbed", watched)
     refitted(monkeypatch, [top], effect, guess)
@@ -187,7 +225,7 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
 
     blocks = [block([1.0, 9.0, 4.0, 3.0], [True, False, True, True]), block([10.0, 20.0], [True, False])]
     starts = [np.zeros((4, 1)), np.zeros((2, 1))]
-    found = refit._climbed(blocks, 100.0, np.array([5.0, 6.0]), starts)
+    found = refit._climbed(blocks, lambda a: np.full(len(a), -100.0), np.array([5.0, 6.0]), starts)
     assert found.value.tolist() == [1.0 + 10.0 - 100.0, -np.inf]
     assert [ends[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]
 

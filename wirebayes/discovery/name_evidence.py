@@ -1,14 +1,14 @@
 """From screened candidates to effects: refit the promising ones and sum the evidence of their forms."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
 
-from wirebayes.discovery.linear_scan import Probe, Scan
-from wirebayes.discovery.refit import Refit, refit
+from wirebayes.discovery.linear_scan import Probe, Scan, expand, projected
+from wirebayes.discovery.refit import LARGEST, Refit, refit
 from wirebayes.discovery.screening import Candidate, log_bayes
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
@@ -17,7 +17,6 @@ from wirebayes.wire.effect import Effect
 from wirebayes.workers import ParallelMap
 
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
-Correction = Callable[[Refit], float]
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
 _WAVE = 4  # names refitted at once, whatever the number of cores
 _HOPELESS = -2.0  # nats: a block whose scan speaks against an effect is not refitted with it
@@ -47,11 +46,14 @@ class NameEvidence:
         refitted.
     presence : dict of name to (b,) array
         Probability that the effect is present in each block, given that it is missing at all.
+    reach : mapping of (effect key, blocks) to float
+        Where priors of amplitudes end, in every set the same.
     """
 
     log_bayes: dict[str, float]
     winners: dict[str, list[Refit]]
     presence: dict[str, Array]
+    reach: Mapping[_Place, float] = field(default_factory=dict)
 
     def amplitudes(self, name: str) -> dict[int, Refit]:
         """Refit of a name by block."""
@@ -65,7 +67,7 @@ def weigh_names(
     scans: Sequence[Scan],
     further: Mapping[Candidate, float] = {},
     parallel_map: ParallelMap = map,
-    correction: Correction = lambda found: 0.0,
+    reach: Mapping[_Place, float] = {},
     most: int = 16,
     forms_a_name: int = 3,
 ) -> NameEvidence:
@@ -82,8 +84,8 @@ def weigh_names(
         Log Bayes factors of the effects that were tried from larger amplitudes.
     parallel_map : function, optional
         The built-in `map`, or one over processes: refits are independent of each other.
-    correction : function of Refit
-        Added to the log Bayes factor of every refit (see `wirebayes.discovery.stepwise`).
+    reach : mapping of (effect key, blocks) to float
+        Where the prior of its amplitude ends (see `reaches`).
     most, forms_a_name : int
         Names that are refitted at the most, those not counted that came out hopeless, and forms of one name.
     """
@@ -103,23 +105,25 @@ def weigh_names(
         if not wave:
             break
         waiting = waiting[len(wave) :]
-        tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], scans)
+        tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], scans, reach)
         done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
         found |= zip(tasks, done, strict=True)
-        summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks), correction)
+        summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks))
         values += [summed.log_bayes[n] for n in wave]
-    return _summed(forms, found, len(blocks), correction)
+    return replace(_summed(forms, found, len(blocks)), reach=reach)
 
 
-def _tasks(forms: Sequence[_Form], scans: Sequence[Scan]) -> dict[_Place, tuple[Effect, float, float]]:
-    """What is refitted of some forms: at each place the effect, the amplitude per δ, and a guess of it."""
+def _tasks(
+    forms: Sequence[_Form], scans: Sequence[Scan], reach: Mapping[_Place, float]
+) -> dict[_Place, tuple[Effect, float, float, float]]:
+    """What is refitted of some forms: at each place the effect, the amplitude per δ, a guess of it, and its reach."""
     tasks = {}
     for form in forms:
         best = max(form.linear)
         for place, value, probe in zip(form.places, form.linear, form.probes, strict=True):
             if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
                 _, guess, per_delta = log_bayes(Candidate(probe, form.effect.name, place[1], True), scans)
-                tasks[place] = form.effect, float(per_delta[0]), float(guess[0])
+                tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf)
     return tasks
 
 
@@ -146,15 +150,37 @@ def _forms(
     return out
 
 
-def _corrected(found: Refit, correction: Correction) -> float:
-    """The log Bayes factor of a refit; where no climb of it ended there are no parameters to correct it at."""
-    return found.log_bayes + correction(found) if np.isfinite(found.log_bayes) else -np.inf
+def reaches(
+    blocks: Sequence[LaplaceFit], trials: Sequence[Probe], candidates: Sequence[Candidate]
+) -> dict[_Place, float]:
+    """Distance from neutral at which each form has δ = `LARGEST` in the noise of fits without effects.
+
+    Parameters
+    ----------
+    blocks : sequence of LaplaceFit
+        Plain.
+    trials, candidates
+        See `wirebayes.discovery.screening.candidate_probes`.
+    """
+    lengths = []
+    for block in blocks:
+        x = expand(block.target, block.modes.z[:1], trials)
+        lengths.append((projected(x, float(x.ratio[0])) ** 2).sum(axis=0))
+    out: dict[_Place, float] = {}
+    for c in candidates:
+        probe = trials[c.probe]
+        per_unit = float(np.sqrt(sum(lengths[b][c.probe] for b in c.blocks)))
+        own = LARGEST / per_unit if per_unit > 0.0 else np.inf
+        place = probe.effect.key, c.blocks
+        # of the ladder of a nonlinear form, and of its shapes, the one that reaches farthest
+        out[place] = max(out.get(place, 0.0), own)
+    return out
 
 
-def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int, correction: Correction) -> NameEvidence:
+def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int) -> NameEvidence:
     """Add up the forms of every name: its variants equally, its blocks by `over_subsets`."""
     parts: dict[str, list[tuple[float, Array, list[Refit]]]] = {}
-    known = {place: _corrected(r, correction) for place, r in found.items()}
+    known = {place: r.log_bayes for place, r in found.items()}
     refitted_best: dict[str, float] = {}
     for place, value in known.items():
         name = found[place].effect.name

@@ -1,12 +1,13 @@
 """Which effect: every candidate refitted without linearisation, its evidence compared with the flexible reference.
 
-The amplitude of every effect has the same prior in units of its influence on these readings (δ, uniform up to
-`LARGEST`), so none is preferred for the units of its amplitude. Its evidence is then its best refitted posterior
-density plus a constant.
+The prior of an amplitude is the catalogue's density as far as the effect does not exceed δ = `LARGEST` in the noise of
+the plain fit, integrated to one: a wide catalogue does not count against an effect, and an amplitude that is hardly
+possible does. Fits with the effect inside, folds, samples and predictions have the same density.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +15,10 @@ from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
-# δ; end of the amplitudes' uniform prior. Hardly matters: twice as much takes ln 2 from every name alike
+# δ; end of an amplitude's prior. Hardly matters: twice as much takes ln 2 from every name alike
 LARGEST = 40.0
 _OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all
+_ROUNDING = 1e-9  # of a reach, which a grid may end on
 _TOP = 1.0  # nats; neighbours alone may lie so close that their values' last digits decide
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice
 _DELTAS = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
@@ -60,7 +62,7 @@ class _Profile:
     ----------
     amplitude : (a,) array
     value : (a,) array
-        Log evidence against the blocks without the effect; -inf where no climb converged.
+        Log evidence against the blocks without the effect, with the amplitude's prior; -inf where no climb converged.
     ends : sequence of (a, d) arrays
         Where the climbs of each block ended, unconstrained.
     """
@@ -80,7 +82,14 @@ class _Profile:
         return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
 
 
-def refit(blocks: Sequence[LaplaceFit], which: Sequence[int], effect: Effect, per_delta: float, guess: float) -> Refit:
+def refit(
+    blocks: Sequence[LaplaceFit],
+    which: Sequence[int],
+    effect: Effect,
+    per_delta: float,
+    guess: float,
+    reach: float = np.inf,
+) -> Refit:
     """Refit one effect with one amplitude shared by the blocks `which`.
 
     Parameters
@@ -92,16 +101,23 @@ def refit(blocks: Sequence[LaplaceFit], which: Sequence[int], effect: Effect, pe
         Amplitude that amounts to δ = 1, from the linear scan.
     guess : float
         The linear scan's best distance from neutral.
+    reach : float
+        Distance from neutral at which the effect has δ = `LARGEST` in the noise of the plain fit.
     """
     main = effect.amplitudes[0]
     low, high = (float(v) for v in main.prior.support())
     one_sided = low >= main.neutral
     pinned = [Pinned(blocks[b], effect) for b in which]
     reference = sum(blocks[b].log_evidence for b in which)
+    log_prior = within(pinned[0].prior, main.neutral, reach)
+
+    def added(amplitudes: Array) -> Array:
+        return log_prior(amplitudes) - reference
+
     steps = np.concatenate([_DELTAS, [max(abs(guess) / per_delta, 0.3)]]) * per_delta
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
-    profile = _climbed(pinned, reference, grid, [np.tile(p.starts(), (len(grid), 1)) for p in pinned])
+    profile = _climbed(pinned, added, grid, [np.tile(p.starts(), (len(grid), 1)) for p in pinned])
     outward = refined = 0
     while refined < 2:
         at = float(profile.amplitude[profile.best])
@@ -114,12 +130,37 @@ def refit(blocks: Sequence[LaplaceFit], which: Sequence[int], effect: Effect, pe
             finer = _around(profile, main.neutral if one_sided else None)
             refined += 1
         begin = [_between(profile.amplitude, e, profile.best, finer) for e in profile.ends]
-        profile = profile.joined(_climbed(pinned, reference, finer, begin))
-    return _summary(effect, which, pinned, profile, per_delta, one_sided)
+        profile = profile.joined(_climbed(pinned, added, finer, begin))
+    return _summary(effect, which, pinned, profile, per_delta)
 
 
-def _climbed(pinned: Sequence[Pinned], reference: float, amplitudes: Array, begin: Sequence[Array]) -> _Profile:
-    """The profile at amplitudes (a,): each block climbs from k starts an amplitude, (a k, d); the best end stays."""
+def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]:
+    """The log density of a prior as far as `reach` from neutral, integrated to one.
+
+    Parameters
+    ----------
+    prior : scipy frozen distribution
+    neutral, reach : float
+    """
+    inside = float(prior.cdf(neutral + reach) - prior.cdf(neutral - reach))
+
+    def log_density(amplitude: Array) -> Array:
+        density = prior.logpdf(amplitude) - np.log(max(inside, 1e-300))
+        return np.where(np.abs(amplitude - neutral) <= reach * (1.0 + _ROUNDING), density, -np.inf)
+
+    return log_density
+
+
+def _climbed(
+    pinned: Sequence[Pinned],
+    added: Callable[[Array], Array],
+    amplitudes: Array,
+    begin: Sequence[Array],
+) -> _Profile:
+    """The profile at amplitudes (a,): each block climbs from k starts an amplitude, (a k, d); the best end stays.
+
+    `added` is the prior's log density, less the evidence without the effect.
+    """
     total, ends, rows = np.zeros(len(amplitudes)), [], np.arange(len(amplitudes))
     for block, start in zip(pinned, begin, strict=True):
         k = len(start) // len(amplitudes)
@@ -128,7 +169,7 @@ def _climbed(pinned: Sequence[Pinned], reference: float, amplitudes: Array, begi
         pick = np.argmax(value, axis=1)
         total = total + value[rows, pick]
         ends.append(found.z.reshape(len(amplitudes), k, -1)[rows, pick])
-    return _Profile(amplitudes, total - reference, ends)
+    return _Profile(amplitudes, total + added(amplitudes), ends)
 
 
 def _around(profile: _Profile, end: float | None) -> Array:
@@ -146,12 +187,11 @@ def _summary(
     pinned: Sequence[Pinned],
     profile: _Profile,
     per_delta: float,
-    one_sided: bool,
 ) -> Refit:
     best = profile.best
     at = profile.amplitude[best : best + 1]
-    log_bayes = float(profile.value[best] + occam(one_sided))
     sd = _width(profile.amplitude, profile.value, best, per_delta)
+    log_bayes = float(profile.value[best] + 0.5 * np.log(2.0 * np.pi) + np.log(sd))
     theta = tuple(p.natural(e[best][None], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 

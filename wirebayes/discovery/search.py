@@ -19,7 +19,7 @@ from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence, Judgement, judge
 from wirebayes.discovery.linear_scan import Expansion
 from wirebayes.discovery.model_space import smallest_set
-from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
+from wirebayes.discovery.name_evidence import NameEvidence, reaches, weigh_names
 from wirebayes.discovery.screening import GlobalTest
 from wirebayes.discovery.settings import ALPHA, REMAINS, Settings
 from wirebayes.discovery.stepwise import Accepted, Explored, Fits, explore
@@ -194,7 +194,8 @@ def _named(
     parallel_map: ParallelMap,
 ) -> _Named:
     """The sets of effects that were looked at, past the global test, and what they say."""
-    found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map)
+    reach = reaches(gate.blocks, gate.trials, gate.candidates)
+    found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map, reach)
     alike = _families_of_singles(gate.blocks, found)
     explored = explore(gate.blocks, found, expansions, gate.trials, alike, settings, rng, parallel_map)
     families = _families(gate.blocks, explored)

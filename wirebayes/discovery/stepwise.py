@@ -3,8 +3,8 @@
 A step back asks whether an early effect is still needed beside those that came after it: the set without it may be
 better, and was never reached because the names in it explain little one by one.
 
-The evidence of a set comes from a chain of refits, each effect refitted beside those before it. The prior of amplitudes
-follows one rule in every set, so the order of the chain does not matter.
+The evidence of a set comes from a chain of refits, each effect refitted beside those before it. The prior of an
+amplitude is the same in every set, so the order of the chain does not matter.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,6 @@ from itertools import repeat
 import numpy as np
 
 from wirebayes.discovery import screening, smooth_reference
-from wirebayes.discovery.amplitude_prior import corrections
 from wirebayes.discovery.families import Family
 from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
 from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
@@ -356,13 +355,14 @@ def added(
 
 def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator) -> FittedSet:
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
+    assert parent.further is not None
     blocks, effects = added(parent, name, settings, rng)
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
     scans = [_scanned(block, trials) for block in blocks]
     further = None
     if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
         further = weigh_names(
-            blocks, trials, candidates, scans, correction=corrections(blocks), most=MOST_BESIDE, forms_a_name=1,
+            blocks, trials, candidates, scans, reach=parent.further.reach, most=MOST_BESIDE, forms_a_name=1,
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
             further = None

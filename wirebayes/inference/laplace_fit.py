@@ -161,13 +161,14 @@ _HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up f
 class Pinned:
     """The density of a block with one more effect, its amplitude pinned row by row; shape constants stay free.
 
-    Points lack the amplitude's column; what is left is climbed or integrated. The amplitude has a flat prior here:
-    the evidence puts its own on it, the same for every effect.
+    Points lack the amplitude's column; what is left is climbed or integrated. The amplitude has a flat prior here;
+    `prior` is the one it has otherwise.
     """
 
     def __init__(self, block: LaplaceFit, effect: Effect) -> None:
         problem = block.problem_with(effect)
         self.column = column_of(problem, effect)
+        self.prior = problem.prior.distributions[problem.names[self.column]]
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
         self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
         self._plain = block
