@@ -13,7 +13,6 @@ from scipy import stats
 from wirebayes.effects import named
 from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.io.paper import experiments
-from wirebayes.model.pooling import SPREAD, pooled
 from wirebayes.model.problem import LENGTH_EXPONENT, MATERIAL, Problem, build
 from wirebayes.prediction.leave_one_hold_out import LeftOut, smoothed_leave_one_hold_out
 from wirebayes.results.identifiability import identifiability
@@ -57,8 +56,6 @@ def main() -> None:
         result = fitted(build(wires, [named(f"length_dependence@{which}")], length_exponent=free), name)
         models[name] = smoothed_leave_one_hold_out(result)
         print(f"  {which} as L0^p, p {interval(result.flat[:, result.problem.names.index('length_dependence.p')])}")
-    specimens = fitted(pooled(build(wires, length_exponent=free)), "partially pooled, k1 and B by specimen")
-    models["partially pooled"] = smoothed_leave_one_hold_out(specimens)
 
     print("\nparameter, each sample by itself, both together")
     for name in MATERIAL:
@@ -71,10 +68,6 @@ def main() -> None:
         print(f"    ratio, longer over shorter, fitted apart {interval(ratio)}")
     p = together.flat[:, together.problem.names.index(LENGTH_EXPONENT)]
     print(f"\np of B as L0^p: {interval(p)} (1: creep is a strain); prior 1 ± 1")
-    for i, name in enumerate(specimens.problem.names):
-        if "spread" in name:
-            before = interval(SPREAD.ppf(np.linspace(0.001, 0.999, 999)))
-            print(f"{name}: {interval(specimens.flat[:, i])}; prior {before}")
     print("\nmodel, elpd of all holds left out in turn, difference from separate fits ± se")
     base = models["separate"].elpd
     for name, left in models.items():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.inference.between_specimens import between_specimens
-from wirebayes.model.pooling import SPREAD
+from wirebayes.inference.between_specimens import SPREAD, between_specimens
 
 PRIOR = np.log([2000.0, 0.37, 0.5, 0.03, 0.65]), np.diag([1.5, 1.2, 0.7, 1.2, 0.45]) ** 2
 

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.statistical.targets import Silent
 from wirebayes.effects import named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.transform import LogPosterior, Transformation
-from wirebayes.model.pooling import pooled
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.staircase import Model, simulate
@@ -28,7 +26,6 @@ PROBLEMS = {
         LINE, Truth(effects=(named("fixture_compliance"), named("steady_creep"))), seed=7
     ).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
-    "pooled": pooled(draw(LINE, seed=5).problem, ("k1", "B", "N")),
     "slack": build([Bench().experiment()]),  # every reading zero
     "hold": build([Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 10.0)).experiment()], likelihood="hold"),
 }
@@ -154,40 +151,3 @@ def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates(effect, amplitu
 
     assert np.log(lost(level)).std() < 0.15 * np.log(lost(theta)).std()
     assert stats.spearmanr(np.log(lost(theta)), coordinates.to_sampled(theta)[:, column]).statistic > 0.98
-
-
-def test_a_specimen_of_which_readings_say_nothing_counts_in_units_of_the_spread():
-    problem = PROBLEMS["pooled"]
-    silent, names = Silent(problem.samples, problem.prior, problem.likelihood), problem.names
-    theta = problem.prior.rvs(500, np.random.default_rng(3))
-    z = Transformation(silent).to_sampled(theta)
-    at = {name: i for i, name in enumerate(names)}
-    seen = Transformation(problem).to_sampled(theta)
-    for line, spread, own in problem.prior.pools:
-        for name in own:
-            deviation = np.log(theta[:, at[name]] / theta[:, at[line]]) / theta[:, at[spread]]
-            assert z[:, at[name]] == pytest.approx(deviation, rel=0.05, abs=0.05)
-    # readings say much of k1: with a wide spread a specimen's value counts, and its line's does not matter
-    theta = theta[:2]
-    theta[:, at["spread_k1"]], theta[1] = 10.0, theta[0]
-    theta[1, at["k1"]] *= 1.1
-    moved = np.diff(Transformation(problem).to_sampled(theta), axis=0)[0]
-    own = [at[name] for name in problem.prior.pools[0][2]]
-    assert np.abs(moved[own]).max() < 0.01 < np.abs(np.diff(z[:2], axis=0)[0][own]).max()
-    assert np.isfinite(seen).all()
-
-
-@pytest.mark.parametrize("exponent", ["U", "N"])
-def test_the_ridge_of_a_pool_levels_off_without_a_kink(exponent):
-    """Coordinates of creep follow the exponents of a line where data see it, not into the prior's tail."""
-    problem = PROBLEMS["pooled"]
-    coordinates = Transformation(problem)
-    theta = np.repeat(np.array([[float(d.median()) for d in problem.prior.distributions.values()]]), 4000, axis=0)
-    values = np.linspace(0.2, 20.0, 4000)
-    theta[:, problem.names.index(exponent)] = values
-    moved = coordinates.to_sampled(theta)[:, problem.names.index({"U": "B", "N": "k2"}[exponent])]
-    slope = np.gradient(moved, values)
-    near, far = np.abs(slope[values < 0.5]).min(), np.abs(slope[-1])
-    assert far < 0.01 * near
-    # a kink would lose all of the slope from one value to the next
-    assert np.abs(np.diff(slope)).max() < 0.02 * np.abs(slope).max()

@@ -9,7 +9,6 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.transform import Transformation
-from wirebayes.model.pooling import pooled
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
@@ -54,32 +53,3 @@ def test_the_prior_of_every_amplitude_comes_back():
     keys = [f"{name}@k1" if name == "length_dependence" else name for name in keys]
     for first in range(0, len(keys), 5):
         assert_prior(silent(tuple(named(key) for key in keys[first : first + 5])), (2,))
-
-
-def pooled_shares(problem, theta):
-    """(n, d) shares of the prior below each value; below a specimen's, of the prior given its line and spread."""
-    column = dict(zip(problem.names, theta.T, strict=True))
-    below = {name: d.cdf(column[name]) for name, d in problem.prior.distributions.items()}
-    for line, spread, specimens in problem.prior.pools:
-        for name in specimens:
-            below[name] = stats.norm.cdf(np.log(column[name] / column[line]) / column[spread])
-    return np.column_stack(list(below.values()))
-
-
-@pytest.mark.parametrize(
-    ("parameters", "runs"), [(1, 6), *(pytest.param(k, 16, marks=pytest.mark.slow) for k in range(1, 6))]
-)
-def test_the_prior_of_pooled_specimens_comes_back(parameters, runs):
-    """A funnel for every pooled parameter; 14 columns with one, 26 with five."""
-    made = draw([Bench("a", "line"), Bench("b", "line", 1700.0)], seed=3).problem
-    problem = pooled(made, ("k1", "B", "U", "k2", "N")[:parameters])
-    found = []
-    for seed in range(runs):
-        done = fit(Silent(problem.samples, problem.prior, problem.likelihood), seed)
-        assert done.chains.converged, done.chains.why
-        below = pooled_shares(done.problem, done.flat)
-        found.append([below.mean(axis=0), (below > 0.95).mean(axis=0), (below < 0.05).mean(axis=0)])
-    off = np.mean(found, axis=0) - np.array([0.5, 0.05, 0.05])[:, None]
-    error = np.sqrt(np.var(found, axis=0, ddof=1).mean(axis=1, keepdims=True) / runs)  # alike for all columns
-    print(f"{parameters} pooled: largest |z| {np.abs(off / error).max():.2f}, errors {error.ravel()}")
-    assert np.abs(off / error).max() < 4.5

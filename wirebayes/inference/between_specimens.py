@@ -4,7 +4,7 @@ The logarithms ``x`` of a specimen's parameters are normal about the line's ``μ
 ``s``. A specimen's readings enter as the normal approximation of its posterior with the prior of its fit taken out:
 precision ``Λ = S⁻¹ - S₀⁻¹``, so that a parameter that no test determines stays unknown however many tests there are.
 Specimens and ``μ`` are integrated out in closed form; from the density of ``log s`` that is left, importance sampling
-about its mode draws. Few specimens leave the spreads near their prior (`model.pooling`) and their bands wide.
+about its mode draws. Few specimens leave the spreads near their prior (`SPREAD`) and their bands wide.
 """
 
 from collections.abc import Callable
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import optimize
+from scipy import optimize, stats
 
-from wirebayes.model.pooling import SPREAD
 from wirebayes.resampling import systematic_rows
 from wirebayes.typing import Floats
 
+SPREAD = stats.lognorm(1.0, scale=0.05)  # specimens of one line mostly agree within one to twenty-five per cent
 _PROPOSALS = 4000  # importance draws: a thousand effective ones and more with five parameters
 _REACH = 4.0  # prior sd of log s in which the mode is sought
 _FREEDOM = 5.0  # of the proposal's t distribution: tails beyond those of a normal prior of log s

@@ -22,8 +22,6 @@ deviations of their prior. Then, one after the other,
 
 The map is triangular, and its steps but those of the preload and of shares have unit Jacobian. Those of U, the preload
 and shares are for proposals to draw from: Laplace approximations, as the search for effects compares them, do without.
-Values of partially pooled specimens come last (`wirebayes.inference.specimens`).
-
 The proposal learns the remaining curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the
 columns are ordered: errors before what they widen, the shape of the creep before its amount and the stiffness.
 """
@@ -41,7 +39,6 @@ from wirebayes.inference.edges import edge
 from wirebayes.inference.power_of_tension import suiting_powers
 from wirebayes.inference.shares import Elongation
 from wirebayes.inference.slack_edge import slack_edge
-from wirebayes.inference.specimens import specimens
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.typing import Array
 from wirebayes.wire import compiled
@@ -52,9 +49,6 @@ Density = Callable[[Array, Array], Array]
 Residuals = Callable[[Array, Array], tuple[Array, Array]]
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
-# Much larger U and N of a pool are of no ridge that data see: to follow them would only bend the prior's tails. The
-# ridge levels off smoothly, as walkers stay too long on one side of a kink.
-_STEEPEST = 1.6
 _NONE = np.zeros(1), np.zeros(1)  # where U is sampled as it is
 _ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
@@ -72,7 +66,6 @@ class _Ridge:
     where: dict[str, int]
     fixed: dict[str, float]
     shifted: frozenset[str]
-    steepest: float
     log_tension: Array
     log_step: float
     times_s: Array
@@ -124,14 +117,9 @@ class _Ridge:
         """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
         return np.asarray(np.logaddexp(0.0, z[:, self.where["B"]] - self.log_step))
 
-    def levelled(self, exponent: Any) -> Any:
-        """(n,) an exponent, U or N, that the ridge follows no further than to `steepest`."""
-        return exponent if np.isinf(self.steepest) else exponent / np.sqrt(1.0 + (exponent / self.steepest) ** 2)
-
     def log_creep(self, theta: Array) -> Array:
         """(n,) log G: root mean square of the elongation gained in a hold, for B = 1, at natural parameters (n, d)."""
         U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
-        U = self.levelled(U)
         reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
         mean, apart = self._tensions
         drive = np.exp(U * apart)
@@ -218,18 +206,14 @@ class Transformation:
             [i for i, name in enumerate(names) if name.split("[")[0] == of and self.log_columns[i]]
             for of in ("sensor_sd", "setting_sd")
         )
-        self.specimens = specimens(problem)
-        first = () if self.specimens is None else self.specimens.spreads
-        steepest = np.inf if self.specimens is None else _STEEPEST
-        unpooled = set(names) if self.specimens is None else set()
-        self.order = np.array(sorted(range(len(names)), key=lambda i: (i not in first, _rank(names[i]))))
+        self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
         self.ridges: list[_Ridge] = []
         self.shares: list[int] = []
         shifted: set[str] = set()  # a column that several samples share follows the first of them
         for sample in problem.samples:
             mark = _mark(problem, sample.material)
             columns = {
-                name: own if (own := f"{name}[{sample.name}]") in unpooled else f"{name}{mark}" for name in MATERIAL
+                name: own if (own := f"{name}[{sample.name}]") in names else f"{name}{mark}" for name in MATERIAL
             }
             fixed = {name: problem.prior.fixed[c] for name, c in columns.items() if c in problem.prior.fixed}
             if "k1" not in sample.parameters(problem.likelihood):
@@ -242,8 +226,6 @@ class Transformation:
             moved = frozenset({"k2", "U", "B", "k1"} & {name for name in where if columns[name] not in shifted})
             if not for_draws:
                 moved -= {"U"}
-            if self.specimens is not None:
-                moved -= {"k1", "U"}  # specimens' values have coordinates of their own
             if "B" not in moved or sample.protocol.control == "force":
                 moved -= {"k1"}  # the tension lost in a hold is not known
             if "k2" not in moved or sample.model.history != "saturating" or problem.likelihood != "chain":
@@ -257,7 +239,7 @@ class Transformation:
                         where[column] = names.index(name)
                     else:
                         fixed[column] = problem.prior.fixed[name]
-                ridge = _ridge(where, fixed, moved, steepest, problem, sample, effects)
+                ridge = _ridge(where, fixed, moved, problem, sample, effects)
                 self.ridges.append(self._with_shares(ridge, sample) if for_draws else ridge)
                 self.shares += self.ridges[-1].shares
 
@@ -296,8 +278,6 @@ class Transformation:
                     z[:, ridge.where["k1"]] -= np.logaddexp(0.0, own)
                 if "k1" in ridge.shifted:
                     z[:, ridge.where["k1"]] -= ridge.softened(z)
-        if self.specimens is not None:
-            z[:, self.specimens.own] = self.specimens.to_sampled(theta)
         return z
 
     def to_natural(self, z: Array) -> Array:
@@ -326,8 +306,6 @@ class Transformation:
                         gained = part.log_gained(theta) + stiffness
                         theta[:, part.column], lost = np.exp(lost + share - gained), lost + rest
                     theta[:, ridge.where["B"]] = np.exp(lost - (ridge.log_creep(theta) + stiffness))
-            if self.specimens is not None:
-                theta[:, self.specimens.own] = self.specimens.to_natural(theta, z[:, self.specimens.own])
             for slack in self.slack_edges:
                 theta[:, slack.preload] = slack.value(theta[:, slack.preload], theta)
         return theta
@@ -345,8 +323,6 @@ class Transformation:
             total = total + (shares.log_slope(theta[:, i], z[:, i]) if i in self.shares else at.log_slope(theta[:, i]))
         for slack in self.slack_edges:
             total = total + slack.log_slope(theta)
-        if self.specimens is not None:
-            total = total + self.specimens.log_jacobian(theta)
         return np.asarray(total)
 
     def prior_residuals(self, theta: Array, z: Array) -> Array:
@@ -363,15 +339,10 @@ class Transformation:
             out[:, i] = self.edges[i].score(theta[:, i])
         for slack in self.slack_edges:
             out[:, slack.preload] = theta[:, slack.preload] / self.scale[slack.preload]
-        if self.specimens is not None:
-            own, lines, spreads = (
-                theta[:, i] for i in (self.specimens.own, self.specimens.lines, self.specimens.spreads)
-            )
-            out[:, self.specimens.own] = np.log(own / lines) / spreads
         return np.asarray(out.T)
 
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
-        return np.asarray(ridge.levelled(ridge.get(theta, "N")) * ridge.log_half_hold)
+        return np.asarray(ridge.get(theta, "N") * ridge.log_half_hold)
 
     def _with_shares(self, ridge: _Ridge, sample: Sample) -> _Ridge:
         """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.
@@ -422,7 +393,6 @@ def _ridge(
     where: dict[str, int],
     fixed: dict[str, float],
     shifted: frozenset[str],
-    steepest: float,
     problem: Problem,
     sample: Sample,
     effects: tuple[Effect, ...],
@@ -442,7 +412,7 @@ def _ridge(
     )  # fmt: skip
     powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s)) if "U" in shifted else _NONE
     return _Ridge(
-        where, fixed, shifted, steepest, np.log(tension), log_step, times, which, kept, hold_s, float(np.log(length)),
+        where, fixed, shifted, np.log(tension), log_step, times, which, kept, hold_s, float(np.log(length)),
         effects, holds, powers, elongations=sample.protocol.control == "force",
     )  # fmt: skip
 

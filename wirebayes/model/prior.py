@@ -79,55 +79,6 @@ class Prior:
         return evaluate
 
 
-@dataclass(frozen=True)
-class PooledPrior(Prior):
-    """Independent distributions, except that specimens' values spread about their line's.
-
-    Attributes
-    ----------
-    pools : tuple of (line, spread, specimens)
-        Column names: the line's parameter, the standard deviation of the logarithm, the specimens' own parameters.
-        What `distributions` says of the last is the line's own prior, for want of a closed form.
-    """
-
-    pools: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
-
-    def rvs(self, n: int, rng: np.random.Generator) -> Array:
-        """(n, d) draws."""
-        return self.ppf(rng.uniform(size=(n, len(self.names))))
-
-    def ppf(self, cube: Array) -> Array:
-        """(n, d) parameters of points ``(n, d)`` in the unit cube."""
-        theta = super().ppf(cube)
-        where = {name: i for i, name in enumerate(self.names)}
-        for line, spread, specimens in self.pools:
-            for name in specimens:
-                deviation = theta[:, where[spread]] * stats.norm.ppf(cube[:, where[name]])
-                theta[:, where[name]] = theta[:, where[line]] * np.exp(deviation)
-        return theta
-
-    def log_density(self) -> Callable[[Array], Array]:
-        """A function of (n, d) parameters that returns the (n,) log density."""
-        names = self.names
-        own = {name for _, _, specimens in self.pools for name in specimens}
-        shared = [i for i, name in enumerate(names) if name not in own]
-        rest = Prior({names[i]: self.distributions[names[i]] for i in shared}, {}, frozenset()).log_density()
-        pools = [(names.index(line), names.index(spread), [names.index(s) for s in specimens])
-                 for line, spread, specimens in self.pools]  # fmt: skip
-
-        def evaluate(theta: Array) -> Array:
-            total = rest(theta[:, shared])
-            for line, spread, specimens in pools:
-                value, sd = theta[:, specimens], theta[:, [spread]]
-                with np.errstate(all="ignore"):
-                    deviation = (np.log(value) - np.log(theta[:, [line]])) / sd
-                    each = -0.5 * deviation**2 - np.log(sd * value) - 0.5 * np.log(2.0 * np.pi)
-                total = total + np.where((value > 0) & (sd > 0), each, -np.inf).sum(axis=1)
-            return total
-
-        return evaluate
-
-
 def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
     """The log density of a frozen distribution; closed forms of the common ones avoid scipy's overhead per call."""
     name, shape, loc, scale = _parsed(dist)
