@@ -10,6 +10,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.inference.simulation_based_calibration import one
 from wirebayes.model.problem import Likelihood, Problem, build, with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.model.scales import planned_scales
 from wirebayes.simulation.synthetic import PAPER_TIMES_S, Bench
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=400.0)
@@ -39,7 +40,8 @@ class Study:
     def data_set(self, seed: int, index: int) -> dict[str, Any]:
         """Simulate and fit the data set of a number; the same whatever else is run."""
         own = seed_of(seed, "calibration", self.protocol, self.likelihood, str(index))
-        problem = build([BENCHES[self.protocol].experiment()], likelihood=self.likelihood)
+        test = BENCHES[self.protocol].experiment()
+        problem = build([test], likelihood=self.likelihood, scales=planned_scales([test]))
         if self.likelihood == "hold":
             problem = _with_first_readings(problem, self.protocol, own)
         fitted = _without_setting_error if self.broken else _as_it_is
@@ -89,7 +91,8 @@ def _as_it_is(problem: Problem) -> Problem:
 def _with_first_readings(problem: Problem, protocol: str, seed: int) -> Problem:
     """First readings from a wire of its own, drawn anew until every hold pulls: they are given, so they may not know
     the truth that is to be found from the later ones."""
-    chain = build([BENCHES[protocol].experiment()])
+    test = BENCHES[protocol].experiment()
+    chain = build([test], scales=planned_scales([test]))
     rng = np.random.default_rng(seed_of(seed, "first readings"))
     while True:
         made = [readings(chain, chain.prior.rvs(1, rng), sample, rng) for sample in chain.samples]

@@ -6,9 +6,8 @@ from scipy import stats
 
 from tests.statistical.targets import Silent
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit, parameters_at
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.transform import Transformation
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
@@ -31,10 +30,10 @@ def assert_prior(problem, seeds):
         z = done.chains.z[:, -1].reshape(
             -1, done.chains.z.shape[-1]
         )  # as good as independent: of every walker the last
-        theta.append(Transformation(problem).to_natural(z))
+        theta.append(last.known(parameters_at(problem, z)))
         for i, (name, distribution) in enumerate(last.distributions.items()):
             ess = done.chains.ess[i]
-            share = distribution.cdf(done.flat[:, i])
+            share = distribution.cdf(last.known(done.flat)[:, i])
             assert share.mean() == pytest.approx(0.5, abs=4.5 * np.sqrt(1 / 12 / ess)), name
             assert share.std() == pytest.approx(np.sqrt(1 / 12), rel=4.5 * 0.6 / np.sqrt(ess)), name
     for (name, distribution), values in zip(last.distributions.items(), np.concatenate(theta).T, strict=True):

@@ -11,7 +11,6 @@ from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.modes import modes
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Likelihood, Problem, build
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
@@ -142,7 +141,8 @@ def effects_of(
 def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence[Effect], seed: int) -> Effect:
     evidence = []
     for variant in variants:
-        target = LogPosterior(problem_of(candidate, training, [variant]))
+        problem = problem_of(candidate, training, [variant])
+        target = LogPosterior(problem.in_units(problem.own_units))
         found = modes(target, np.random.default_rng(seed))
         evidence.append(np.where(found.converged, found.log_evidence, -np.inf).max())
     return variants[int(np.argmax(evidence))]
@@ -167,4 +167,7 @@ def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Eff
     prior = problem.prior
     here = {name: value for name, value in candidate.fixed.items() if name in prior.names}
     free = {name: d for name, d in prior.distributions.items() if name not in here}
-    return replace(problem, prior=Prior(free, prior.fixed | here, prior.logarithmic & free.keys()))
+    return replace(
+        problem,
+        prior=replace(prior, distributions=free, fixed=prior.fixed | here, logarithmic=prior.logarithmic & free.keys()),
+    )

@@ -199,14 +199,13 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
     ----------
     block : LaplaceFit
     z : (n, d) array
-        The plain fits of n data sets, sampled coordinates. Steps also begin at the best fit with setting errors as
-        expected.
+        The plain fits of n data sets, sampled coordinates.
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
     target, n = block.target, len(z)
     free = moving_columns(target.problem)
-    y = np.concatenate([z, *(np.broadcast_to(s, z.shape) for s in block.modes_with_expected_setting_error)])
+    y = z.copy()
     units = _log_units(target, y)
     best, height, rows = y.copy(), np.full(len(y), -np.inf), np.arange(len(y))
     for step in range(_STEPS + 1):

@@ -1,7 +1,7 @@
 """Whether an effect makes the gap smaller on readings it did not see: held-out holds, and leaving out one at a time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -35,6 +35,8 @@ class HeldOut:
         Log predictive density of each hold.
     inside : float
         Share of readings in their 90 % bands.
+    readings_each : tuple of int
+        Of each hold.
     """
 
     holds: list[int]
@@ -43,10 +45,17 @@ class HeldOut:
     floor: float
     elpd: Array
     inside: float
+    readings_each: tuple[int, ...] = ()
 
     @property
     def rmse_N(self) -> float:
         return float(np.sqrt(self.squares))
+
+    def times(self, unit: float) -> "HeldOut":
+        """The same with readings written in a unit so many times smaller."""
+        each = np.array(self.readings_each)
+        squares, floor = self.squares * unit**2, self.floor * unit**2
+        return replace(self, squares=squares, floor=floor, elpd=self.elpd - each * np.log(unit))
 
 
 def last_third(experiment: Experiment) -> int:
@@ -77,13 +86,14 @@ def predicted(
     """
     first = [e.train(k) for e, k in zip(experiments, train, strict=True)]
     near = block.target.coordinates.to_natural(block.modes.z[:1])[0] if block.effects == tuple(effects) else None
-    trained = fitted(first, effects, block.law, block.history, rng, near)
+    trained = fitted(first, effects, block.law, block.history, rng, near, scales=block.scales)
     problem, theta = _draws(trained, rng, 500)
-    whole = build(experiments, effects, law=block.law, history=block.history)
+    whole = build(experiments, effects, law=block.law, history=block.history, scales=block.scales)
+    ahead = whole.in_units(problem.units).samples
     # The training readings' reference tension belongs to the parameters.
     return [
-        _scored(ahead, trained_on.model, problem.parameters(theta, trained_on), k, rng)
-        for ahead, trained_on, k in zip(whole.samples, problem.samples, train, strict=True)
+        _scored(later, trained_on.model, problem.parameters(theta, trained_on), k, rng).times(problem.read_unit(later))
+        for later, trained_on, k in zip(ahead, problem.samples, train, strict=True)
     ]
 
 
@@ -114,6 +124,7 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     return HeldOut(
         [int(n) for n in sample.protocol.number[last]], float((e**2).mean()), len(e),
         float(np.concatenate(floor).mean()), elpd, float(np.concatenate(inside).mean()),
+        tuple(len(each) for each in error),
     )  # fmt: skip
 
 

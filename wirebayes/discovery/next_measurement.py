@@ -10,6 +10,7 @@ from wirebayes.discovery.linear_scan import Probe, expand, projected
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
+from wirebayes.model.scales import NATURAL, Units
 from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 
@@ -32,19 +33,31 @@ class MeasurementPlan:
         return _holds(self.displacement_mm, self.times_s, self.length_mm)
 
 
-def alternatives(p: Protocol, alone: bool) -> list[MeasurementPlan]:
-    """What could be done with a sample instead; `alone` if there is no other, whose displacements would differ."""
+def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[MeasurementPlan]:
+    """What could be done with a sample instead.
+
+    Parameters
+    ----------
+    p : Protocol
+        What was done with it.
+    alone : bool
+        Whether there is no other sample, whose displacements would differ.
+    units : Units
+        In which the protocol is written; words are in mm and s.
+    """
     recorded = p.recorded
+    mm, second = units.length_mm, units.time_s
     x = p.setting[recorded]
     down = x[-2::-1] if len(x) > 1 else x
-    log_times = np.concatenate([[0.0], np.geomspace(2.0, 600.0, 24)])
     times = _longest_series(p)
-    span = f"{x.min():g} to {x.max():g} mm" if alone else "each sample's displacements"
-    dense = "600 s with 25 readings spaced evenly in the logarithm of time"
+    long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
+    log_times = np.concatenate([[0.0], np.geomspace(long / 300.0, long, 24)])
+    span = f"{mm * x.min():g} to {mm * x.max():g} mm" if alone else "each sample's displacements"
+    dense = f"{second * long:g} s with 25 readings spaced evenly in the logarithm of time"
     there_and_back = np.concatenate([x, down])
     halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
-    last = f" from {x.max():g} to {x.min():g} mm" if alone else ", of every sample"
-    back = f"the same displacements back{last}, each held {times[-1]:g} s"
+    last = f" from {mm * x.max():g} to {mm * x.min():g} mm" if alone else ", of every sample"
+    back = f"the same displacements back{last}, each held {second * times[-1]:g} s"
     return [
         MeasurementPlan(words, displacements, moments, p.length_mm)
         for words, displacements, moments in (
@@ -54,6 +67,9 @@ def alternatives(p: Protocol, alone: bool) -> list[MeasurementPlan]:
             (f"take twice as many, half as large steps over {span}", halved, times),
         )
     ]
+
+
+LONGER = 5.0  # times the longest series: holds in which slow and fast creep part
 
 
 def _longest_series(p: Protocol) -> Array:
@@ -79,7 +95,7 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
     exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
     prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
     which = "a second" if len({s.protocol.length_mm for s in problem.samples}) == 1 else "another"
-    words = f"repeat the test at {which} length, {length:g} mm, with steps scaled alike"
+    words = f"repeat the test at {which} length, {problem.units.length_mm * length:g} mm, with steps scaled alike"
     return words, replace(problem, samples=(*problem.samples, more), prior=prior)
 
 
@@ -127,7 +143,9 @@ def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tup
     """Words of the plan with the largest value, and that value over the present test's."""
     problem = block.target.problem
     planned = [_another_length(problem)]
-    for plans in zip(*(alternatives(s.protocol, len(problem.samples) == 1) for s in problem.samples), strict=True):
+    alone = len(problem.samples) == 1
+    each = [alternatives(s.protocol, alone, problem.units) for s in problem.samples]
+    for plans in zip(*each, strict=True):
         protocols = [plan.protocol for plan in plans]
         empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
         planned.append((plans[0].words, with_protocols(problem, protocols, empty)))

@@ -15,6 +15,7 @@ from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.check import EffectSize, ParameterRange
+from wirebayes.model.scales import NATURAL
 from wirebayes.notice import Notice
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import of_posterior
@@ -58,8 +59,9 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     """
     block = fitted((experiment,), (), "hooke", "saturating", rng)
     problem = block.target.problem
-    theta = rough_draws.draws(block.target, block.modes, rng)
-    before = problem.prior.rvs(4000, rng)
+    theta = problem.theta_in(NATURAL, rough_draws.draws(block.target, block.modes, rng))
+    before = problem.theta_in(NATURAL, problem.prior.rvs(4000, rng))
+    problem = problem.in_units(NATURAL)
     sample = problem.samples[0]
     own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
     parameters = {name: _range(theta[:, i], before[:, i]) for i, name in enumerate(problem.names)}
@@ -87,17 +89,20 @@ def _effects(block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.rando
     null = screening.replicated(block, trials, SIMULATIONS, rng).scan
     found = power.detectable(null, trials, candidates, screening.chance_level(candidates, [null]))
     return {
-        name: _shown(kind, found[name][1], control) if name in found else _hidden(kind, kind.shows, control)
+        name: _shown(block, trials[found[name][0]].effect, found[name][1])
+        if name in found
+        else _hidden(kind, kind.shows, control)
         for name, kind in kinds.items()
     }
 
 
-def _shown(kind: type[Effect], amplitude: float | None, control: Control) -> EffectSize:
+def _shown(block: LaplaceFit, effect: Effect, amplitude: float | None) -> EffectSize:
     if amplitude is None:
-        return _hidden(kind, "taken up by the model's own parameters", control)
-    main = kind.amplitudes[0]
+        return _hidden(type(effect), "taken up by the model's own parameters", block.experiments[0].control)
+    main = effect.amplitudes[0]
     shows = "yes" if amplitude <= UNUSUAL * float(main.prior.std()) else "if unusually large"
-    return {"shows": shows, "amplitude_80": amplitude, "unit": kind.unit_under(main, control), "reason": None}
+    seen = block.natural_amplitude(effect, amplitude)
+    return {"shows": shows, "amplitude_80": seen, "unit": block.unit(effect), "reason": None}
 
 
 def _hidden(kind: type[Effect], reason: str, control: Control) -> EffectSize:

@@ -7,6 +7,7 @@ detected.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import repeat
 from typing import Any
 
@@ -50,6 +51,7 @@ from wirebayes.json_files.discovery import (
     Verdict,
 )
 from wirebayes.json_files.read_units import in_unit
+from wirebayes.model.scales import scales_of
 from wirebayes.notice import named, to_json
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
@@ -142,7 +144,8 @@ def investigate(
     for e in experiments:
         groups.setdefault(e.material, []).append(e)
     laws = repeat(settings.law), repeat(settings.history)
-    start = list(parallel_map(fitted, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
+    one_scale = partial(fitted, scales=scales_of(experiments))  # materials may share the amplitude of an instrument
+    start = list(parallel_map(one_scale, groups.values(), repeat(()), *laws, rng.spawn(len(groups))))
     gate = examine(start, settings.kinds, settings.simulations, rng, report=report, parallel_map=parallel_map)
     where = [
         residual_patterns.findings(p, len(gate.trials), d, n, ", ".join(b.names))
@@ -386,7 +389,9 @@ def _stages(
         effects = tuple(a.effects[i] for a in accepted[: k + 1])
         ready = [s.blocks[i] for s in explored.fitted.values() if s.blocks[i].effects == effects]
         base = stages[-1] if stages else plain
-        own = ready[0] if ready else fitted(base.experiments, effects, plain.law, plain.history, rng)
+        own = (
+            ready[0] if ready else fitted(base.experiments, effects, plain.law, plain.history, rng, scales=plain.scales)
+        )
         stages.append(own)
     return stages
 
@@ -405,11 +410,9 @@ def _family(family: FamilyEvidence) -> FamilyReport:
 
 def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
-    main = effect.amplitudes[0]
     low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
     hold = effect.hold if isinstance(effect, EventEffect) else None
-    unit = effect.unit_under(main, final.experiments[0].control)
-    return {"mean": mean, "q05": low, "q95": high, "unit": unit, "hold": hold}
+    return {"mean": mean, "q05": low, "q95": high, "unit": final.unit(effect), "hold": hold}
 
 
 def _inclusion(found: Evidence | None) -> dict[str, float]:
@@ -456,9 +459,7 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
     found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)
     best_probe = {name: k for name, (k, _) in found.items()}
     seen: dict[str, DetectableAmplitude] = {
-        name: {"amplitude_80": amplitude, "unit": effect.unit_under(effect.amplitudes[0], control)}
-        for name, (k, amplitude) in found.items()
-        for effect in (trials[k].effect,)
+        name: _detectable(block, trials[k].effect, amplitude) for name, (k, amplitude) in found.items()
     }
     possible = [c.name for c in candidates if i in c.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
@@ -474,7 +475,7 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
     if pair is None and weakest is None and best_probe:
         # Relative to what a person expects before the test, which effect was hidden best?
         def hiddenness(name: str) -> float:
-            amplitude = seen[name]["amplitude_80"]
+            amplitude = found[name][1]
             return (
                 float("inf")
                 if amplitude is None
@@ -489,6 +490,12 @@ def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dic
     else:
         proposal = next_measurement.next_measurement(block, pair, weakest)
     return {"power": seen, "not_identifiable": hidden, "next_measurement": proposal}
+
+
+def _detectable(block: LaplaceFit, effect: Effect, amplitude: float | None) -> DetectableAmplitude:
+    """The smallest amplitude that is likely to be seen, in its natural unit."""
+    seen = None if amplitude is None else block.natural_amplitude(effect, amplitude)
+    return {"amplitude_80": seen, "unit": block.unit(effect)}
 
 
 def _only(x: Expansion, m: int) -> Expansion:

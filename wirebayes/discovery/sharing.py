@@ -35,7 +35,8 @@ def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: n
         if table is not None:
             with_prior = [replace(e, priors=e.priors | {effect.columns()[0]: table}) for e in blocks[b].experiments]
             near = blocks[b].target.coordinates.to_natural(blocks[b].modes.z[:1])[0]
-            out[b] = fitted(with_prior, blocks[b].effects, blocks[b].law, blocks[b].history, rng, near)
+            block = blocks[b]
+            out[b] = fitted(with_prior, block.effects, block.law, block.history, rng, near, scales=block.scales)
     return out
 
 

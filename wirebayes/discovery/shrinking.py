@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import repeat
 
 import numpy as np
@@ -131,7 +132,8 @@ def _beside_discrepancy(
     fitting = []
     for base, added, own in handed_over:
         effects, alone_ = list(added), [(e,) for e in base.experiments]
-        fits = parallel_map(fitted, alone_, effects[:n], repeat(base.law), repeat(base.history), own)
+        one_scale = partial(fitted, scales=base.scales)
+        fits = parallel_map(one_scale, alone_, effects[:n], repeat(base.law), repeat(base.history), own)
         trained = zip(alone_, train, effects[n:], strict=True)
         fitting.append((fits, [_Trained(e, (k,), extra, base) for e, k, extra in trained]))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
@@ -231,7 +233,11 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.G
     own = alone(block.effects, experiment)
     # two experiments of one name differ in how many of its holds they have
     same = block.names == (experiment.name,) and len(block.experiments[0].holds) == len(experiment.holds)
-    fit = block if same and own == block.effects else fitted([experiment], own, block.law, block.history, rng)
+    fit = (
+        block
+        if same and own == block.effects
+        else fitted([experiment], own, block.law, block.history, rng, scales=block.scales)
+    )
     return (*own, discrepancy(experiment, left_over(fit, experiment.name)))
 
 
@@ -250,7 +256,8 @@ def left_over(block: LaplaceFit, name: str) -> float:
     """Root mean square of what the best parameters leave over in an experiment's readings, N."""
     sample = block.target.problem.samples[block.names.index(name)]
     line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
-    return float(np.sqrt((((sample.readings - line.reading)[sample.protocol.mask]) ** 2).mean()))
+    left = float(np.sqrt((((sample.readings - line.reading)[sample.protocol.mask]) ** 2).mean()))
+    return left * block.target.problem.read_unit(sample)
 
 
 def _score(held: held_out.HeldOut) -> Scores:

@@ -347,7 +347,8 @@ def added(
         effects[b] = r.effect
         near = r.theta[r.blocks.index(b)]
         every = (*blocks[b].effects, r.effect)
-        blocks[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near)
+        scales = blocks[b].scales
+        blocks[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near, scales=scales)
     if any(len(r.blocks) > 1 for r in refits.values()):
         blocks = informed(blocks, effects, rng)
     return blocks, effects

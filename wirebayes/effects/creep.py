@@ -57,8 +57,8 @@ class SecondRelaxation(Effect):
     formula = "second_mode"
     scope = "material"
     amplitudes = (
-        Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.1), is_elongation=True),
-        Amplitude("T2", "s", 30.0, stats.lognorm(1.2, scale=30.0), is_shape=True),
+        Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.4), is_elongation=True),
+        Amplitude("T2", "s", 0.25, stats.lognorm(1.2, scale=0.25), is_shape=True),
     )
     sentence = "The wire creeps in two modes, one with a time constant of its own."
     shows = "shape within the hold"
@@ -74,7 +74,7 @@ class SteadyCreep(Effect):
     place = "elongation"
     formula = "flow"
     scope = "material"
-    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 1e-3), is_elongation=True),)
+    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 0.5), is_elongation=True),)
     sentence = "The wire also flows steadily under tension and never settles."
     shows = "tail of the hold"
 
@@ -144,7 +144,7 @@ class CreepThreshold(Effect):
     formula = "threshold"
     no_creep_below = "creep_threshold.tau_c"
     scope = "material"
-    amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 2.0)),)
+    amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 0.5)),)
     sentence = "Below a threshold tension the wire does not creep."
     shows = "no relaxation in the first holds"
 

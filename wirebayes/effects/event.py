@@ -33,7 +33,7 @@ class UnrecordedHold(EventEffect):
     name = "unrecorded_hold"
     place = "wait"
     formula = "wait"
-    amplitudes = (Amplitude("T", "s", 0.0, stats.halfnorm(0.0, 300.0)),)
+    amplitudes = (Amplitude("T", "s", 0.0, stats.halfnorm(0.0, 2.5)),)
     sentence = "Time passed at a displacement before its first reading."
     shows = "step in level; names the hold"
 

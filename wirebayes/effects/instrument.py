@@ -20,7 +20,7 @@ class ReadingDelay(Effect):
     place = "clock"
     formula = "delay"
     scope = "instrument"
-    amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 5.0)),)
+    amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 0.04)),)
     sentence = "The first reading of each hold was taken later than recorded."
     shows = "first reading low, most where creep is fastest"
 
@@ -37,7 +37,7 @@ class SensorDrift(Effect):
     place = "reading"
     formula = "drift"
     scope = "instrument"
-    amplitudes = (Amplitude("a", "N/s", 0.0, stats.norm(0.0, 1e-3)),)
+    amplitudes = (Amplitude("a", "N/s", 0.0, stats.norm(0.0, 0.1)),)
     sentence = "The force sensor drifts with time."
     shows = "grows with elapsed time, also within holds"
 
@@ -52,7 +52,7 @@ class SensorNonlinearity(Effect):
     place = "reading"
     formula = "square"
     scope = "instrument"
-    amplitudes = (Amplitude("a", "1/N", 0.0, stats.norm(0.0, 0.02)),)
+    amplitudes = (Amplitude("a", "1/N", 0.0, stats.norm(0.0, 0.08)),)
     sentence = "The force sensor is nonlinear at higher tension."
     shows = "like stiffening; distinguishable with several wires"
 
@@ -69,7 +69,7 @@ class ClampTransient(Effect):
     scope = "instrument"
     amplitudes = (
         Amplitude("a", "-", 0.0, stats.norm(0.0, 0.05)),
-        Amplitude("T", "s", 10.0, stats.lognorm(1.0, scale=10.0), is_shape=True),
+        Amplitude("T", "s", 0.08, stats.lognorm(1.0, scale=0.08), is_shape=True),
     )
     sentence = "After each move the clamp or sensor settles, in proportion to the tension."
     shows = "decays inside the hold, scales with tension"

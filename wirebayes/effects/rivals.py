@@ -1,9 +1,9 @@
 """Alternatives to eq (5): other time laws, and eq (2) without any. Not missing effects, so not in the catalogue.
 
-A time law returns the share of the creep reached by a time, in place of that of eq (5). Where it has no plateau, the
-creep of eq (4) is what is reached after a day.
+A time law returns the share of the creep reached by a time, in place of that of eq (5).
 """
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,24 @@ from scipy import stats
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
 Own = dict[str, NDArray[Any]]
-DAY_S = 86400.0
+LONG = 720.0  # typical holds: a day, where they last two minutes
+
+
+@dataclass(frozen=True)
+class _WithoutPlateau(Effect):
+    """A time law without a plateau: the creep of eq (4) is what is reached after a long time, `long_s`."""
+
+    long_s: float = LONG * 120.0
+
+    @property
+    def formula_constant(self) -> float:
+        return self.long_s
+
+    def in_units(self, tension: float, time: float) -> "_WithoutPlateau":
+        return replace(self, long_s=self.long_s * time)
+
+    def referred(self, hold_s: float) -> "_WithoutPlateau":
+        return replace(self, long_s=LONG * hold_s)
 
 
 class AtOnce(Effect):
@@ -62,23 +79,23 @@ class NotInTime(Effect):
         return 0.0 * value
 
 
-class Logarithmic(Effect):
-    """log(1 + t / t0), one at a day."""
+class Logarithmic(_WithoutPlateau):
+    """log(1 + t / t0), one after a long time."""
 
     name = "logarithmic"
     place = "fraction"
     formula = "logarithmic"
     scope = "material"
-    amplitudes = (Amplitude("t0", "s", np.nan, stats.lognorm(1.5, scale=10.0), is_shape=True),)
+    amplitudes = (Amplitude("t0", "s", np.nan, stats.lognorm(1.5, scale=0.08), is_shape=True),)
     sentence = "Creep grows with the logarithm of time."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
-        share = np.log1p(hold.time_s / own["t0"]) / np.log1p(DAY_S / own["t0"])
+        share = np.log1p(hold.time_s / own["t0"]) / np.log1p(self.long_s / own["t0"])
         return np.asarray(share + 0.0 * value)
 
 
-class PowerLaw(Effect):
-    """(t / day)^n."""
+class PowerLaw(_WithoutPlateau):
+    """(t / long time)^n."""
 
     name = "power_law"
     place = "fraction"
@@ -88,7 +105,7 @@ class PowerLaw(Effect):
     sentence = "Creep grows with a power of time."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
-        return np.asarray((hold.time_s / DAY_S) ** own["n"] + 0.0 * value)
+        return np.asarray((hold.time_s / self.long_s) ** own["n"] + 0.0 * value)
 
 
 class TwoModes(Effect):

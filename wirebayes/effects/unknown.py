@@ -4,7 +4,7 @@ Two random walks over the order of holds, one for the level and one for the cour
 between a few knots. Beyond the training holds the walks continue, so the bands widen there.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,12 @@ class Discrepancy(Effect):
     @property
     def amplitudes(self) -> tuple[Amplitude, ...]:  # type: ignore[override]
         step = stats.norm(0.0, self.size_N / KNOTS**0.5)
-        return tuple(Amplitude(f"{walk}{k}", "N", 0.0, step) for walk in ("level", "course") for k in range(2 * KNOTS))
+        names = [f"{walk}{k}" for walk in ("level", "course") for k in range(2 * KNOTS)]
+        return tuple(Amplitude(name, "N", 0.0, step, in_natural_units=True) for name in names)
+
+    def in_units(self, tension: float, time: float) -> "Discrepancy":
+        """The same walks, their size in another unit of tension and the hold in another one of time."""
+        return replace(self, size_N=self.size_N * tension, hold_s=self.hold_s * time)
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
         place = hold.index / max(self.holds - 1, 1) * KNOTS

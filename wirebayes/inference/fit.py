@@ -10,7 +10,7 @@ import numpy as np
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
 from wirebayes.inference.sampler.ensemble import Chains
-from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.transform import LogPosterior, Transformation
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
 from wirebayes.typing import Array
@@ -63,7 +63,7 @@ def fit(
     near: Mapping[str, float] | None = None,
     rough: Array | None = None,
 ) -> Fit:
-    """Sample the posterior of a problem.
+    """Sample the posterior of a problem, in units of the test's own scales.
 
     Parameters
     ----------
@@ -76,20 +76,25 @@ def fit(
     near : mapping of name to value, optional
         Parameters known to be good, where the search for modes looks too.
     rough : (n, d) array, optional
-        Natural parameters drawn from nearly this posterior, which save burn-in a part of its work.
+        Parameters drawn from nearly this posterior, which save burn-in a part of its work.
 
     Returns
     -------
     Fit
     """
-    target = LogPosterior(integrated(problem))
+    own = problem.in_units(problem.own_units)
+    target = LogPosterior(integrated(own))
     walked = target.problem.names
+
+    def sampled(theta: Array) -> Array:
+        """Sampled coordinates of (n, d) parameters in the problem's units."""
+        columns = [problem.names.index(name) for name in walked]
+        return target.coordinates.to_sampled(problem.theta_in(own.units, theta)[:, columns])
+
     start = None
     if near is not None and near.keys() >= set(walked):
-        start = target.coordinates.to_sampled(np.array([[near[name] for name in walked]]))
-    cloud = None
-    if rough is not None:
-        cloud = target.coordinates.to_sampled(rough[:, [problem.names.index(name) for name in walked]])
+        start = sampled(np.array([[near.get(name, 1.0) for name in problem.names]]))
+    cloud = None if rough is None else sampled(rough)
     chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud)
     m, steps, walkers, d = chains.z.shape
     thin = max(1, steps * walkers // STORED_DRAWS)
@@ -97,7 +102,21 @@ def fit(
     log_density = np.moveaxis(chains.log_density[:, thin - 1 :: thin], 2, 1).reshape(m, -1)
     theta = target.coordinates.to_natural(z.reshape(-1, d))
     _, theta, added = completed(target.problem, theta, np.random.default_rng(seed_of(seed, "completed")))
+    theta = own.theta_in(problem.units, theta)
     return Fit(problem, theta.reshape(m, -1, theta.shape[1]), log_density + added.reshape(m, -1), chains, thin)
+
+
+def parameters_at(problem: Problem, z: Array) -> Array:
+    """(n, d) parameters, in the problem's units, of (n, d) coordinates that `fit` sampled.
+
+    Parameters
+    ----------
+    problem : Problem
+        Without amplitudes that are integrated out.
+    z : (n, d) array
+    """
+    own = problem.in_units(problem.own_units)
+    return own.theta_in(problem.units, Transformation(own).to_natural(z))
 
 
 def seed_of(seed: int, *words: str) -> int:

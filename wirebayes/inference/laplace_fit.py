@@ -11,11 +11,11 @@ from wirebayes.inference.modes import Optimum, climb, modes
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.linear_amplitudes import integrated
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.problem import Problem, build, unit_of_column
+from wirebayes.model.scales import NATURAL, Scales
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.wire.protocol import Protocol
 
 _FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
 # its log density in those units, taken out again: the amplitude's own prior is not in the evidence
@@ -26,7 +26,7 @@ _AS_HELD = 0.05  # standard deviation of the log of a setting error that is held
 
 @dataclass(frozen=True)
 class LaplaceFit:
-    """What shares parameters, fitted.
+    """What shares parameters, fitted in units of the tests' scales.
 
     Attributes
     ----------
@@ -39,9 +39,6 @@ class LaplaceFit:
     target : LogPosterior
     modes : Optimum
         Distinct modes, best first.
-    modes_with_expected_setting_error : (k, d) array
-        Where the best fit calls setting error what is larger than half a step of the test, the best one with setting
-        errors as they are expected: a large effect is easily taken in by a setting error without bounds. Else no row.
     exponent : float or scipy frozen distribution
         See `fitted`.
     """
@@ -52,7 +49,6 @@ class LaplaceFit:
     history: History
     target: LogPosterior
     modes: Optimum
-    modes_with_expected_setting_error: Array
     exponent: Any = 1.0
 
     @property
@@ -61,28 +57,57 @@ class LaplaceFit:
 
     @property
     def best(self) -> dict[str, float]:
-        """The best parameters, all of them."""
-        theta = self.target.coordinates.to_natural(self.modes.z[:1])[0]
-        return dict(zip(self.target.problem.names, theta.tolist(), strict=True))
+        """The best parameters, all of them, in mm, N and s."""
+        theta = self.target.coordinates.to_natural(self.modes.z[:1])
+        natural = self.target.problem.theta_in(NATURAL, theta)[0]
+        return dict(zip(self.target.problem.names, natural.tolist(), strict=True))
 
     def parameters(self, name: str) -> dict[str, float]:
-        """The best parameters, by the names they have where one of the experiments is fitted alone."""
+        """The best parameters in mm, N and s, by the names they have where one of the experiments is fitted alone."""
+        problem = self.target.problem.in_units(NATURAL)
         theta = self.target.coordinates.to_natural(self.modes.z[:1])
-        sample = self.target.problem.samples[self.names.index(name)]
-        own = self.target.problem.parameters(theta, sample)
+        natural = self.target.problem.theta_in(NATURAL, theta)
+        own = problem.parameters(natural, problem.samples[self.names.index(name)])
         return {key: float(value[0]) for key, value in own.items()}
 
     def along(self, effect: Effect, deviations: Sequence[float]) -> Array:
-        """An effect's amplitude so many standard deviations from its best, by the normal approximation as sampled."""
+        """An effect's amplitude so many standard deviations from its best, by the normal approximation as sampled.
+
+        In its natural unit.
+        """
         column = column_of(self.target.problem, effect)
         z = np.repeat(self.modes.z[:1], len(deviations), axis=0)
         z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
-        return self.target.coordinates.to_natural(z)[:, column]
+        amplitudes = self.target.coordinates.to_natural(z)[:, column]
+        return amplitudes * self.target.problem.units.of(self.unit(effect))
 
     def problem_with(self, effect: Effect) -> Problem:
         """The same samples with one more effect, nothing integrated out."""
         effects = (*self.effects, effect)
-        return build(self.experiments, effects, law=self.law, history=self.history, length_exponent=self.exponent)
+        problem = build(
+            self.experiments,
+            effects,
+            law=self.law,
+            history=self.history,
+            length_exponent=self.exponent,
+            scales=self.scales,
+        )
+        return problem.in_units(problem.own_units)
+
+    def unit(self, effect: Effect) -> str:
+        """The natural unit of an effect's amplitude, which depends on what is read."""
+        problem = self.target.problem
+        with_effect = [replace(s, model=replace(s.model, effects=(effect,))) for s in problem.samples]
+        return unit_of_column(effect.columns()[0], with_effect)
+
+    def natural_amplitude(self, effect: Effect, amplitude: float) -> float:
+        """An amplitude as the block counts it, in its natural unit."""
+        return amplitude * self.target.problem.units.of(self.unit(effect))
+
+    @property
+    def scales(self) -> Scales | None:
+        """Those of the tests, which its units are made of."""
+        return self.target.problem.scales
 
     @property
     def log_evidence(self) -> float:
@@ -97,6 +122,7 @@ def fitted(
     rng: np.random.Generator,
     near: Array | None = None,
     exponent: Any = 1.0,
+    scales: Scales | None = None,
 ) -> LaplaceFit:
     """Find the modes of the posterior of some experiments with some effects, from many starts.
 
@@ -111,48 +137,21 @@ def fitted(
     history : {"saturating", "additive"}
     rng : numpy.random.Generator
     near : (d,) array, optional
-        Natural parameters known to be good: one more start.
+        Parameters known to be good, in units of the scales: one more start.
     exponent : float or prior
         That of the creep amount's growth with the sample's length (see `wirebayes.model.problem.build`).
+    scales : Scales, optional
+        In whose units the fit is made; those of the experiments when left out.
 
     Returns
     -------
     LaplaceFit
     """
-    target = LogPosterior(
-        integrated(build(experiments, effects, law=law, history=history, length_exponent=exponent)), for_draws=False
-    )
+    problem = build(experiments, effects, law=law, history=history, length_exponent=exponent, scales=scales)
+    target = LogPosterior(integrated(problem.in_units(problem.own_units)), for_draws=False)
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
-    return LaplaceFit(
-        tuple(experiments),
-        tuple(effects),
-        law,
-        history,
-        target,
-        found,
-        _with_expected_setting_error(target, found, rng),
-        exponent,
-    )
-
-
-def _with_expected_setting_error(target: LogPosterior, found: Optimum, rng: np.random.Generator) -> Array:
-    """(k, d) places of `LaplaceFit.modes_with_expected_setting_error`."""
-    problem, best = target.problem, target.coordinates.to_natural(found.z[:1])
-    if all(
-        problem.parameters(best, s)["setting_sd"][0] <= _ABSURD * _typical_step(s.protocol) for s in problem.samples
-    ):
-        return np.empty((0, found.z.shape[1]))
-    every = problem.prior.distributions
-    held = {n: stats.lognorm(_AS_HELD, scale=d.median()) for n, d in every.items() if n.startswith("setting_sd")}
-    bound = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=every | held)), for_draws=False)
-    return target.coordinates.to_sampled(bound.coordinates.to_natural(modes(bound, rng).z[:1]))
-
-
-def _typical_step(protocol: Protocol) -> float:
-    """Median distance between displacements that follow each other, mm."""
-    steps = np.abs(np.diff(protocol.setting))
-    return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
+    return LaplaceFit(tuple(experiments), tuple(effects), law, history, target, found, exponent)
 
 
 _HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up for
@@ -174,12 +173,10 @@ class Pinned:
         self._plain = block
 
     def starts(self, best: int = 2) -> Array:
-        """(k, d) starts: the modes without the effect and the fit with expected setting errors, shapes at medians."""
+        """(k, d) starts: the best modes without the effect, shapes at medians."""
         names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
         known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
-        natural = self._plain.target.coordinates.to_natural(
-            np.concatenate([self._plain.modes.z[:best], self._plain.modes_with_expected_setting_error])
-        )
+        natural = self._plain.target.coordinates.to_natural(self._plain.modes.z[:best])
         theta = np.empty((len(natural), len(names)))
         for i, name in enumerate(names):
             theta[:, i] = (

@@ -14,13 +14,13 @@ from scipy.optimize import least_squares
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.likelihoods import hold_courses
-from wirebayes.model.prior import wire_defaults
-from wirebayes.model.problem import MATERIAL, Likelihood
+from wirebayes.model.problem import MATERIAL, Likelihood, default_prior
+from wirebayes.model.scales import scales_of
 from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import Model, simulate
 
-_FAR = 1e-6  # the search stays between these quantiles of the prior: along a ridge it would never end
+_WIDE = 100_000  # the search stays between the ends of so many prior draws: along a ridge it would never end
 _LEAST_STIFFNESS = 10.0  # times the largest tension: a thin line does not stretch by a tenth
 _DRAWS, _STARTS = 2000, 6
 _STEP = 1e-5  # of coordinates of order one: central differences are then exact to some 1e-10
@@ -141,11 +141,11 @@ def identify(
     if not names:
         only = residuals(experiment, at(known), variant)
         return Identified(known, rms(only))
-    distributions = wire_defaults(experiment.length_mm)
+    prior = default_prior(experiment.length_mm, scales_of([experiment]), {})
     logarithmic = np.array([name != "preload" for name in names])
-    low, high = (
-        _logged(np.array([distributions[name].ppf(q) for name in names]), logarithmic) for q in (_FAR, 1.0 - _FAR)
-    )
+    columns = [prior.names.index(name) for name in names]
+    wide = prior.rvs(_WIDE, rng)[:, columns]
+    low, high = (_logged(end, logarithmic) for end in (wide.min(axis=0), wide.max(axis=0)))
     if "k1" in names:
         low[names.index("k1")] = np.log(_LEAST_STIFFNESS * experiment.tension().max())
 
@@ -165,7 +165,7 @@ def identify(
     if variant.likelihood == "hold":
         predicted[:, 0] = False
     measured = experiment.tension()[predicted]
-    draws = np.column_stack([distributions[name].rvs(size=_DRAWS, random_state=rng) for name in names])
+    draws = prior.rvs(_DRAWS, rng)[:, columns]
     with np.errstate(all="ignore"):
         starts = np.clip(_logged(draws, logarithmic), low + 1e-9, high - 1e-9)
         best = starts[np.argsort((misfit(starts) ** 2).sum(axis=0), kind="stable")[:_STARTS]]

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.inference.fit import Fit, fit, parameters_at, seed_of
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.transform import Transformation
 from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.typing import Array
@@ -92,7 +91,7 @@ def one(
 def _last_of_every_walker(done: Fit) -> Array:
     """(n, d) draws that are as good as independent: walkers only meet through the differential-evolution move."""
     z = done.chains.z[:, -1]
-    return Transformation(done.problem).to_natural(z.reshape(-1, z.shape[-1]))
+    return parameters_at(done.problem, z.reshape(-1, z.shape[-1]))
 
 
 def extremeness(share_below: Array) -> float:

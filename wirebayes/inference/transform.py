@@ -33,6 +33,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logit
 
 from wirebayes.inference import shares
 from wirebayes.inference.edges import edge
@@ -201,6 +202,15 @@ class Transformation:
         for i in np.flatnonzero(self.log_columns).tolist():
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
             self.log_spread[i] = 0.5 * np.log(high / low)
+        # half a step is the most that a setting can be off: logarithms end there
+        self.log_upper = np.full(len(names), np.inf)
+        self.shares_of_most: dict[int, tuple[float, float, float]] = {}
+        for i in np.flatnonzero(self.log_columns).tolist():
+            distribution = problem.prior.distributions[names[i]]
+            if distribution.dist.name == "logitnorm":
+                (middle, sd), _, most = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
+                self.log_upper[i] = np.log(most)
+                self.shares_of_most[i] = (float(middle), float(sd), float(most))
         self.noises = _noises(problem, self.log_columns, self.log_spread)
         self.sensor_columns, self.setting_columns = (
             [i for i, name in enumerate(names) if name.split("[")[0] == of and self.log_columns[i]]
@@ -335,6 +345,11 @@ class Transformation:
         """
         # other coordinates than logarithms have a standard deviation of one already
         out = np.where(self.log_columns, np.log(np.where(self.log_columns, theta, 1.0)), z) / self.log_spread
+        for i, (middle, sd, most) in self.shares_of_most.items():
+            out[:, i] = (logit(theta[:, i] / most) - middle) / sd
+        for name in self.problem.prior.powers.keys() & self.problem.prior.distributions.keys():
+            i = self.problem.names.index(name)
+            out[:, i] += self.problem.prior.log_factor(name, theta) / self.log_spread[i]
         for i in self.shares:
             out[:, i] = self.edges[i].score(theta[:, i])
         for slack in self.slack_edges:

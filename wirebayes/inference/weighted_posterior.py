@@ -67,13 +67,20 @@ def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPoste
     WeightedPosterior
     """
     rng = np.random.default_rng(seed)
-    target = LogPosterior(integrated(problem))
+    own = problem.in_units(problem.own_units)
+    target = LogPosterior(integrated(own))
     pool = witnessed(target, rng, ess)
     z = pool.drawn(0, min(_DRAWS, len(pool.z)), rng)
     _, theta, _ = completed(target.problem, target.coordinates.to_natural(z), rng)
     found, k = effective(pool.log_weight)[0], tail(pool.log_weight[:, 0])
     why = f"importance sampling: {found:.0f} effective draws of {len(pool.z)}, Pareto k {k:.2f}"
-    return WeightedPosterior(problem, theta, float(pool.log_integral[0]), bool(pool.settled[0]), why)
+    log_units = sum(
+        sample.protocol.mask.sum() * np.log(own.read_unit(sample) / problem.read_unit(sample))
+        for sample in problem.samples
+    )
+    log_evidence = float(pool.log_integral[0] - log_units)
+    theta = own.theta_in(problem.units, theta)
+    return WeightedPosterior(problem, theta, log_evidence, bool(pool.settled[0]), why)
 
 
 def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Weighted:

@@ -149,10 +149,18 @@ def integrated(problem: Problem) -> Problem:
         for s in problem.samples
     )
     return MarginalisedProblem(
-        samples, replace(problem.prior, distributions=left), "chain", problem,
-        tuple(np.array(gone)[shows]), tuple(s[..., shows] for s in shapes),
-        np.array([p.mean() for p in priors])[shows], np.array([p.std() for p in priors])[shows],
-    )  # fmt: skip
+        samples,
+        replace(problem.prior, distributions=left),
+        "chain",
+        scales=problem.scales,
+        units=problem.units,
+        stated=problem.stated,
+        whole=problem,
+        columns=tuple(np.array(gone)[shows]),
+        shapes=tuple(s[..., shows] for s in shapes),
+        mean=np.array([p.mean() for p in priors])[shows],
+        sd=np.array([p.std() for p in priors])[shows],
+    )
 
 
 def completed(problem: Problem, theta: Array, rng: np.random.Generator) -> tuple[Problem, Array, Array]:

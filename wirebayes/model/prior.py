@@ -1,34 +1,59 @@
-"""What a person knows of a thin line before the test: one object for sampling, calibration and prediction.
+"""What is known of a line before its test: one object for sampling, calibration and prediction.
 
-The ranges (5 % to 95 %) and their reasons:
+Default priors are numbers in the scales of the test (`wirebayes.model.scales`): its displacement step and range, its
+typical tension, its typical hold. Their ranges (5 % to 95 %) and reasons:
 
-=============  ====================  ==========================================================================
-k1             170 to 24,000 N       nylon monofilament of 0.2 mm to braided polyethylene of 1 mm (modulus x area)
-B              5.1e-5 to 2.7e-3 L0   creep strain at 1 N; 1e-4 to 1e-3 measured on light polymer lines
-U              0.16 to 1.6           linear viscoelasticity is 1; polymers under small loads lie below
-k2             0.0042 to 0.22 s^-N   half the creep within seconds up to hours, together with N
-N              0.31 to 1.4           1 is an exponential, below it a stretched one
-preload        -1.1 to 2.1 mm        the test begins at a small tension, at a step of about 1 mm
-sensor_sd      0.0014 to 0.1 N       a load cell of 10 to 100 N range
-setting_sd     0.004 to 0.2 mm       a milling machine's screw up to a hand-set vernier
-=============  ====================  ==========================================================================
+=============  ==========================================  ===========================================================
+parameter      range                                       reason
+=============  ==========================================  ===========================================================
+k1             0.13 to 18 tensions / (range / length)      a test spans tensions of its typical size: k1 times the
+                                                           range of strain is 2 typical tensions where it begins at
+                                                           none, less where the wire is preloaded or kept slack
+B              0.0064 to 0.88 of half the range            creep at the typical tension as a share of the elastic
+                                                           stretch there: a per cent on stiff braids, most on kite line
+U              0.16 to 1.6                                 linear viscoelasticity is 1; polymers under small loads lie
+                                                           below
+k2             0.059 to 8.3 hold^-N                        a hold shows between a twentieth and all of the creep
+N              0.31 to 1.4                                 1 is an exponential, below it a stretched one
+preload        -0.39 to 0.59 of the range                  the test begins at a small tension, or a little slack
+sensor_sd      0.00025 to 0.035 tensions                   load cells resolve a ten-thousandth to a hundredth of what
+                                                           they are used for
+setting_sd     0.004 to 0.16 steps, at most 0.5            a screw up to a hand-set vernier; displacements that are
+                                                           off by more than half a step do not order the holds
+=============  ==========================================  ===========================================================
+
+Where the tension is set, ``setting_sd`` is as many steps of the weight and ``sensor_sd`` the same share of the range of
+displacements; the zero of the gauge is arbitrary, so that ``preload`` is as wide as that range.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
-from scipy.special import log_ndtr
+from scipy.special import expit, log_ndtr, logit, ndtr, ndtri
 
 from wirebayes.errors import InputError
 from wirebayes.io.readings import shown
+from wirebayes.model.scales import Scales
 from wirebayes.typing import Array
+from wirebayes.wire.protocol import Control
 
 ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # as stiffness, creep and errors are
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
+
+
+class Power(NamedTuple):
+    """A parameter whose unit depends on another one: its distribution is that of ``value * exp(log_base * exponent)``.
+
+    ``B`` in mm N^-U is the creep at 1 N. What is known is the creep at the test's typical tension, B times that tension
+    to the power U.
+    """
+
+    exponent: str | float
+    log_base: float
 
 
 @dataclass(frozen=True)
@@ -43,11 +68,14 @@ class Prior:
         Parameters that are known and not sampled.
     logarithmic : frozenset of str
         Positive parameters, sampled as logarithms.
+    powers : dict of name to Power
+        Of parameters whose unit depends on an exponent, the other column or a number.
     """
 
     distributions: dict[str, Any]
     fixed: dict[str, float]
     logarithmic: frozenset[str]
+    powers: dict[str, Power] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -55,11 +83,38 @@ class Prior:
 
     def rvs(self, n: int, rng: np.random.Generator) -> Array:
         """(n, d) draws."""
-        return np.column_stack([d.rvs(size=n, random_state=rng) for d in self.distributions.values()])
+        drawn = [d.rvs(size=n, random_state=rng) for d in self.distributions.values()]
+        return self._from_known(np.column_stack(drawn))
 
     def ppf(self, cube: Array) -> Array:
         """(n, d) parameters of points ``(n, d)`` in the unit cube."""
-        return np.column_stack([d.ppf(cube[:, i]) for i, d in enumerate(self.distributions.values())])
+        known = [d.ppf(cube[:, i]) for i, d in enumerate(self.distributions.values())]
+        return self._from_known(np.column_stack(known))
+
+    def log_factor(self, name: str, theta: Array) -> Any:
+        """(n,) logarithm of what a parameter of (n, d) is multiplied by for its distribution; 0.0 for most."""
+        if name not in self.powers:
+            return 0.0
+        exponent, log_base = self.powers[name]
+        if not isinstance(exponent, str):
+            return log_base * exponent
+        return log_base * (self.fixed[exponent] if exponent in self.fixed else theta[:, self.names.index(exponent)])
+
+    def known(self, theta: Array) -> Array:
+        """(n, d) what the distributions are of: parameters (n, d), those with powers times their factor."""
+        if not self.powers:
+            return theta
+        out = theta.copy()
+        for name in self.powers.keys() & self.distributions.keys():
+            out[:, self.names.index(name)] *= np.exp(self.log_factor(name, theta))
+        return out
+
+    def _from_known(self, known: Array) -> Array:
+        """Parameters of what their distributions are of, both (n, d)."""
+        theta = known.copy()
+        for name in self.powers.keys() & self.distributions.keys():
+            theta[:, self.names.index(name)] *= np.exp(-self.log_factor(name, known))
+        return theta
 
     def log_density(self) -> Callable[[Array], Array]:
         """A function of (n, d) parameters that returns the (n,) log density."""
@@ -69,14 +124,47 @@ class Prior:
         positive = np.flatnonzero(is_positive)
         together = _lognormal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("shape", "scale")))
         others = [(i, fast_logpdf(d)) for i, d in enumerate(self.distributions.values()) if not is_positive[i]]
+        powers = [name for name in self.distributions if name in self.powers]
 
         def evaluate(theta: Array) -> Array:
-            total = together(theta[:, positive]).sum(axis=1)
+            known = self.known(theta)
+            total = together(known[:, positive]).sum(axis=1)
+            for name in powers:
+                total = total + self.log_factor(name, theta)
             for i, log_pdf in others:
-                total = total + log_pdf(theta[:, i])
+                total = total + log_pdf(known[:, i])
             return total
 
         return evaluate
+
+
+class _LogitNormal(stats.rv_continuous):
+    """A share of the scale whose logit is normal: log-normal for small shares, never above the scale."""
+
+    def _argcheck(self, middle: Any, sd: Any) -> Any:  # type: ignore[override]
+        return np.isfinite(middle) & (sd > 0)
+
+    def _logpdf(self, x: Any, middle: Any, sd: Any) -> Any:  # type: ignore[override]
+        score = (logit(x) - middle) / sd
+        return -0.5 * score**2 - np.log(sd) - _HALF_LOG_2PI - np.log(x) - np.log1p(-x)
+
+    def _pdf(self, x: Any, middle: Any, sd: Any) -> Any:  # type: ignore[override]
+        return np.exp(self._logpdf(x, middle, sd))
+
+    def _cdf(self, x: Any, middle: Any, sd: Any) -> Any:  # type: ignore[override]
+        return ndtr((logit(x) - middle) / sd)
+
+    def _ppf(self, q: Any, middle: Any, sd: Any) -> Any:  # type: ignore[override]
+        return expit(middle + sd * ndtri(q))
+
+
+logit_normal = _LogitNormal(a=0.0, b=1.0, name="logitnorm", shapes="middle, sd")
+
+
+def scaled(distribution: Any, factor: float) -> Any:
+    """The distribution of a positive number times what another one describes."""
+    shapes, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
+    return distribution.dist(*shapes, loc=loc * factor, scale=scale * factor)
 
 
 def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
@@ -93,6 +181,8 @@ def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
     if name == "truncnorm" and dist.support()[1] == np.inf:
         least, whole = loc + shape * scale, float(np.log(scale)) + _HALF_LOG_2PI + float(log_ndtr(-shape))
         return lambda x: np.where(x >= least, -0.5 * ((x - loc) / scale) ** 2 - whole, -np.inf)
+    if name == "logitnorm":
+        return _logit_normal(shape, float(dist.dist._parse_args(*dist.args, **dist.kwds)[0][1]), scale)
     if name == "uniform":
         return lambda x: np.where((x >= loc) & (x <= loc + scale), -np.log(scale), -np.inf)
     return lambda x: np.asarray(dist.logpdf(x))
@@ -125,22 +215,82 @@ def _lognormal(spread: Any, median: Any) -> Callable[[Array], Array]:
     return evaluate
 
 
-def wire_defaults(length_mm: float) -> dict[str, Any]:
-    """Distributions of the plain model's parameters for a sample of this length (see the module's table)."""
-    return dict(_wire_defaults(length_mm))
+def _logit_normal(middle: float, sd: float, most: float) -> Callable[[Array], Array]:
+    """The log density of a number between 0 and `most` the logit of whose share is normal."""
+    constant = float(np.log(sd)) + _HALF_LOG_2PI + float(np.log(most))
+
+    def evaluate(x: Array) -> Array:
+        share = x / most
+        inside = (share > 0) & (share < 1)
+        u = np.where(inside, share, 0.5)
+        log_below, log_above = np.log(u), np.log1p(-u)
+        score = (log_below - log_above - middle) / sd
+        return np.where(inside, -0.5 * score**2 - log_below - log_above - constant, -np.inf)
+
+    return evaluate
+
+
+K1_TENSIONS, K1_SD = 1.5, 1.5  # k1 times the range of strain, in typical tensions; sd of the logarithm
+CREEP_SHARE, CREEP_SD = 0.15, 1.5  # of the elastic stretch at the typical tension, nearly half the range
+HAZARD, HAZARD_SD = 0.7, 1.5  # k2 t^N after a typical hold, when half of the creep is over
+PRELOAD_MEAN, PRELOAD_SD = 0.1, 0.3  # of the range
+SENSOR, SENSOR_SD = 0.003, 1.5  # of the typical tension
+SETTING, SETTING_LOG_SD, SETTING_MOST = 0.03, 1.2, 0.5  # of the typical step
+
+
+def wire_defaults(length_mm: float, scales: Scales, control: Control = "displacement") -> dict[str, Any]:
+    """Distributions of the plain model's parameters, in the test's own units (see the module's table).
+
+    Parameters
+    ----------
+    length_mm : float
+        Of the sample.
+    scales : Scales
+    control : {"displacement", "force"}
+        What is set in the test: its setting error is one of that, its sensor error one of what is read.
+
+    Returns
+    -------
+    dict of name to scipy frozen distribution
+        ``B`` is the creep at the typical tension in steps, ``k2`` the hazard after a typical hold.
+    """
+    lengths, steps = length_mm / scales.range_mm, scales.range_mm / scales.step_mm
+    if control == "displacement":
+        return dict(_wire_defaults(lengths, steps))
+    return _wire_defaults(lengths, steps) | _under_weights(steps, scales.step_N / scales.tension_N)
 
 
 @cache  # scipy takes as long to make eight distributions as a hundred points take to be evaluated
-def _wire_defaults(length_mm: float) -> dict[str, Any]:
+def _wire_defaults(lengths: float, steps: float) -> dict[str, Any]:
+    """`lengths` is the sample's length in ranges of displacement, `steps` the range in steps."""
     return {
-        "k1": stats.lognorm(1.5, scale=2000.0),
-        "B": stats.lognorm(1.2, scale=3.7e-4 * length_mm),
+        "k1": stats.lognorm(K1_SD, scale=K1_TENSIONS * lengths),
+        "B": stats.lognorm(CREEP_SD, scale=CREEP_SHARE * 0.5 * steps),
         "U": stats.lognorm(0.7, scale=0.5),
-        "k2": stats.lognorm(1.2, scale=0.03),
+        "k2": stats.lognorm(HAZARD_SD, scale=HAZARD),
         "N": stats.lognorm(0.45, scale=0.65),
-        "preload": stats.norm(0.5, 1.0),
-        "sensor_sd": stats.lognorm(1.3, scale=0.012),
-        "setting_sd": stats.lognorm(1.2, scale=0.03),
+        "preload": stats.norm(PRELOAD_MEAN * steps, PRELOAD_SD * steps),
+        "sensor_sd": stats.lognorm(SENSOR_SD, scale=SENSOR),
+        "setting_sd": logit_normal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, loc=0.0, scale=SETTING_MOST),
+    }
+
+
+@cache
+def _under_weights(steps: float, weight_step: float) -> dict[str, Any]:
+    """What is different where the tension is set; the zero of a gauge is arbitrary.
+
+    Parameters
+    ----------
+    steps : float
+        The range of displacements in steps.
+    weight_step : float
+        The typical change of the weight in typical tensions.
+    """
+    most = SETTING_MOST * weight_step
+    return {
+        "preload": stats.norm(0.0, steps),
+        "sensor_sd": stats.lognorm(SENSOR_SD, scale=SENSOR * steps),
+        "setting_sd": logit_normal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, loc=0.0, scale=most),
     }
 
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy import stats
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
-from wirebayes.model.prior import Prior, from_table, possible, wire_defaults
+from wirebayes.model.prior import Power, Prior, from_table, possible, scaled, wire_defaults
+from wirebayes.model.scales import NATURAL, Scales, Units, scales_of
 from wirebayes.typing import Array
 from wirebayes.units import nearest
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Protocol
@@ -77,11 +78,20 @@ class Problem:
     prior : Prior
         Its names are the columns of every ``(n, d)`` parameter array.
     likelihood : {"chain", "hold"}
+    scales : Scales or None
+        Of the test, which default priors refer to; None where there is nothing to scale, as for a stored posterior.
+    units : Units
+        In which parameters, protocols and readings are written.
+    stated : frozenset of str
+        Parameters whose prior a person stated, in natural units.
     """
 
     samples: tuple[Sample, ...]
     prior: Prior
     likelihood: Likelihood = "chain"
+    scales: Scales | None = None
+    units: Units = NATURAL
+    stated: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -189,6 +199,73 @@ class Problem:
             out.append(np.where(np.isfinite(value), value, -np.inf))
         return out
 
+    def read_unit(self, sample: Sample) -> float:
+        """How many N, or mm where the tension is set, the readings of a sample count as one."""
+        return self.units.of(READ_UNIT[sample.protocol.control])
+
+    @property
+    def own_units(self) -> Units:
+        """Units made of the test's scales; mm, N and s where it has none.
+
+        A stated or fixed B or k2, whose unit depends on U or N, keeps the tension or the time as it is: its prior stays
+        simple.
+        """
+        if self.scales is None:
+            return NATURAL
+        own = self.scales.units
+        known = {column for column, value in self.prior.fixed.items() if value != 0.0}
+        named = {column.split("[")[0] for column in self.stated | known}
+        return Units(own.length_mm, 1.0 if "B" in named else own.tension_N, 1.0 if "k2" in named else own.time_s)
+
+    def in_units(self, units: Units) -> "Problem":
+        """The same posterior written in other units."""
+        if units == self.units:
+            return self
+        samples = tuple(_sample_in(sample, self.units, units) for sample in self.samples)
+        return replace(self, samples=samples, prior=self._prior_in(units), units=units)
+
+    def theta_in(self, units: Units, theta: Array) -> Array:
+        """(n, d) parameters of this problem in other units."""
+        out = theta.copy()
+        for i, name in enumerate(self.names):
+            out[:, i] *= _ratio(unit_of_column(name, self.samples), self.units, units)
+        for name, (exponent, log_ratio) in self._exponents(units).items():
+            if name in self.names:
+                value = theta[:, self.names.index(exponent)] if isinstance(exponent, str) else exponent
+                out[:, self.names.index(name)] *= np.exp(-log_ratio * value)
+        return out
+
+    def _exponents(self, units: Units) -> dict[str, Power]:
+        """For B and k2 of every material the exponent, and the logarithm of the ratio of the units raised to it."""
+        logs = {
+            "B": ("U", np.log(_ratio("N", self.units, units))),
+            "k2": ("N", np.log(_ratio("s", self.units, units))),
+        }
+        out = {}
+        for name in (*self.names, *self.prior.fixed):
+            base, bracket, mark = name.partition("[")
+            if base in logs:
+                exponent, log_ratio = logs[base]
+                column = f"{exponent}{bracket}{mark}"
+                out[name] = Power(self.prior.fixed.get(column, column), float(log_ratio))
+        return out
+
+    def _prior_in(self, units: Units) -> Prior:
+        prior = self.prior
+        ratios = {
+            name: _ratio(unit_of_column(name, self.samples), self.units, units) for name in (*self.names, *prior.fixed)
+        }
+        distributions = {name: scaled(d, ratios[name]) for name, d in prior.distributions.items()}
+        fixed = {name: value * ratios[name] for name, value in prior.fixed.items()}
+        powers = {}
+        for name, (exponent, log_ratio) in self._exponents(units).items():
+            log_base = prior.powers[name].log_base if name in prior.powers else 0.0
+            if log_base + log_ratio != 0.0:
+                powers[name] = Power(exponent, log_base + log_ratio)
+            if name in fixed and isinstance(exponent, float):
+                fixed[name] *= float(np.exp(-log_ratio * exponent))
+        return replace(prior, distributions=distributions, fixed=fixed, powers=powers)
+
     def linearised(self, theta: Array, sample: Sample) -> tuple[Linearised, Array, Array]:
         """A sample's staircase with reading variance and setting error, each (n,)."""
         own = self.parameters(theta, sample)
@@ -207,8 +284,9 @@ def build(
     history: History = "saturating",
     likelihood: Likelihood = "chain",
     length_exponent: Any = 1.0,
+    scales: Scales | None = None,
 ) -> Problem:
-    """The posterior of some experiments; those of one material share its parameters.
+    """The posterior of some experiments, in mm, N and s; those of one material share its parameters.
 
     Parameters
     ----------
@@ -219,6 +297,9 @@ def build(
         See `wirebayes.wire.laws` and `wirebayes.model.likelihoods`.
     length_exponent : float or scipy frozen distribution
         p of B ∝ L0^p among samples of one material: a value, or a prior to learn it.
+    scales : Scales, optional
+        What default priors refer to; those of the experiments when left out. Part of a test, or a replicate of it, is
+        given those of the whole.
 
     Raises
     ------
@@ -228,26 +309,126 @@ def build(
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
         materials.setdefault(experiment.material, []).append(experiment)
+    scales = scales or scales_of(experiments)
     several = len(experiments) > 1
     distributions: dict[str, Any] = {}
     samples: list[Sample] = []
     for material, members in materials.items():
         mark = f"[{material}]" if len(materials) > 1 else ""
-        distributions |= _material_priors(members, effects, mark, length_exponent, likelihood)
-        samples += _samples(members, effects, law, history)
+        distributions |= _material_priors(members, effects, mark, length_exponent, scales, likelihood)
+        samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], law, history)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
-        defaults = wire_defaults(experiment.length_mm)
+        defaults = wire_defaults(experiment.length_mm, scales, experiment.control)
         wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
-        if experiment.control == "force":
-            defaults["preload"] = stats.norm(0.0, 30.0)
         distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
-    _apply_tables(distributions, experiments, several)
-    fixed = {name: float(d) for name, d in distributions.items() if isinstance(d, int | float)}
+    units = scales.units
+    learned = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.in_natural_units}
+    every = {
+        name: d if name in learned or not hasattr(d, "dist") else scaled(d, units.of(unit_of_column(name, samples)))
+        for name, d in distributions.items()
+    }
+    stated = _apply_tables(every, experiments, several)
+    fixed = {name: float(d) for name, d in every.items() if isinstance(d, int | float)}
     shapes = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_shape}
-    free = {name: d for name, d in distributions.items() if name not in fixed}
+    free = {name: d for name, d in every.items() if name not in fixed}
     logarithmic = frozenset(n for n, d in free.items() if n.split("[")[0] in _POSITIVE | shapes and d.support()[0] >= 0)
-    return Problem(tuple(samples), Prior(free, fixed, logarithmic), likelihood)
+    powers = _default_powers([name for name in free if name not in stated], fixed, units)
+    return Problem(
+        tuple(samples), Prior(free, fixed, logarithmic, powers), likelihood, scales=scales, stated=frozenset(stated)
+    )
+
+
+def default_prior(length_mm: float, scales: Scales, instead: Mapping[str, Any]) -> Prior:
+    """The plain model's prior for a wire of this length, in mm, N and s.
+
+    Parameters
+    ----------
+    length_mm : float
+    scales : Scales
+        Of the test, which defaults refer to.
+    instead : mapping of name to float or scipy frozen distribution
+        What is stated in place of defaults, in natural units.
+    """
+    units = scales.units
+    defaults = wire_defaults(length_mm, scales)
+    every = {name: scaled(d, units.of(unit_of_column(name, ()))) for name, d in defaults.items()} | dict(instead)
+    fixed = {name: d for name, d in every.items() if isinstance(d, float)}
+    free = {name: d for name, d in every.items() if name not in fixed}
+    powers = _default_powers([name for name in free if name not in instead], fixed, units)
+    return Prior(free, fixed, frozenset(_POSITIVE & free.keys()), powers)
+
+
+def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Units) -> dict[str, Power]:
+    """Of the defaults of B and k2, which speak of the creep at the typical tension and of the hazard after a hold."""
+    logs = {"B": ("U", float(np.log(units.tension_N))), "k2": ("N", float(np.log(units.time_s)))}
+    out = {}
+    for name in names:
+        base, bracket, mark = name.partition("[")
+        if base in logs:
+            exponent, log_base = logs[base]
+            column = f"{exponent}{bracket}{mark}"
+            out[name] = Power(fixed.get(column, column), log_base)
+    return out
+
+
+_UNITS = {"k1": "N", "B": "mm", "preload": "mm"}
+_ERRORS = {"sensor_sd": READ_UNIT, "setting_sd": SET_UNIT}
+
+
+def unit_of_column(name: str, samples: Sequence[Sample]) -> str:
+    """The unit of a column in mm, N and s; of ``B`` and ``k2`` without the part that depends on U and N.
+
+    Parameters
+    ----------
+    name : str
+    samples : sequence of Sample
+        Of the problem: what is set and what is read decides the units of errors and of amplitudes of instruments.
+    """
+    base, _, mark = name.partition("[")
+    if base in _UNITS:
+        return _UNITS[base]
+    here = [sample for sample in samples if sample.name == mark.rstrip("]")] or samples
+    if base in _ERRORS:
+        return _ERRORS[base][here[0].protocol.control if here else "displacement"]
+    for sample in here:
+        for effect in sample.model.effects:
+            for column, amplitude in zip(effect.columns(), effect.amplitudes, strict=True):
+                if column == base:
+                    return effect.unit_under(amplitude, sample.protocol.control)
+    return "-"
+
+
+def _ratio(unit: str, old: Units, new: Units) -> float:
+    """What a number in old units is multiplied by in new ones."""
+    return old.of(unit) / new.of(unit)
+
+
+def _sample_in(sample: Sample, old: Units, new: Units) -> Sample:
+    """The same sample in other units."""
+    length, tension, time = (_ratio(unit, old, new) for unit in ("mm", "N", "s"))
+    p, model = sample.protocol, sample.model
+    set_, read = (_ratio(units[p.control], old, new) for units in (SET_UNIT, READ_UNIT))
+    protocol = replace(
+        p,
+        length_mm=p.length_mm * length,
+        setting=p.setting * set_,
+        time_s=p.time_s * time,
+        duration_s=p.duration_s * time,
+    )
+    changed = replace(
+        model,
+        effects=tuple(effect.in_units(tension, time) for effect in model.effects),
+        tension_ref_N=model.tension_ref_N * tension,
+        length_ref_mm=model.length_ref_mm * length,
+    )
+    return replace(
+        sample,
+        protocol=protocol,
+        readings=sample.readings * read,
+        resolution=sample.resolution * read,
+        model=changed,
+    )
 
 
 def _reference_length(members: Sequence[Experiment]) -> float:
@@ -258,10 +439,15 @@ def _reference_length(members: Sequence[Experiment]) -> float:
 
 
 def _material_priors(
-    members: Sequence[Experiment], effects: Sequence[Effect], mark: str, length_exponent: Any, likelihood: Likelihood
+    members: Sequence[Experiment],
+    effects: Sequence[Effect],
+    mark: str,
+    length_exponent: Any,
+    scales: Scales,
+    likelihood: Likelihood,
 ) -> dict[str, Any]:
     """Default priors of what the samples of one material share; `mark` distinguishes materials in the names."""
-    defaults = wire_defaults(_reference_length(members))
+    defaults = wire_defaults(_reference_length(members), scales)
     stiff = likelihood == "chain" or any(e.control == "displacement" for e in members)
     wanted = MATERIAL if stiff else tuple(name for name in MATERIAL if name != "k1")
     out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
@@ -297,8 +483,9 @@ def _extent(experiment: Experiment) -> float:
     return float(np.ptp(values) if experiment.control == "force" else np.abs(values).max())
 
 
-def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> None:
-    """Put the priors of the files in place of the defaults."""
+def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> set[str]:
+    """Put the priors of the files in place of the defaults, and return the columns that have one."""
+    stated = set()
     everything = set(MATERIAL) | set(SAMPLE) | {LENGTH_EXPONENT}
     for experiment in experiments:
         for name, table in experiment.priors.items():
@@ -310,9 +497,11 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
             ]
             if hits:
                 distributions[hits[0]] = wanted
+                stated.add(hits[0])
             elif name not in everything and "." not in name:
                 known = f"one of {', '.join(sorted(everything))}, or effect.parameter"
                 raise InputError(f"{key}: found no such parameter{nearest(name, sorted(everything))}, expected {known}")
+    return stated
 
 
 def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:

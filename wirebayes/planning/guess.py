@@ -1,6 +1,6 @@
 """Draws of the wire's parameters guessed before a test: from a plan's tables, an earlier fit, or readings."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,9 @@ import numpy as np
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws as rough_draws
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.prior import from_table, possible, wire_defaults
-from wirebayes.model.problem import MATERIAL, SAMPLE
+from wirebayes.model.prior import from_table, possible
+from wirebayes.model.problem import MATERIAL, SAMPLE, default_prior
+from wirebayes.model.scales import NATURAL, TYPICAL_K1_N, planned_scales
 from wirebayes.notice import Notice
 from wirebayes.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
@@ -44,9 +45,13 @@ class GuessedWire:
 
 
 def from_tables(
-    tables: Mapping[str, Any], lines: Mapping[str, int], source: Path, length_mm: float, n: int,
+    tables: Mapping[str, Any],
+    lines: Mapping[str, int],
+    source: Path,
+    tests: Sequence[Experiment],
+    n: int,
     rng: np.random.Generator,
-) -> GuessedWire:  # fmt: skip
+) -> GuessedWire:
     """A guess as a plan file writes it; what it leaves out is as wide as the model's prior.
 
     Raises
@@ -62,8 +67,8 @@ def from_tables(
         Where each stands in the file, for messages.
     source : Path
         The plan file, for messages.
-    length_mm : float
-        Length of the sample that the guess speaks of: priors of `B` depend on it.
+    tests : sequence of Experiment
+        What is planned; the guess speaks of a sample as long as the first one's.
     n : int
         Number of draws.
     rng : numpy.random.Generator
@@ -72,17 +77,18 @@ def from_tables(
     -------
     GuessedWire
     """
-    defaults = wire_defaults(length_mm)
-    out = {}
-    for name in (*MATERIAL, *SAMPLE):
-        if name not in tables:
-            out[name] = defaults[name].rvs(n, random_state=rng)
-            continue
-        table = tables[name] if isinstance(tables[name], dict) else {"fixed": tables[name]}
+    stated = {}
+    for name, value in tables.items():
+        table = value if isinstance(value, dict) else {"fixed": value}
         key = f"{source}, line {lines[name]}: guess.{name}"
-        found = possible(key, name, from_table(key, table))
-        fixed = isinstance(found, float)
-        out[name] = np.full(n, found) if fixed else np.asarray(found.rvs(n, random_state=rng))
+        stated[name] = possible(key, name, from_table(key, table))
+    k1 = stated.get("k1", TYPICAL_K1_N)
+    scales = planned_scales(tests, k1 if isinstance(k1, float) else float(k1.median()))
+    length_mm = tests[0].length_mm
+    prior = default_prior(length_mm, scales, stated)
+    drawn = dict(zip(prior.names, prior.rvs(n, rng).T, strict=True))
+    known = {name: np.full(n, value) for name, value in prior.fixed.items()}
+    out = {name: (drawn | known)[name] for name in (*MATERIAL, *SAMPLE)}
     given = ", ".join(tables) if tables else "nothing"
     return GuessedWire(out, length_mm, f"the plan's guess ({given} given, the rest as wide as the model's prior)")
 
@@ -130,5 +136,6 @@ def from_readings(
     """
     block = fitted([experiment], (), law, history, rng)
     theta = rough_draws(block.target, block.modes, rng, n)
-    own = block.target.problem.parameters(theta, block.target.problem.samples[0])
+    problem = block.target.problem.in_units(NATURAL)
+    own = problem.parameters(block.target.problem.theta_in(NATURAL, theta), problem.samples[0])
     return GuessedWire(dict(own), experiment.length_mm, f"a quick fit of {experiment.name}")

@@ -91,8 +91,8 @@ def sensitivity(
     for name, (k, seen) in power.detectable(null, trials, candidates, level).items():
         main = trials[k].effect.amplitudes[0]
         effects[name] = {
-            "amplitude_80": seen,
-            "unit": main.unit,
+            "amplitude_80": None if seen is None else block.in_unit(trials[k].effect, seen),
+            "unit": block.unit(trials[k].effect),
             "delta_80": None if seen is None else seen * float(strength[k]),
             "delta_prior": float(strength[k] * main.prior.std()),
             "confused_with": [n for n in power.group_of([name], alike) if n != name],
@@ -102,9 +102,10 @@ def sensitivity(
 
 def _fit_at(test: Experiment, centre: Mapping[str, float], law: ElasticLaw, history: History) -> LaplaceFit:
     """The fit whose best parameters are the guess's centre."""
-    target = LogPosterior(build([test], law=law, history=history))
-    theta = np.array([[centre[name] for name in target.problem.names]])
-    z = target.coordinates.to_sampled(theta)
+    natural = build([test], law=law, history=history)
+    target = LogPosterior(natural.in_units(natural.own_units))
+    theta = np.array([[centre[name] for name in natural.names]])
+    z = target.coordinates.to_sampled(natural.theta_in(target.problem.units, theta))
     d = z.shape[1]
     there = Optimum(z, target(z), np.eye(d)[None], np.array([True]))
-    return LaplaceFit((test,), (), law, history, target, there, np.empty((0, d)))
+    return LaplaceFit((test,), (), law, history, target, there)

@@ -34,7 +34,7 @@ def log_densities(
     problem : Problem
     holds : list of (sample, row of its protocol)
     draws : (n, d) array
-        Natural parameters, of the full posterior.
+        Parameters in the problem's units, of the full posterior.
     seed : int
     doubtful : (m,) bool array
         Those that draws of the full posterior do not settle: a search bears witness against each of them. Where the
@@ -47,6 +47,9 @@ def log_densities(
         Which of them are settled.
     """
     rng = np.random.default_rng(seed)
+    asked = problem
+    draws = problem.theta_in(problem.own_units, draws)
+    problem = problem.in_units(problem.own_units)
     target = LogPosterior(problem)
     z = target.coordinates.to_sampled(draws)
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
@@ -68,7 +71,11 @@ def log_densities(
         s, j = holds[m]
         alone = weighted_posterior(without_hold(problem, s, j), seed_of(seed, str(s), str(j)), _ALONE)
         elpd[m], settled[m] = log_whole - alone.log_evidence, known and alone.converged
-    return elpd, settled
+    log_units = [
+        sample.protocol.mask[j].sum() * np.log(problem.read_unit(sample) / asked.read_unit(sample))
+        for sample, j in ((problem.samples[s], j) for s, j in holds)
+    ]
+    return elpd - np.array(log_units), settled
 
 
 def without_hold(problem: Problem, sample: int, hold: int) -> Problem:

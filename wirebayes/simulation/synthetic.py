@@ -19,6 +19,7 @@ from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
+from wirebayes.model.scales import TYPICAL_K1_N, geometric_mean, planned_scales
 from wirebayes.typing import Array
 from wirebayes.units import nearest
 from wirebayes.wire.control import READ_UNIT
@@ -161,7 +162,10 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     seed : int or numpy.random.SeedSequence
     """
     rng = np.random.default_rng(seed)
-    problem = build([bench.experiment() for bench in benches], truth.effects, law=truth.law, history=truth.history)
+    stated = [value for name, value in truth.parameters.items() if name.split("[")[0] == "k1" and value > 0]
+    tests = [bench.experiment() for bench in benches]
+    scales = planned_scales(tests, geometric_mean(stated) if stated else TYPICAL_K1_N)
+    problem = build(tests, truth.effects, law=truth.law, history=truth.history, scales=scales)
     theta = problem.prior.rvs(1, rng)
     for name, value in truth.parameters.items():
         hits = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
@@ -170,6 +174,7 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
             raise InputError(f"parameter {name}: no such parameter{hint}; there are {', '.join(problem.names)}")
         for i in hits:
             low, high = problem.prior.distributions[problem.names[i]].support()
+            high = np.inf if name.split("[")[0] == "setting_sd" else high  # a bench may be worse than its prior
             if not low <= value <= high:
                 raise InputError(f"parameter {name}: found {value:g}, expected a number from {low:g} to {high:g}")
             theta[0, i] = value

@@ -27,7 +27,6 @@ FORMULAS = (
 )
 
 cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
-cdef double DAY_S = 86400.0
 cdef int NEWTON_STEPS = 7  # as in `wirebayes.effects.rivals`
 cdef int MOST_STEPS = 200  # as in `wirebayes.wire.inverse`
 cdef double EXACT = 4.0 * 2.220446049250313e-16
@@ -308,9 +307,9 @@ cdef inline double law_of_time(Wire* wire, double time_s) noexcept nogil:
         if wire.formula[e] == NOT_IN_TIME:
             share = 0.0
         elif wire.formula[e] == LOGARITHMIC:
-            share = log1p(time_s / a) / log1p(DAY_S / a)
+            share = log1p(time_s / a) / log1p(wire.number[e] / a)
         elif wire.formula[e] == POWER_OF_TIME:
-            share = pow(time_s / DAY_S, a)
+            share = pow(time_s / wire.number[e], a)
         elif wire.formula[e] == TWO_MODES:
             share = -(1.0 - a) * expm1(-wire.k2 * time_s) - a * expm1(-wire.k2 * time_s / wire.own[e][1])
     return share

@@ -43,11 +43,14 @@ class Amplitude:
     neutral : float
         The value at which the effect returns the plain model to the last bit.
     prior : scipy frozen distribution
+        In the test's own units: displacement steps for mm, typical tensions for N, typical holds for s.
     is_shape : bool
         True for a positive constant of the form (a time constant), sampled as a logarithm; it means nothing while
         the amplitude is neutral.
     is_elongation : bool
         True where the amplitude is an elongation of the whole wire, which grows with the length of the sample.
+    in_natural_units : bool
+        True where the prior was learned from the readings, and is in the amplitude's own unit.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Amplitude:
     prior: Any
     is_shape: bool = False
     is_elongation: bool = False
+    in_natural_units: bool = False
 
 
 @dataclass
@@ -176,6 +180,14 @@ class Effect:
     def columns(self) -> tuple[str, ...]:
         """Parameter names as they appear in a posterior: ``effect_name.parameter``."""
         return tuple(f"{self.name}.{a.name}" for a in self.amplitudes)
+
+    def in_units(self, tension: float, time: float) -> "Effect":
+        """The effect where tensions and times are multiplied by these numbers; itself unless it has such constants."""
+        return self
+
+    def referred(self, hold_s: float) -> "Effect":
+        """The effect for a test whose holds typically last so long; itself unless its form refers to that."""
+        return self
 
     @classmethod
     def unit_under(cls, amplitude: Amplitude, control: Control) -> str:

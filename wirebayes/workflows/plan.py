@@ -219,7 +219,8 @@ def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np
     for test, _ in tests:
         build([test])  # checks priors
     if file.posterior is None:
-        guess = from_tables(file.guess, file.guess_lines, file.source, file.tests[0].length_mm, n, rng)
+        planned = [test for test, _ in tests]
+        guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
         about: dict[str, Any] = {}
     else:
         guess, about, _ = _posterior(file.posterior, name, n, own)
