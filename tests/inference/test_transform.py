@@ -56,7 +56,9 @@ def test_the_target_is_prior_likelihood_and_volume():
     problem = PROBLEMS["chain"]
     target = LogPosterior(problem)
     theta = problem.prior.rvs(20, np.random.default_rng(2))
-    prior = sum(d.logpdf(theta[:, i]) for i, d in enumerate(problem.prior.distributions.values()))
+    known = problem.prior.known(theta)
+    prior = sum(d.logpdf(known[:, i]) for i, d in enumerate(problem.prior.distributions.values()))
+    prior = prior + sum(problem.prior.log_factor(name, theta) for name in problem.prior.powers)
     z = target.coordinates.to_sampled(theta)
     expected = prior + problem.log_likelihood(theta) + target.coordinates.log_jacobian(theta, z)
     assert target(z) == pytest.approx(expected, rel=1e-9)

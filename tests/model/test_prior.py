@@ -5,7 +5,10 @@ import pytest
 from scipy import stats
 
 from wirebayes.errors import InputError
-from wirebayes.model.prior import Prior, fast_logpdf, from_table, possible, wire_defaults
+from wirebayes.model.prior import Power, Prior, fast_logpdf, from_table, possible, wire_defaults
+from wirebayes.model.scales import Scales
+
+SCALES = Scales(step_mm=0.5, range_mm=6.0, tension_N=4.0, hold_s=90.0, step_N=1.0)
 
 FORMS = [
     stats.norm(0.5, 2.0), stats.halfnorm(0.0, 0.3), stats.lognorm(1.2, scale=0.03), stats.uniform(-1.0, 3.0),
@@ -20,7 +23,7 @@ def test_the_fast_density_is_scipy_s_inside_and_outside(form):
 
 
 def test_draws_quantiles_and_density_belong_to_one_distribution():
-    prior = Prior(wire_defaults(1000.0), {}, frozenset())
+    prior = Prior(wire_defaults(1000.0, SCALES), {}, frozenset())
     draws = prior.rvs(4000, np.random.default_rng(0))
     for i, distribution in enumerate(prior.distributions.values()):
         # Kolmogorov-Smirnov at a level that eight tests together miss once in ten thousand
@@ -35,11 +38,33 @@ def test_draws_quantiles_and_density_belong_to_one_distribution():
 
 def test_the_stated_ranges_are_the_5_and_95_percent_points():
     stated = {
-        "k1": (170, 24000), "B": (0.05, 2.7), "U": (0.16, 1.6), "k2": (0.0042, 0.22), "N": (0.31, 1.4),
-        "preload": (-1.1, 2.1), "sensor_sd": (0.0014, 0.1), "setting_sd": (0.004, 0.2),
+        "k1": (0.13, 18), "B": (0.0064 * 0.5, 0.88 * 0.5), "U": (0.16, 1.6), "k2": (0.059, 8.3), "N": (0.31, 1.4),
+        "preload": (-0.39, 0.59), "sensor_sd": (0.00025, 0.035), "setting_sd": (0.004, 0.16),
     }  # fmt: skip
-    for name, distribution in wire_defaults(1000.0).items():
-        assert distribution.ppf([0.05, 0.95]) == pytest.approx(stated[name], rel=0.15)
+    length, steps = 1000.0 / SCALES.range_mm, SCALES.range_mm / SCALES.step_mm
+    unit = {"k1": length, "B": 2.0 * steps, "preload": steps}
+    for name, distribution in wire_defaults(1000.0, SCALES).items():
+        found = distribution.ppf([0.05, 0.95]) / unit.get(name, 1.0)
+        assert found == pytest.approx(stated[name], rel=0.15), name
+
+
+def test_a_setting_error_is_at_most_half_a_step():
+    distribution = wire_defaults(1000.0, SCALES)["setting_sd"]
+    assert distribution.support() == (0.0, 0.5)
+    assert np.isneginf(fast_logpdf(distribution)(np.array([0.5, 0.6]))).all()
+    weights = wire_defaults(1000.0, SCALES, "force")["setting_sd"]
+    assert weights.support()[1] == 0.5 * SCALES.step_N / SCALES.tension_N
+
+
+def test_a_power_makes_what_is_known_of_a_parameter_of_its_unit():
+    """Creep at 4 N is log-normal, whatever U; B in mm N^-U is not."""
+    free = {"B": stats.lognorm(0.5, scale=2.0), "U": stats.norm(1.0, 0.3)}
+    prior = Prior(free, {}, frozenset(), {"B": Power("U", np.log(4.0))})
+    theta = prior.rvs(4000, np.random.default_rng(0))
+    creep = theta[:, 0] * 4.0 ** theta[:, 1]
+    assert stats.kstest(creep, free["B"].cdf).pvalue > 1e-5
+    expected = free["B"].logpdf(creep) + theta[:, 1] * np.log(4.0) + free["U"].logpdf(theta[:, 1])
+    assert prior.log_density()(theta) == pytest.approx(expected, rel=1e-12)
 
 
 def test_tables_become_distributions_and_fixed_values():

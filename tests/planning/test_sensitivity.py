@@ -11,8 +11,9 @@ from wirebayes.discovery.settings import ALPHA
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.readings import frozen
+from wirebayes.model.scales import scales_of
 from wirebayes.planning.sensitivity import sensitivity
-from wirebayes.planning.widths import at_centre
+from wirebayes.planning.widths import at_centre, central
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 UP = Bench("up", displacements_mm=(1, 2, 3, 4, 5, 6))
@@ -47,7 +48,9 @@ def test_what_looks_alike_is_said_and_lies_close(up):
 
 def test_delta_is_amplitude_in_units_of_what_is_seen(up):
     effect = up.effects["steady_creep"]
-    ratio = CATALOGUE["steady_creep"]().amplitudes[0].prior.std() / effect["amplitude_80"]
+    units = scales_of([at_centre(UP.experiment(), central(guess(20)), "hooke", "saturating")]).units
+    amplitude = CATALOGUE["steady_creep"]().amplitudes[0]
+    ratio = units.of(amplitude.unit) * amplitude.prior.std() / effect["amplitude_80"]
     assert effect["delta_prior"] == pytest.approx(ratio * effect["delta_80"])
     assert 2.0 < effect["delta_80"] < 10.0  # fewer standard deviations are chance, more are plain to see
 

@@ -69,7 +69,7 @@ def test_without_weights_it_would_not_be(monkeypatch):
 
     one_round = widths._round
     monkeypatch.setattr(widths, "_round", even)
-    assert abs(np.log(planned_over_sampled(RIDGE))).mean() > 0.25
+    assert abs(np.log(planned_over_sampled(RIDGE))).mean() > 0.2  # twice what is allowed
 
 
 def test_more_readings_and_longer_holds_teach_more():

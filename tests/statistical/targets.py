@@ -28,7 +28,6 @@ class Analytic:
             to_sampled=same,
             to_natural=same,
             log_columns=np.zeros(d, bool),
-            log_upper=np.full(d, np.inf),
             order=np.arange(d),
         )
         start = lambda n, rng: rng.normal(0.0, spread, (n, d))  # noqa: E731

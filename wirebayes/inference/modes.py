@@ -42,7 +42,6 @@ _RANKS = np.array(
     [[0.1, 0.1], [0.1, 0.9], [0.1, 0.5], [0.9, 0.9], [0.9, 0.5], [0.9, 0.1], [0.5, 0.5], [0.5, 0.1], [0.5, 0.9]]
 )
 _WITHIN = 0.1  # added to these, at most
-_BELOW_MOST = 0.1  # of a logarithm: near the most that a setting can be off the prior falls without end
 _LED, _LED_TO = 12, 0.1  # steps, at most, with a ratio kept, and the gain in nats that ends them
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
 
@@ -475,12 +474,6 @@ class _SideBySide:
         self.n, self.noises = n, target.coordinates.noises
         self.sensors, self.settings = target.coordinates.sensor_columns, target.coordinates.setting_columns
         self.density, self.residuals = target.rowwise(readings)
-        self.upper = target.coordinates.log_upper - _BELOW_MOST
-
-    def _inside(self, z: Array) -> Array:
-        """Places whose setting errors are below the most that a setting can be off."""
-        z[:, self.settings] = np.minimum(z[:, self.settings], self.upper[self.settings])
-        return z
 
     def climbed(self, begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
         """The modes to which climbs lead from (m, d) places of each density, but for those known before."""
@@ -508,7 +501,7 @@ class _SideBySide:
         def kept(z: Array, rows: Array) -> Array:
             for pair in self.noises:
                 z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
-            return self._inside(z)
+            return z
 
         return [led.z for led in self._led(begin, [p.setting for p in self.noises], kept)] if self.noises else begin
 
@@ -522,7 +515,7 @@ class _SideBySide:
         def held(z: Array, rows: Array) -> Array:
             z[:, self.settings] = best[rows][:, self.settings] + _SETTING_UP
             z[:, self.sensors] = best[rows][:, self.sensors] - _SENSOR_DOWN
-            return self._inside(z)
+            return z
 
         if noises := [*self.settings, *self.sensors]:
             begin = [distinct([led]).z for led in self._led(begin, noises, held, together=True)]

@@ -1,8 +1,9 @@
 """The coordinates that are sampled: what the data determine, so that the curved ridge in (B, k2, N) is nearly straight.
 
-Positive parameters become logarithms; amplitudes whose prior ends at an edge (half-normal and uniform priors) become
-what is standard normal under their prior, so that no proposal leaves the support; others are measured in standard
-deviations of their prior. Then, one after the other,
+Positive parameters become logarithms; a setting error, which is at most half a step, the log odds of that; amplitudes
+whose prior ends at an edge (half-normal and uniform priors) become what is standard normal under their prior, so that
+no proposal leaves the support; others are measured in standard deviations of their prior. Then, one after the other,
+
 
 - log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
 - log U becomes its distance from the power of tension that suits the measured losses best at this hazard
@@ -33,7 +34,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logit
 
 from wirebayes.inference import shares
 from wirebayes.inference.edges import edge
@@ -196,21 +196,14 @@ class Transformation:
             if i not in self.edges:
                 self.scale[i] = _spread(distribution)
         self._log_scale = np.log(self.scale).sum()
+        ends = [float(d.support()[1]) for d in problem.prior.distributions.values()]
+        self._most = np.where([d.dist.name == "logitnorm" for d in problem.prior.distributions.values()], ends, np.inf)
         slack = [slack_edge(problem, sample) for sample in problem.samples] if for_draws else []
         self.slack_edges = [s for s in slack if s and not self.log_columns[s.preload] and s.preload not in self.edges]
         self.log_spread = np.ones(len(names))
         for i in np.flatnonzero(self.log_columns).tolist():
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
-            self.log_spread[i] = 0.5 * np.log(high / low)
-        # half a step is the most that a setting can be off: logarithms end there
-        self.log_upper = np.full(len(names), np.inf)
-        self.shares_of_most: dict[int, tuple[float, float, float]] = {}
-        for i in np.flatnonzero(self.log_columns).tolist():
-            distribution = problem.prior.distributions[names[i]]
-            if distribution.dist.name == "logitnorm":
-                (middle, sd), _, most = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
-                self.log_upper[i] = np.log(most)
-                self.shares_of_most[i] = (float(middle), float(sd), float(most))
+            self.log_spread[i] = 0.5 * (_log_odds(high, self._most[i]) - _log_odds(low, self._most[i]))
         self.noises = _noises(problem, self.log_columns, self.log_spread)
         self.sensor_columns, self.setting_columns = (
             [i for i, name in enumerate(names) if name.split("[")[0] == of and self.log_columns[i]]
@@ -263,7 +256,7 @@ class Transformation:
     def to_sampled(self, theta: Array) -> Array:
         """Sampled coordinates of natural parameters."""
         z = theta / self.scale
-        z[:, self.log_columns] = np.log(theta[:, self.log_columns])
+        z[:, self.log_columns] = self._logarithms(theta)
         for i, at in self.edges.items():
             z[:, i] = at.score(theta[:, i])
         for slack in self.slack_edges:
@@ -296,7 +289,8 @@ class Transformation:
         for i, at in self.edges.items():
             theta[:, i] = at.value(z[:, i])
         with np.errstate(all="ignore"):
-            theta[:, self.log_columns] = np.exp(z[:, self.log_columns])
+            odds = np.exp(z[:, self.log_columns])
+            theta[:, self.log_columns] = odds / (1.0 + odds / self._most[self.log_columns])
             for ridge in self.ridges:
                 if "k2" in ridge.shifted:
                     theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
@@ -328,7 +322,8 @@ class Transformation:
         theta, z : (n, d) arrays
             Natural parameters and their coordinates.
         """
-        total = np.log(theta[:, self.log_columns]).sum(axis=1) + self._log_scale
+        positive = theta[:, self.log_columns]
+        total = (np.log(positive) + np.log1p(-positive / self._most[self.log_columns])).sum(axis=1) + self._log_scale
         for i, at in self.edges.items():
             total = total + (shares.log_slope(theta[:, i], z[:, i]) if i in self.shares else at.log_slope(theta[:, i]))
         for slack in self.slack_edges:
@@ -344,9 +339,9 @@ class Transformation:
             Natural parameters and their coordinates.
         """
         # other coordinates than logarithms have a standard deviation of one already
-        out = np.where(self.log_columns, np.log(np.where(self.log_columns, theta, 1.0)), z) / self.log_spread
-        for i, (middle, sd, most) in self.shares_of_most.items():
-            out[:, i] = (logit(theta[:, i] / most) - middle) / sd
+        out = z.copy()
+        out[:, self.log_columns] = self._logarithms(theta)
+        out /= self.log_spread
         for name in self.problem.prior.powers.keys() & self.problem.prior.distributions.keys():
             i = self.problem.names.index(name)
             out[:, i] += self.problem.prior.log_factor(name, theta) / self.log_spread[i]
@@ -355,6 +350,10 @@ class Transformation:
         for slack in self.slack_edges:
             out[:, slack.preload] = theta[:, slack.preload] / self.scale[slack.preload]
         return np.asarray(out.T)
+
+    def _logarithms(self, theta: Array) -> Array:
+        """(n, k) logarithms of the positive parameters, of those with a largest value the log odds of reaching it."""
+        return _log_odds(theta[:, self.log_columns], self._most[self.log_columns])
 
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
         return np.asarray(ridge.get(theta, "N") * ridge.log_half_hold)
@@ -385,6 +384,12 @@ class Transformation:
                 part = Elongation(amount, effect, others, ends, ridge.kept)
                 ridge = replace(ridge, beside=(*ridge.beside, part))
         return ridge
+
+
+def _log_odds(value: Any, most: Any) -> Any:
+    """``log(value / (1 - value / most))``: the logarithm of values far below the most."""
+    with np.errstate(all="ignore"):  # what cannot be has no coordinate
+        return np.log(value) - np.log1p(-value / most)
 
 
 def _noises(problem: Problem, log_columns: NDArray[np.bool_], spread: Array) -> tuple[Noises, ...]:
