@@ -194,7 +194,11 @@ class Fits:
         self.did: list[Any] = []
         self.blocks: Any = [
             SimpleNamespace(
-                experiments=f"e{b}", effects=(f"old{b}",), target=b, modes=SimpleNamespace(z=np.ones((2, 1)))
+                experiments=f"e{b}",
+                effects=(f"old{b}",),
+                target=b,
+                modes=SimpleNamespace(z=np.ones((2, 1))),
+                scales="scales",
             )
             for b in range(2)
         ]
@@ -210,7 +214,8 @@ class Fits:
         )  # fmt: skip
         self.settings: Any = SimpleNamespace(law="modified", history="additive", kinds={})
 
-        def fitted(experiments: str, effects: Any, law: str, history: str, rng: Any, near: Any) -> Any:
+        def fitted(experiments: str, effects: Any, law: str, history: str, rng: Any, near: Any, scales: Any) -> Any:
+            assert scales == "scales"
             self.did.append(("fitted", experiments, effects, law, history, near.tolist()))
             return SimpleNamespace(target=experiments, modes=SimpleNamespace(z=np.ones((2, 1))))
 

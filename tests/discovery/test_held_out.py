@@ -15,8 +15,11 @@ from wirebayes.discovery import held_out
 from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
+from wirebayes.model.scales import Scales
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.staircase import Model
+
+SCALES = Scales(1.0, 12.0, 4.0, 120.0, 0.3)
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 0.02}
 TRAIN = 7
@@ -41,9 +44,9 @@ def test_readings_are_inside_up_to_1_645_predictive_standard_deviations(
     experiment = simulated_tests([Bench()], Truth(WIRE), seed=2)[0]
     problem = build([experiment.train(TRAIN)])
     theta = np.tile([WIRE[name] for name in problem.names], (4000, 1))  # a posterior that is one point
-    monkeypatch.setattr(held_out, "fitted", lambda *_: None)
+    monkeypatch.setattr(held_out, "fitted", lambda *_, **__: None)
     monkeypatch.setattr(held_out, "_draws", lambda *_: (problem, theta))
-    block = SimpleNamespace(effects=None, law="hooke", history="saturating")
+    block = SimpleNamespace(effects=None, law="hooke", history="saturating", scales=None)
     # a quantile of 4000 normal draws has a standard error of 0.033 standard deviations
     for deviations, share in ((1.5, 1.0), (1.8, 0.0)):
         measured = moved(experiment, side * deviations)
@@ -142,7 +145,8 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
     problem = build([e.train(k) for e, k in zip(pair, (7, 3), strict=True)], effects, law="modified")
     given: list[tuple[object, ...]] = []
 
-    def fitted(experiments: list[Experiment], *rest: object) -> str:
+    def fitted(experiments: list[Experiment], *rest: object, scales: object) -> str:
+        assert scales == SCALES
         given.append(([len(e.recorded_holds) for e in experiments], *rest))
         return "trained"
 
@@ -155,7 +159,7 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
     monkeypatch.setattr(held_out, "_draws", draws)
     target = SimpleNamespace(coordinates=SimpleNamespace(to_natural=lambda z: z))
     block = SimpleNamespace(effects=effects if same else (), law="modified", history="saturating", target=target,
-                            modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])))  # fmt: skip
+                            scales=SCALES, modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])))  # fmt: skip
     found = held_out.predicted(pair, [7, 3], effects, block, np.random.default_rng(0))  # type: ignore[arg-type]
     ((counts, extra, law, history, _, start),) = given
     assert (counts, extra, law, history) == ([7, 3], effects, "modified", "saturating")

@@ -112,7 +112,9 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
     """Reports of two experiments where a model's squared error says which one it is, and on what."""
     error = {"plain": 50.0, "a": 40.0, "ab": 30.0, "abc": 25.0, "plain~": 20.0, "a~": 15.0, "ab~": 10.0, "abc~": 5.0}
     pair = tuple(replace(e, holds=e.recorded_holds[:holds]) for e in experiments()[1:3])
-    models = [Model(name=name, experiments=pair, effects=(), law="", history="") for name in ("plain", *stages)]
+    models = [
+        Model(name=name, experiments=pair, effects=(), law="", history="", scales=None) for name in ("plain", *stages)
+    ]
 
     def predicted(trained: Any, rng: Any) -> list[HeldOut]:
         smooth = "~" if trained.effects == ("discrepancy",) else ""
@@ -128,7 +130,7 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
     monkeypatch.setattr(shrinking, "_predicted", predicted)
     monkeypatch.setattr(held_out, "truncated_leave_one_hold_out", lambda fit, rng: fit.name)
     monkeypatch.setattr(shrinking, "with_discrepancy", lambda base, e, rng: ("discrepancy",))
-    monkeypatch.setattr(shrinking, "fitted", lambda *given: Model(name="~"))
+    monkeypatch.setattr(shrinking, "fitted", lambda *given, **_: Model(name="~"))
     monkeypatch.setattr(shrinking, "_gain", gained)
     return shrinking.shrinking(
         models[0], models[1:], stages, remains, held_out.LeftOut(np.random.default_rng(0), map),  # type: ignore[arg-type]
@@ -214,28 +216,28 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
 
     asked: list[Any] = []
 
-    def fitted(*given: Any) -> Any:
-        asked.append(given)
+    def fitted(*given: Any, scales: Any) -> Any:
+        asked.append((*given, scales))
         return block
 
     monkeypatch.setattr(shrinking, "fitted", fitted)
     slip = replace(named("grip_slip@4"), test="another")  # type: ignore[type-var]
     whole: Any = SimpleNamespace(
         effects=(slip, named("memory")), law="hooke", history="additive", names=(one.name, other.name),
-        experiments=(one, other),
+        experiments=(one, other), scales="scales",
     )  # fmt: skip
     memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]
-    assert memory is whole.effects[1] and asked == [([other], (memory,), "hooke", "additive", "rng")]
+    assert memory is whole.effects[1] and asked == [([other], (memory,), "hooke", "additive", "rng", "scales")]
     assert smooth == shrinking.discrepancy(other, shrinking.left_over(block, other.name))
     # a block that is this experiment alone has been fitted, its first holds have not
     block.effects, block.experiments, block.names = (memory,), (other,), (other.name,)
-    block.law, block.history = "hooke", "additive"
+    block.law, block.history, block.scales = "hooke", "additive", "scales"
     first = other.train(3)
     monkeypatch.setattr(shrinking, "left_over", lambda fit, name: 0.5 if fit is block else np.nan)
     _, smooth = shrinking.with_discrepancy(block, other, "rng")  # type: ignore[arg-type]
     assert smooth == shrinking.discrepancy(other, 0.5) and len(asked) == 1
     shrinking.with_discrepancy(block, first, "rng")  # type: ignore[arg-type]
-    assert asked[1:] == [([first], (memory,), "hooke", "additive", "rng")]
+    assert asked[1:] == [([first], (memory,), "hooke", "additive", "rng", "scales")]
 
 
 def test_a_gain_is_reported_by_its_three_numbers() -> None:

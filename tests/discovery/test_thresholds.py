@@ -80,9 +80,9 @@ def test_bands_of_held_out_readings_hold_nine_in_ten(
     one = replace(one, holds=tuple(holds))
     problem = build([one.train(3)])
     theta = np.tile([WIRE[name] for name in problem.names], (500, 1))
-    monkeypatch.setattr(held_out, "fitted", lambda *given: None)
+    monkeypatch.setattr(held_out, "fitted", lambda *given, **_: None)
     monkeypatch.setattr(held_out, "_draws", lambda block, rng, n: (problem, theta))
-    block = SimpleNamespace(effects=("none",), law="hooke", history="saturating")
+    block = SimpleNamespace(effects=("none",), law="hooke", history="saturating", scales=None)
     (found,) = held_out.predicted([one], [3], (), block, Even())  # type: ignore[arg-type]
     assert found.inside == covered
     assert found.squares == pytest.approx((away * WIRE["sensor_sd"]) ** 2, rel=1e-6)

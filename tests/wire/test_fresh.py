@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from tests.effects.test_catalogue import HenckyStrain, strong
 from tests.wire.protocols import PLAIN, columns, protocol
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.effects.rivals import DAY_S, AtOnce, Logarithmic, NotInTime, PowerLaw, TwoModes
+from wirebayes.effects.rivals import AtOnce, Logarithmic, NotInTime, PowerLaw, TwoModes
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot, warnings
@@ -16,6 +16,7 @@ from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import Model, simulate
 
+LONG_S = PowerLaw().long_s
 LOAD, REFERENCE, LENGTH_REF = 3.5, 2.0, 1300.0
 TIMES = np.array([0.0, 120.0, 3600.0, 86400.0])
 k1, B, U, k2, N = (PLAIN[name] for name in ("k1", "B", "U", "k2", "N"))
@@ -62,8 +63,8 @@ CREEP = {
     "length_dependence@B": lambda t: eq5(t, B * long * LOAD**U),
     "length_dependence@U": lambda t: eq5(t, B * LOAD ** (U * long)),
     "length_dependence@N": lambda t: eq5(t, power=N * long),
-    "logarithmic": lambda t: B * LOAD**U * np.log1p(t / 7.0) / np.log1p(DAY_S / 7.0),
-    "power_law": lambda t: B * LOAD**U * (t / DAY_S) ** 0.3,
+    "logarithmic": lambda t: B * LOAD**U * np.log1p(t / 7.0) / np.log1p(LONG_S / 7.0),
+    "power_law": lambda t: B * LOAD**U * (t / LONG_S) ** 0.3,
     "two_modes": lambda t: B * LOAD**U * (0.7 * (1 - np.exp(-k2 * t)) + 0.3 * (1 - np.exp(-k2 * t / 12.0))),
     "not_in_time": lambda t: 0.0 * t,
     "waking": lambda t: eq5(t**0.6),
