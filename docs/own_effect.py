@@ -9,10 +9,10 @@ from wirebayes.model.problem import build
 from wirebayes.wire.effect import Amplitude, Effect
 
 
-class PowerStrain(Effect):
+class OwnPower(Effect):
     """s -> s (s / 0.001)^p; p = 0 is the plain wire."""
 
-    name, place, scope = "power_strain", "strain", "material"
+    name, place, scope = "own_power", "strain", "material"
     amplitudes = (Amplitude("p", "-", 0.0, stats.norm(0.0, 0.3)),)
     sentence = "The tension grows as a power of the strain."
 
@@ -23,8 +23,8 @@ class PowerStrain(Effect):
 
 def main():
     nylon = paper.experiments()[2]
-    result = fit(build([nylon], [PowerStrain()]), seed=1)
-    p = result.flat[:, result.problem.names.index("power_strain.p")]
+    result = fit(build([nylon], [OwnPower()]), seed=1)
+    p = result.flat[:, result.problem.names.index("own_power.p")]
     print(f"p = {p.mean():.2f}, standard deviation {p.std():.2f}, converged: {result.chains.converged}")
 
 

@@ -63,10 +63,10 @@ def test_the_effect_of_ones_own_is_neutral_at_its_neutral_value_to_the_last_bit(
     monkeypatch.setattr(compiled, "kernel", None)  # numpy computes such effects, and compiled code rounds otherwise
     (experiment,) = read_experiments(DOCS / "example" / "my-wire.toml")
     theta = {name: np.array([value]) for name, value in THETA.items()}
-    effect = load("own_effect").PowerStrain()
+    effect = load("own_effect").OwnPower()
     plain = simulate(experiment.protocol(), theta)
-    neutral = simulate(experiment.protocol(), theta | {"power_strain.p": np.zeros(1)}, Model(effects=(effect,)))
-    bent = simulate(experiment.protocol(), theta | {"power_strain.p": np.full(1, 0.2)}, Model(effects=(effect,)))
+    neutral = simulate(experiment.protocol(), theta | {"own_power.p": np.zeros(1)}, Model(effects=(effect,)))
+    bent = simulate(experiment.protocol(), theta | {"own_power.p": np.full(1, 0.2)}, Model(effects=(effect,)))
     assert (neutral == plain).all()
     assert (bent != plain)[experiment.protocol().mask].all()
 

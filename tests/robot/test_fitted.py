@@ -28,7 +28,7 @@ def strain_of_stiffening(load, c):
     return (np.sqrt(1 + 4 * c * load) - 1) / (2 * c)
 
 
-EFFECTS = {"strain_stiffening": ("c", None, strain_of_stiffening), "power_strain": ("p", OWN, strain_of_power)}
+EFFECTS = {"strain_stiffening": ("c", None, strain_of_stiffening), "own_power": ("p", OWN, strain_of_power)}
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +68,10 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
 
 @pytest.mark.parametrize("command", [["pose", "linear-6"], ["export", "hangprinter-4"]])
 def test_an_effect_of_ones_own_needs_its_file(fitted, tmp_path, capsys, command):
-    arguments = [*command, "--wires", str(fitted["power_strain"]), "--output", str(tmp_path / "out")]
+    arguments = [*command, "--wires", str(fitted["own_power"]), "--output", str(tmp_path / "out")]
     assert main(arguments) == 2
     line = capsys.readouterr().err.strip()
-    assert "power_strain" in line
+    assert "own_power" in line
     assert "\n" not in line
     assert not (tmp_path / "out").exists()
     if command[0] == "export":
@@ -79,7 +79,7 @@ def test_an_effect_of_ones_own_needs_its_file(fitted, tmp_path, capsys, command)
 
 
 def test_another_effects_file_is_another_configuration(fitted, tmp_path, capsys):
-    arguments = ["export", "hangprinter-4", "--wires", str(fitted["power_strain"]), "--output", str(tmp_path / "out")]
+    arguments = ["export", "hangprinter-4", "--wires", str(fitted["own_power"]), "--output", str(tmp_path / "out")]
     assert main([*arguments, "--own-effects", str(OWN)]) == 0
     other = tmp_path / "other.py"
     other.write_text(OWN.read_text() + "\n# changed\n")

@@ -122,11 +122,11 @@ def test_an_effect_of_ones_own_is_written_into_the_readings(tmp_path):
     own = str(Path(__file__).parents[2] / "docs" / "own_effect.py")
     wire = ["--parameter", "sensor_sd=1e-6", "--parameter", "setting_sd=1e-6", "--parameter", "k1=700"]
     for name, p in (("plain", "0"), ("power", "0.5")):
-        options = ["--own-effects", own, "--effect", f"power_strain.p={p}", *wire]
+        options = ["--own-effects", own, "--effect", f"own_power.p={p}", *wire]
         assert main(["simulate", "--output", str(tmp_path / name), *options]) == 0
     plain, power = (read_experiments(tmp_path / name / "experiments.toml")[0].tension() for name in ("plain", "power"))
     assert (power[-1, 0] / plain[-1, 0]) > 2.0  # strains well above 0.001
-    assert main(["simulate", "--output", str(tmp_path / "no"), "--effect", "power_strain.p=1"]) == 2
+    assert main(["simulate", "--output", str(tmp_path / "no"), "--effect", "own_power.p=1"]) == 2
 
 
 def test_the_experiment_file_is_plain_toml(tmp_path):

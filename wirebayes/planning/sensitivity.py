@@ -91,7 +91,7 @@ def sensitivity(
     for name, (k, seen) in power.detectable(null, trials, candidates, level).items():
         main = trials[k].effect.amplitudes[0]
         effects[name] = {
-            "amplitude_80": None if seen is None else block.in_unit(trials[k].effect, seen),
+            "amplitude_80": None if seen is None else block.natural_amplitude(trials[k].effect, seen),
             "unit": block.unit(trials[k].effect),
             "delta_80": None if seen is None else seen * float(strength[k]),
             "delta_prior": float(strength[k] * main.prior.std()),
