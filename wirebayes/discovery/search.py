@@ -455,7 +455,6 @@ def _common(
 def _outlook(gate: Gate, i: int, settings: Settings, answer: _Answer, alike: dict[tuple[str, str], float]) -> Outlook:
     """What could have been seen in block `i`, what cannot be, and what to measure next."""
     block, trials, candidates = gate.blocks[i], gate.trials, gate.candidates
-    control = block.experiments[0].control
     found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)
     best_probe = {name: k for name, (k, _) in found.items()}
     seen: dict[str, DetectableAmplitude] = {

@@ -163,7 +163,10 @@ class Fits:
         for plain, block in zip(self._known[frozenset()], larger.blocks, strict=True):
             effects = [effect for effect in block.effects if effect.name in key]
             base = block if effects else plain
-            out.append(fitted(base.experiments, effects, plain.law, plain.history, self._rng) if effects else plain)
+            if effects:
+                out.append(fitted(base.experiments, effects, plain.law, plain.history, self._rng, scales=plain.scales))
+            else:
+                out.append(plain)
         return out
 
 
