@@ -21,7 +21,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse, path
+from wirebayes.robot.motion import forward, inverse, mixed, path
 from wirebayes.robot.motion.creep import CreepState, HoldCreep
 from wirebayes.typing import Floats
 
@@ -276,7 +276,7 @@ class LiveEstimator:
             hard = self._live & ~(length < _LONG * robot.size_m)
             if hard.any():
                 step[hard] = np.nan
-            self._x, self._R = path.moved(robot, (self._x, self._R), step)
+            self._x, self._R = mixed.moved(robot, (self._x, self._R), step)
             if hard.any():
                 self._carefully(np.flatnonzero(hard), zero, offset)
             if not (length[self._live & ~hard] > _AGAIN * robot.size_m).any():

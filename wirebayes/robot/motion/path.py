@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics import cholesky, statics
-from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward
+from wirebayes.robot.motion import forward, mixed
 from wirebayes.typing import Floats
 
 _SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
@@ -70,11 +69,11 @@ def follow(
     """
     n = len(start[0])
     x, R = (np.array(v) for v in start)
-    whole, good = _step(robot, wires, (x, R), new)  # most need no division: all at once
+    tau = forward.tensions_at(robot, wires, x, R, *old)
+    whole, good = _step(robot, wires, (x, R), tau, new)  # most need no division: all at once
     share, drop = np.where(good, 1.0, 0.0), np.zeros(n)
     step = np.full(n, 0.5)
     hesitant = np.zeros(n, bool)
-    tau = forward.tensions_at(robot, wires, x, R, *old)
     for name, before in (("position_m", x), ("rotation", R), ("tension_N", tau)):
         getattr(whole, name)[~good] = before[~good]
     live = np.flatnonzero(~good & np.isfinite(whole.position_m).all(1))
@@ -82,7 +81,7 @@ def follow(
         to = np.minimum(share[live] + step[live], 1.0)
         between = [a[live] + to[:, None] * (b[live] - a[live]) for a, b in zip(old, new, strict=True)]
         part, at = wires.part(live), (whole.position_m[live], whole.rotation[live])
-        there, held = _step(robot, part, at, (between[0], between[1]))
+        there, held = _step(robot, part, at, whole.tension_N[live], (between[0], between[1]))
         rows = live[held]
         for name in ("position_m", "rotation", "tension_N", "status", "residual_N"):
             getattr(whole, name)[rows] = getattr(there, name)[held]
@@ -101,20 +100,20 @@ def follow(
 
 
 def _step(
-    robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
+    robot: Robot, wires: Wires, start: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
 ) -> tuple[forward.Equilibria, NDArray[np.bool_]]:
     """Solutions from starts, and whether each is where one Newton step says that it is."""
-    ahead = newton_step(robot, wires, start, lengths)
-    predicted = moved(robot, start, ahead)
-    there = forward.solve(robot, wires, *lengths, *predicted)
+    near, ahead = mixed.approach(robot, wires, start, tension_N, lengths)
+    predicted = mixed.moved(robot, start, ahead)
+    there = forward.solve(robot, wires, *lengths, *near)
     turn = there.rotation @ np.swapaxes(predicted[1], -1, -2) - np.eye(3)
     off = np.maximum(
         np.linalg.norm(there.position_m - predicted[0], axis=1), robot.size_m * np.linalg.norm(turn, axis=(1, 2))
     )
-    near = off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
-    near &= np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
-    near &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
-    return there, np.asarray(there.found & near)
+    close = off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
+    close &= np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
+    close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
+    return there, np.asarray(there.found & close)
 
 
 def settle(
@@ -136,7 +135,7 @@ def settle(
     Equilibria
     """
     step = newton_step(robot, wires, near, lengths)
-    x, R = moved(robot, near, step)
+    x, R = mixed.moved(robot, near, step)
     n = len(x)
     tau = forward.tensions_at(robot, wires, x, R, *lengths)
     out = forward.Equilibria(x, R, tau, np.full(n, forward.FOUND), np.ones(n, np.int64), np.zeros(n))
@@ -147,30 +146,6 @@ def settle(
         for field in fields(forward.Equilibria):
             getattr(out, field.name)[far] = getattr(rest, field.name)
     return out
-
-
-def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
-    """Poses after small steps.
-
-    Parameters
-    ----------
-    robot : Robot
-    pose : (position, rotation)
-        (n, 3), m, and (n, 3, 3).
-    step : (n, 6 or 3) array
-        Displacement, m, then turn in metres at the platform's edge; a NaN moves nothing.
-
-    Returns
-    -------
-    position : (n, 3) array
-    rotation : (n, 3, 3) array
-    """
-    step = np.where(np.isfinite(step), step, 0.0)
-    x = pose[0] + step[:, :3]
-    if robot.degrees == 3:
-        return x, pose[1]
-    turn = turning.compose(step[:, 3:].T / robot.size_m, pose[1].transpose(1, 2, 0))
-    return x, turn.transpose(2, 0, 1)
 
 
 def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:

@@ -1,0 +1,154 @@
+"""Newton's method on poses and tensions together, which converges alike for soft and for stiff wires.
+
+Where tensions are computed from a pose, an error of the pose of second order is an error of the tensions by as much
+times the stiffness: steps then shorten as wires get stiffer. Here the tensions are unknowns of their own, as in mixed
+finite elements. Which wires are taut is found with each step by a primal-dual active set (Hintermüller, Ito and
+Kunisch, SIAM J. Optim. 13, 2003).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics import cholesky, statics
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
+from wirebayes.typing import Floats
+
+_SETS = 12  # of taut wires tried in a step; three are usual
+_STEPS = 8  # of Newton's method; two or three are usual
+_NEAR = 1e-6  # of the platform's size: after so short a step the next would be lost in rounding
+_BARELY = 1e-9  # strain at which a slack wire's stiffness is taken
+
+
+def newton_step(
+    robot: Robot, wires: Wires, pose: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
+) -> tuple[Floats, Floats]:
+    """One step of poses and tensions towards equilibrium at lengths.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    pose : (position, rotation)
+        (n, 3), m, and (n, 3, 3).
+    tension_N : (n, w) array
+        Tensions that go with the poses; they need not be those of the lengths.
+    lengths : (zero, offset)
+        Zero-tension lengths (n, w) and lengths beyond the exit points, m.
+
+    Returns
+    -------
+    step : (n, 6 or 3) array
+        Displacement, m, then turn in metres at the platform's edge; NaN where no set of taut wires is a minimum.
+    tension_N : (n, w) array
+        After the step.
+    """
+    zero, offset = lengths[0].T, np.broadcast_to(lengths[1], lengths[0].shape).T
+    tau, R = tension_N.T, pose[1].transpose(1, 2, 0)
+    scale = np.ones((robot.degrees, 1))
+    scale[3:] = 1.0 / robot.size_m
+    shape = statics.geometry(robot, pose[0].T, R)
+    _, K = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
+    K *= scale[:, None] * scale.T[..., None]
+    J = statics.jacobian(robot, shape) * robot.lines[:, None] * scale[:, None]
+    load = -statics.weight(robot, R) * scale
+    carried = stretched_length(wires, zero, tau)
+    slope = tension(wires, np.maximum(carried, zero * (1.0 + _BARELY)), zero)[1]
+    # What a wire would pull at the pose by its tangent, and by how much that grows along a step.
+    pull = tau + slope * (statics.stretched(robot, shape, offset) - carried)
+    return _with_taut(K, J, load, pull, slope, (tau > 0) | (pull > 0))
+
+
+def _with_taut(
+    K: Floats, J: Floats, load: Floats, pull: Floats, slope: Floats, taut: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Steps and tensions of wires whose tangents carry a load, the taut ones found by trying.
+
+    Parameters
+    ----------
+    K : (d, d, n) array
+        Stiffness without the wires' own.
+    J : (d, w, n) array
+    load : (d, n) array
+        What the wires must not leave over.
+    pull, slope : (w, n) arrays
+        Tension at no step, and its growth by the stretched length.
+    taut : (w, n) bool array
+        The first guess.
+    """
+    d, n = load.shape
+    step, tau = np.full((d, n), np.nan), np.full(pull.shape, np.nan)
+    rows = np.arange(n)
+    for _ in range(_SETS):
+        on = taut[:, rows]
+        along, stiff, at_rest = J[..., rows], np.where(on, slope[:, rows], 0.0), np.where(on, pull[:, rows], 0.0)
+        H = K[..., rows] + np.einsum("iwn,jwn->ijn", along * stiff, along)
+        unbalanced = load[:, rows] + (along * at_rest).sum(1)
+        move, positive = cholesky.solve(H, -unbalanced)
+        after = pull[:, rows] + slope[:, rows] * (along * move[:, None]).sum(0)
+        settled = positive & ((after > 0) == on).all(0)
+        done = rows[settled]
+        step[:, done], tau[:, done] = move[:, settled], np.maximum(after[:, settled], 0.0)
+        taut[:, rows] = after > 0
+        rows = rows[positive & ~settled]
+        if not rows.size:
+            break
+    return step.T, tau.T
+
+
+def approach(
+    robot: Robot, wires: Wires, pose: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
+) -> tuple[tuple[Floats, Floats], Floats]:
+    """Poses near equilibrium at lengths, and the first step towards them.
+
+    Parameters
+    ----------
+    robot, wires, pose, tension_N, lengths
+        As for `newton_step`.
+
+    Returns
+    -------
+    pose : (position, rotation)
+        Where no step leads on, the last that was reached.
+    ahead : (n, 6 or 3) array
+        As `newton_step` gives it.
+    """
+    ahead, tau = newton_step(robot, wires, pose, tension_N, lengths)
+    x, R = moved(robot, pose, ahead)
+    step, rows = ahead, np.arange(len(x))
+    for _ in range(_STEPS):
+        length = np.linalg.norm(step, axis=1)
+        further = (length > _NEAR * robot.size_m) & (length < robot.span_m)
+        rows, tau = rows[further], tau[further]
+        if not rows.size:
+            break
+        part = lengths[0][rows], np.broadcast_to(lengths[1], lengths[0].shape)[rows]
+        step, tau = newton_step(robot, wires.part(rows), (x[rows], R[rows]), tau, part)
+        x[rows], R[rows] = moved(robot, (x[rows], R[rows]), step)
+    return (x, R), ahead
+
+
+def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
+    """Poses after small steps.
+
+    Parameters
+    ----------
+    robot : Robot
+    pose : (position, rotation)
+        (n, 3), m, and (n, 3, 3).
+    step : (n, 6 or 3) array
+        Displacement, m, then turn in metres at the platform's edge; a NaN moves nothing.
+
+    Returns
+    -------
+    position : (n, 3) array
+    rotation : (n, 3, 3) array
+    """
+    step = np.where(np.isfinite(step), step, 0.0)
+    x = pose[0] + step[:, :3]
+    if robot.degrees == 3:
+        return x, np.array(pose[1])
+    turn = turning.compose(step[:, 3:].T / robot.size_m, pose[1].transpose(1, 2, 0))
+    return x, turn.transpose(2, 0, 1)
