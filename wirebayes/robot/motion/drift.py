@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse, path
+from wirebayes.robot.motion import forward, inverse, one_sided, path
 from wirebayes.robot.motion.creep import CreepState, Follow, HoldCreep, fresh
 from wirebayes.typing import Floats
 
@@ -312,7 +312,7 @@ class Walk:
 
     def _stiffness(self, pose: tuple[Floats, Floats] | None = None) -> Floats:
         pose = pose or (self.here.position_m, self.here.rotation)
-        return path.lowest_stiffness(self.robot, self.wires, pose, self.lengths)
+        return one_sided.lowest_stiffness(self.robot, self.wires, pose, self.lengths)
 
     def falls(self) -> Falls:
         """What was written down on the way."""
@@ -372,7 +372,7 @@ def stably(
     n = len(commands.zero_m)
     pose = np.broadcast_to(position_m, (n, 3)), np.broadcast_to(rotation, (n, 3, 3))
     zero = np.where(commands.feasible[:, None], commands.zero_m, 1.0)
-    return commands.feasible & (path.lowest_stiffness(robot, wires, pose, (zero, commands.offset_m)) > 0)
+    return commands.feasible & (one_sided.lowest_stiffness(robot, wires, pose, (zero, commands.offset_m)) > 0)
 
 
 def moved(course: Course, origin_m: Floats, origin_rotation: Floats) -> tuple[Floats, Floats]:

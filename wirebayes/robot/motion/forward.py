@@ -14,6 +14,7 @@ from wirebayes.robot.mechanics import cholesky, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
+from wirebayes.robot.motion import one_sided
 from wirebayes.typing import Floats
 
 FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
@@ -113,7 +114,13 @@ def solve(
         count[slow] += rest[4]
     if robot.pulleys is not None:  # inside a pulley there is no wire, and no equilibrium to be found
         status[(status == FOUND) & ~statics.geometry(robot, at, turn).clear] = NOT_CONVERGED
-    return Equilibria(at.T + middle, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
+    found = Equilibria(at.T + middle, np.moveaxis(turn, -1, 0), tau.T, status, count, left)
+    loose = np.flatnonzero(status == NOT_HELD)
+    if loose.size:  # by wires that are taut; those that are just not slack may hold it yet
+        pose = at[:, loose].T, found.rotation[loose]
+        stiff = one_sided.lowest_stiffness(robot, wires.part(loose), pose, (zero[:, loose].T, offset[:, loose].T))
+        status[loose[stiff > 0]] = FOUND
+    return found
 
 
 def spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:

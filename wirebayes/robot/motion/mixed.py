@@ -2,9 +2,11 @@
 
 Where tensions are computed from a pose, an error of the pose of second order is an error of the tensions by as much
 times the stiffness: steps then shorten as wires get stiffer. Here the tensions are unknowns of their own, as in mixed
-finite elements. Which wires are taut is found with each step by a primal-dual active set (Hintermüller, Ito and
-Kunisch, SIAM J. Optim. 13, 2003).
+finite elements. Which wires are taut is found with each step: about a pose the energy is a piecewise quadratic of the
+displacement, whose minimum Newton's method finds in as many steps as sets of taut wires are passed.
 """
+
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,8 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.typing import Floats
 
-_SETS = 12  # of taut wires tried in a step; three are usual
+_SETS = 40  # of taut wires tried in a step; one or two are usual
+_HALVINGS = 30  # of the way along a direction, to the lowest point on it
 _STEPS = 8  # of Newton's method; two or three are usual
 _NEAR = 1e-6  # of the platform's size: after so short a step the next would be lost in rounding
 _BARELY = 1e-9  # strain at which a slack wire's stiffness is taken
@@ -58,44 +61,86 @@ def newton_step(
     slope = tension(wires, np.maximum(carried, zero * (1.0 + _BARELY)), zero)[1]
     # What a wire would pull at the pose by its tangent, and by how much that grows along a step.
     pull = tau + slope * (statics.stretched(robot, shape, offset) - carried)
-    return _with_taut(K, J, load, pull, slope, (tau > 0) | (pull > 0))
+    return _lowest(_Quadratic(K, J, load, pull, slope), tau > 0)
 
 
-def _with_taut(
-    K: Floats, J: Floats, load: Floats, pull: Floats, slope: Floats, taut: NDArray[np.bool_]
-) -> tuple[Floats, Floats]:
-    """Steps and tensions of wires whose tangents carry a load, the taut ones found by trying.
+@dataclass(frozen=True)
+class _Quadratic:
+    """Energy about ``n`` poses: quadratic where the same wires are taut.
 
-    Parameters
+    Attributes
     ----------
     K : (d, d, n) array
         Stiffness without the wires' own.
     J : (d, w, n) array
+        Growth of the stretched lengths with a displacement.
     load : (d, n) array
-        What the wires must not leave over.
+        Of the platform.
     pull, slope : (w, n) arrays
-        Tension at no step, and its growth by the stretched length.
+        Tension at no displacement, below zero where a wire is slack, and its growth by the stretched length.
+    """
+
+    K: Floats
+    J: Floats
+    load: Floats
+    pull: Floats
+    slope: Floats
+
+    def part(self, rows: NDArray[np.intp]) -> "_Quadratic":
+        return _Quadratic(*(getattr(self, f.name)[..., rows] for f in fields(_Quadratic)))
+
+    def tensions(self, move: Floats) -> Floats:
+        """(w, n) below zero where a wire is slack."""
+        return np.asarray(self.pull + self.slope * (self.J * move[:, None]).sum(0))
+
+    def unbalance(self, move: Floats) -> Floats:
+        """(d, n) the energy's slope."""
+        pulled = (self.J * np.maximum(self.tensions(move), 0.0)).sum(1)
+        return np.asarray(self.load + (self.K * move).sum(1) + pulled)
+
+    def least_with(self, taut: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
+        """Where the energy would be least if just these wires were taut, and whether it would."""
+        stiff, at_rest = np.where(taut, self.slope, 0.0), np.where(taut, self.pull, 0.0)
+        H = self.K + np.einsum("iwn,jwn->ijn", self.J * stiff, self.J)
+        return cholesky.solve(H, -(self.load + (self.J * at_rest).sum(1)))
+
+
+def _lowest(energy: _Quadratic, taut: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Displacements ``(n, d)`` of least energy, and the tensions ``(n, w)`` there.
+
+    Parameters
+    ----------
+    energy : _Quadratic
     taut : (w, n) bool array
         The first guess.
     """
-    d, n = load.shape
-    step, tau = np.full((d, n), np.nan), np.full(pull.shape, np.nan)
-    rows = np.arange(n)
+    d, n = energy.load.shape
+    step, tau = np.full((d, n), np.nan), np.full(taut.shape, np.nan)
+    rows, here = np.arange(n), np.zeros((d, n))
     for _ in range(_SETS):
-        on = taut[:, rows]
-        along, stiff, at_rest = J[..., rows], np.where(on, slope[:, rows], 0.0), np.where(on, pull[:, rows], 0.0)
-        H = K[..., rows] + np.einsum("iwn,jwn->ijn", along * stiff, along)
-        unbalanced = load[:, rows] + (along * at_rest).sum(1)
-        move, positive = cholesky.solve(H, -unbalanced)
-        after = pull[:, rows] + slope[:, rows] * (along * move[:, None]).sum(0)
-        settled = positive & ((after > 0) == on).all(0)
-        done = rows[settled]
-        step[:, done], tau[:, done] = move[:, settled], np.maximum(after[:, settled], 0.0)
-        taut[:, rows] = after > 0
-        rows = rows[positive & ~settled]
-        if not rows.size:
+        there, positive = energy.least_with(taut)
+        settled = positive & ((energy.tensions(there) > 0) == taut).all(0)
+        done = np.flatnonzero(settled)
+        step[:, rows[done]] = there[:, done]
+        tau[:, rows[done]] = np.maximum(energy.tensions(there), 0.0)[:, done]
+        left = np.flatnonzero(positive & ~settled)
+        if not left.size:
             break
+        rows, energy, here, there = rows[left], energy.part(left), here[:, left], there[:, left]
+        here = here + _share(energy, here, there - here) * (there - here)
+        taut = energy.tensions(here) > 0
     return step.T, tau.T
+
+
+def _share(energy: _Quadratic, here: Floats, way: Floats) -> Floats:
+    """How much of a way ``(d, n)`` leads to its lowest point: ``(n,)``, 0 to 1."""
+    low, high = np.zeros(here.shape[1]), np.ones(here.shape[1])
+    whole = (energy.unbalance(here + way) * way).sum(0) <= 0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        down = (energy.unbalance(here + middle * way) * way).sum(0) <= 0
+        low, high = np.where(down, middle, low), np.where(down, high, middle)
+    return np.where(whole, 1.0, low)
 
 
 def approach(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import cholesky, statics
+from wirebayes.robot.mechanics import cholesky
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed
@@ -21,6 +21,7 @@ _TRUST = 0.5  # a step that ends further from its prediction, relative to its le
 # The longest prediction that is believed, of the robot's span, and rad: where wires slacken at the new lengths the
 # stiffness is all but singular, the prediction goes anywhere, and any jump would be within its trust.
 _FARTHEST, _FARTHEST_RAD = 0.05, 0.5
+_ASIDE = 1e-6  # of the platform's size: a disturbance too small to be seen, too large to be rounding
 _SMALL = 1e-7  # of the platform's size: so short a Newton step leaves only rounding
 _JUMP = 1e-7  # of the robot's span: the smallest jump that counts as one
 
@@ -106,14 +107,38 @@ def _step(
     near, ahead = mixed.approach(robot, wires, start, tension_N, lengths)
     predicted = mixed.moved(robot, start, ahead)
     there = forward.solve(robot, wires, *lengths, *near)
+    loose = np.flatnonzero(there.status == forward.NOT_HELD)
+    if loose.size:
+        _let_go(robot, wires, there, loose, lengths)
     turn = there.rotation @ np.swapaxes(predicted[1], -1, -2) - np.eye(3)
     off = np.maximum(
         np.linalg.norm(there.position_m - predicted[0], axis=1), robot.size_m * np.linalg.norm(turn, axis=(1, 2))
     )
+    # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
+    ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     close = off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
     close &= np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
     close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
     return there, np.asarray(there.found & close)
+
+
+def _let_go(
+    robot: Robot, wires: Wires, there: forward.Equilibria, loose: NDArray[np.intp], lengths: tuple[Floats, Floats]
+) -> None:
+    """Put in place of unstable balances the equilibria next to them, to which the least disturbance leads.
+
+    Where wires that were just not slack part from a symmetric platform, it tilts until some are taut again.
+    """
+    offset = np.broadcast_to(lengths[1], lengths[0].shape)
+    part, own = wires.part(loose), (lengths[0][loose], offset[loose])
+    balance = there.position_m[loose], there.rotation[loose]
+    stiffness = np.moveaxis(forward.balance_at(robot, part, *balance, *own)[1], -1, 0)
+    softest = np.linalg.eigh(stiffness)[1][..., 0]
+    aside = mixed.moved(robot, balance, _ASIDE * robot.size_m * softest)
+    found = forward.solve(robot, part, *own, *aside)
+    held = np.flatnonzero(found.found)
+    for field in fields(forward.Equilibria):
+        getattr(there, field.name)[loose[held]] = getattr(found, field.name)[held]
 
 
 def settle(
@@ -168,28 +193,3 @@ def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], length
     gradient, H = forward.balance_at(robot, wires, *start, *lengths)
     step, positive = cholesky.solve(H, -gradient)
     return np.where(positive, step, np.nan).T
-
-
-def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
-    """Smallest eigenvalue of the stiffness matrix, rotations in metres at the platform's edge.
-
-    Parameters
-    ----------
-    robot : Robot
-    wires : Wires
-    pose : (position, rotation)
-        (n, 3), m, and (n, 3, 3).
-    lengths : (zero, offset)
-        Zero-tension lengths (n, w) and lengths beyond the exit points, m.
-
-    Returns
-    -------
-    (n,) array
-        N/m; an equilibrium is stable where it is above zero.
-    """
-    turn = np.moveaxis(pose[1], 0, -1)
-    K = statics.stiffness(robot, wires, pose[0].T, turn, lengths[0].T, np.broadcast_to(lengths[1], lengths[0].shape).T)
-    scale = np.ones(robot.degrees)
-    scale[3:] = 1.0 / robot.size_m
-    K = np.where(np.isfinite(K), K, 0.0) * np.outer(scale, scale)
-    return np.where(np.isfinite(pose[0]).all(1), np.linalg.eigvalsh(K)[:, 0], np.nan)

@@ -23,7 +23,7 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import claim, control, drift, forward, inverse, path
+from wirebayes.robot.motion import claim, control, drift, forward, inverse, one_sided
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.pose import controllers, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
@@ -192,7 +192,7 @@ def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Float
     back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, x + 0.01 * robot.size_m, R)
     n = len(commands.zero_m)
     pose = np.repeat(x[None], n, 0), np.repeat(R[None], n, 0)
-    stiff = path.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
+    stiff = one_sided.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
     return {
         "solved": float(back.found.mean()),
         "statuses": {text: int((back.status == code).sum()) for code, text in forward.STATUS.items()},
