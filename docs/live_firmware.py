@@ -1,8 +1,9 @@
 """Take the creep off a standing Hangprinter's lines, through Klipper or RepRapFirmware. Try it with the motors off.
 
 The firmware goes on believing that its lines are rigid; each motor is moved by what its line has crept since the last
-time, and the firmware is not told. Lengths are in metres here and in millimetres there; a motor's positive direction
-must pay line out.
+time, and the firmware is not told. It counts straight millimetres from anchor to platform, wirebayes metres of the
+whole wire, which runs that way several times: `wire_m` and `straight_correction_m` turn one into the other. A motor's
+positive direction must pay line out.
 """
 
 import json
@@ -47,20 +48,20 @@ def to_reprapfirmware(gcode: str, host: str = "hangprinter.local") -> None:
 
 def correct(
     running: wb.LiveEstimator,
-    nominal_m: Callable[[], Sequence[float]],
+    straight_m: Callable[[], Sequence[float]],
     send: Callable[[Sequence[float]], None],
     hours: float,
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], None] = time.sleep,
 ) -> list[float]:
-    """Follow a robot and correct it once a second; `nominal_m` gives the lengths that the firmware believes in."""
-    sent = [0.0] * 4  # corrections that the motors have made, mm
+    """Follow a robot and correct it once a second; `straight_m` gives the lengths that the firmware believes in."""
+    sent = [0.0] * 4  # corrections that the motors have made, straight mm
     begin = clock()
     while (now := clock() - begin) < 3600 * hours:
-        nominal = list(nominal_m())
+        nominal = list(straight_m())
         actual = [length + 1e-3 * mm for length, mm in zip(nominal, sent, strict=True)]
-        pose = running.step(now, actual, nominal_m=nominal)
-        change = [1e3 * wanted - done for wanted, done in zip(pose.correction_m, sent, strict=True)]
+        pose = running.step(now, running.wire_m(actual), nominal_m=running.wire_m(nominal))
+        change = [1e3 * wanted - done for wanted, done in zip(pose.straight_correction_m, sent, strict=True)]
         if max(map(abs, change)) > LEAST_MM and pose.held == 1:
             send(change)
             sent = [done + mm for done, mm in zip(sent, change, strict=True)]
@@ -69,6 +70,6 @@ def correct(
 
 
 if __name__ == "__main__":
-    lengths = [1.6, 1.5, 1.55, 2.1]  # read them from the firmware while it moves
+    lengths = [1.66778, 1.87425, 1.63797, 1.99983]  # read them from the firmware while it moves
     estimator = wb.live("hangprinter-4", "out/fit/roc-line-1m")
     correct(estimator, lambda: lengths, lambda change: to_klipper(klipper(change)), hours=1.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wirebayes as wb
+from tests.robot import drawn
 from tests.robot.test_history import _joint_values_for, _line, _places
 from wirebayes.errors import InputError
 from wirebayes.robot.history.estimate import estimate
@@ -15,7 +16,7 @@ from wirebayes.robot.history.follow import clock_starts, follow
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
-from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics import firmware, schema
 from wirebayes.robot.motion import path
 
 TIMES = np.array([0, 60, 70, 400, 420, 900, 930, 2000, 2030, 3600.0])
@@ -243,15 +244,36 @@ def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
     live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
     nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     now, sent = [0.0], []
+    believed = (nominal - robot.beyond_m) / robot.lines
     made = sample.correct(
-        live, lambda: nominal, sent.append, 0.1, lambda: now[0], lambda s: now.__setitem__(0, now[0] + s)
+        live, lambda: believed, sent.append, 0.1, lambda: now[0], lambda s: now.__setitem__(0, now[0] + s)
     )
     assert len(sent) > 2
     np.testing.assert_allclose(np.sum(sent, 0), made)
-    assert np.linalg.norm(live.step(400.0, nominal + 1e-3 * np.array(made), nominal_m=nominal).position_m
+    assert np.linalg.norm(live.step(400.0, nominal + 1e-3 * robot.lines * made, nominal_m=nominal).position_m
                           - live._x[-1]) < 2e-4  # fmt: skip
     assert sample.klipper([1, 2, 3, -4]).splitlines()[3] == "FORCE_MOVE STEPPER=stepper_d DISTANCE=-4.0000 VELOCITY=2"
     assert sample.reprapfirmware([1, 2, 3, -4]) == "M120 G91 G1 H2 X1.0000 Y2.0000 Z3.0000 U-4.0000 F120 M121"
+
+
+def test_straight_lengths_of_drawn_robots_are_wires_and_taken_for_wires_are_refused():
+    rng = np.random.default_rng(11)
+    for kind in ("point-4", "point-5", "body-8"):
+        one = drawn.draw(kind, rng)
+        lines = rng.choice([3.0, 4.0], one.robot.legs)
+        robot = replace(one.robot, lines=lines, home_m=one.position_m)
+        live = LiveEstimator(robot, one.line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+        arm = robot.home_m + robot.platform_m - robot.exit_m
+        straight = np.linalg.norm(arm, axis=1)
+        wire = live.wire_m(straight)
+        np.testing.assert_allclose(wire, lines * straight + robot.beyond_m)
+        np.testing.assert_allclose(firmware.straight_of(robot, wire), straight)
+        if not robot.beyond_m.any():
+            with pytest.raises(InputError, match=r"whole wire.*wire_m\(\)"):
+                live.step(0.0, straight)
+        pose = live.step(0.0, wire)
+        np.testing.assert_allclose(pose.straight_correction_m * lines, pose.correction_m)
+        assert pose.held > 0
 
 
 def test_a_step_at_a_controllers_rate_takes_one_newton_step(monkeypatch):

@@ -1,4 +1,4 @@
-"""A log of a few stops far apart: its cost does not grow with the wires' stiffness, and its end is where it was sent."""
+"""A log of a few stops far apart: its cost does not grow with stiffness, and its end is where it was sent."""
 
 from dataclasses import replace
 

@@ -113,7 +113,7 @@ def next_step(result: Result[Any]) -> str:
     if isinstance(result, Pose):
         return _after_pose(result.summary(), folder)
     if isinstance(result, Calibration):
-        if not result.summary()["with_creep_model"]["converged"] or "misfit" in result.kinds:
+        if not result.summary()["usable"]:
             return "wirebayes calibrate with more poses, or once readings, --tension-sd and --reference-sd are checked"
         return f"set the lengths of {folder / 'calibrate.json'} in the controller"
     if isinstance(result, Check):

@@ -24,10 +24,11 @@ class LengthInterval(MeanAndSd):
 
 
 class EstimatedLengths(TypedDict):
-    """What one model of the wires makes of the readings, a value a wire."""
+    """What one model of the wires makes of the readings, a value a wire; `p_joint` tests readings and references."""
 
     converged: bool
     misfit: float
+    p_joint: float
     length_m: LengthInterval
     creep_strain: Numbers
     reference_error_mm: MeanAndSd
@@ -58,7 +59,7 @@ class Observed(TypedDict):
 
 
 class CalibratedPoses(TypedDict):
-    """None where the search did not converge."""
+    """None where the search did not converge; no joint values either where nothing holds the home pose."""
 
     pose_now: PoseNow | None
     joint_values_for_home_m: Numbers | None
@@ -108,6 +109,8 @@ class CalibrateJson(CalibratedPoses, Observed, Warned):
     robot: str
     holds: int
     read: int
+    usable: bool
+    misfit: float
     prior: CalibrationPrior
     with_creep_model: EstimatedLengths
     by_hooke_alone: EstimatedLengths

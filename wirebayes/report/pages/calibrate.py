@@ -21,7 +21,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
-from wirebayes.robot.self_calibration.answer import MISFIT
+from wirebayes.robot.self_calibration.answer import SIGNIFICANT
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -82,10 +82,10 @@ def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
             points.append(f"With {name} the search did not converge: do not use its lengths.")
         if result["misfit"] is None:
             continue
-        fits = "explains" if result["misfit"] < MISFIT else "cannot explain"
+        fits = "explains" if result["p_joint"] >= SIGNIFICANT else "does not explain"
         points.append(
             f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
-            f"{fits} the readings."
+            f"{fits} readings and reference lengths (joint test, p = {number(result['p_joint'], 2)})."
         )
     return Points("How far it can be trusted", points)
 
@@ -130,11 +130,15 @@ def _milli(value: float | None) -> str:
 
 def _next(found: CalibrateJson) -> list[Block]:
     joints = "No joint values are given: read more poses, or check the readings and their stated errors."
+    if found["with_creep_model"]["converged"]:
+        joints = "No tensions within the bounds hold the platform at its home pose: no joint values lead there."
     if found["joint_values_for_home_m"] is not None:
         values = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])
         joints = f"Joint values that bring the platform to its home pose now, m: {values}."
     rows = [[f"{v:.3f}" for v in place] for place in found["next_positions_m"]]
     caption = "Positions whose readings would shrink the lengths' uncertainty most, the most useful first."
+    if found["joint_values_for_home_m"] is not None and not found["usable"]:
+        joints = "Set nothing in the controller: readings, robot and wires contradict each other."
     return [
         Text(joints),
         Table(["x, m", "y, m", "z, m"], rows, caption),

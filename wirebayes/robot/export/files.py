@@ -72,11 +72,14 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         f"winch_min_force: {_joined(np.full(robot.legs, robot.rule.lowest_N), 'g', ', ')}  # N\n"
         f"winch_max_force: {_joined(np.full(robot.legs, robot.rule.highest_N), 'g', ', ')}  # N\n"
     )
+    if robot.drums is not None and robot.drums.radius_m.all():
+        growth = 1e3 * _spools(robot, robot.drums)[1]
+        text += f"winch_buildup_factor: {growth.mean():.5f}  # mm: {_joined(growth, '.5f', ', ')}\n"
     for leg, (letter, (x, y, z)) in enumerate(zip(STEPPERS, 1e3 * robot.exit_m, strict=False)):
         text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
         if robot.drums is not None and robot.drums.radius_m.all():
-            turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][leg]
-            text += f"rotation_distance: {turn:.4f}  # mm of wire a turn, at the origin; a buildup is left out\n"
+            turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][leg] / robot.lines[leg]
+            text += f"rotation_distance: {turn:.4f}  # straight mm a turn of the spool, at the origin\n"
             text += f"gear_ratio: {robot.drums.gear[leg]:g}:1\n"
     return text
 

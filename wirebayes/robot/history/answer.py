@@ -19,7 +19,7 @@ from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.drums import motor_angle
 from wirebayes.robot.motion import drift as drifting
@@ -34,6 +34,7 @@ _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
 _NAMED = 6  # times in a warning: as many as a line holds
+_INERTIA = 0.05  # of the weight: a force above it changes tensions by as much as the creep that is looked for
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
 
 
@@ -302,12 +303,38 @@ def _warnings(
             "the band; give a column hold to say it"
         )
         out.append(Notice("clock", text))
+    out += _dynamics(history.times_s, found.plain.position_m[0])
     holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
     longest = float(np.diff(history.times_s[holds]).max())
     lengths = inverse.lengths(robot, joint_m)[0]
     out += draws.warnings(robot, line, found.track.tension_N, longest, lengths)
     plain = found.plain
     return out + sag.warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
+
+
+def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
+    """That a platform accelerates too much for its inertia to be left out.
+
+    Parameters
+    ----------
+    times_s : (t,) array
+    position_m : (t, 3) array
+        Between two rows the motion is taken to be even.
+    """
+    if len(times_s) < 3:
+        return []
+    step = np.diff(times_s)
+    speed = np.diff(position_m, axis=0) / step[:, None]
+    share = np.linalg.norm(np.diff(speed, axis=0), axis=1) / (0.5 * (step[1:] + step[:-1])) / GRAVITY
+    share = np.where(np.isfinite(share), share, 0.0)
+    k = int(share.argmax())
+    if share[k] <= _INERTIA:
+        return []
+    text = (
+        f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {100 * share[k]:.2g} % of its weight "
+        "to accelerate it, so tensions and poses are those of a slower motion along the same way"
+    )
+    return [Notice("left-out", text)]
 
 
 def _pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> tuple[list[str], list[list[Any]]]:

@@ -17,11 +17,12 @@ from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, sensors, weight
 from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
+from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse, mixed, path
+from wirebayes.robot.motion import forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import CreepState, HoldCreep
 from wirebayes.typing import Floats
 
@@ -29,6 +30,7 @@ _LONG = 5e-2  # of the platform's size: a longer Newton step is followed with ca
 _AGAIN = 5e-3  # of the platform's size: after a shorter one, less than a micrometre is left
 _SHARE, _SHORT_S = 0.2, 1.0  # a step may last so much of its hold's age, and so long in any case
 _FAR = 8.0  # prior sd: a draw that readings move so far contradicts them (a wire is slack, say) and is left out
+_LEAP = 1.5  # times the length at the step before: straight lengths are at most half of a wire of several lines
 _REFRESH_S = 0.1  # what all readings say together changes slowly
 
 
@@ -50,7 +52,9 @@ class LivePose:
     joint_m, joint_sd_m : (w,) arrays
         Joint values that bring the platform to where the nominal joint values would hold it if no wire crept.
     correction_m : (w,) array
-        What that is beyond the nominal joint values.
+        What that is beyond the nominal joint values: wire of all lines.
+    straight_correction_m : (w,) array
+        The same in one line, as firmware counts: `correction_m` over the number of lines.
     tension_N : (w,) array
         Mean.
     held : float
@@ -73,6 +77,7 @@ class LivePose:
     joint_m: Floats
     joint_sd_m: Floats
     correction_m: Floats
+    straight_correction_m: Floats
     tension_N: Floats
     held: float
 
@@ -138,6 +143,23 @@ class LiveEstimator:
         self._live = np.ones(self._columns, bool)
         self._joint = np.empty((self._columns, robot.legs))
 
+    def wire_m(self, straight_m: ArrayLike) -> Floats:
+        """Joint values, ``(w,)`` m, of the straight lengths that firmware counts: ``lines x straight + beyond_exit``.
+
+        Parameters
+        ----------
+        straight_m : (w,) array
+            From exit point to platform point.
+
+        Raises
+        ------
+        InputError
+            A leg has a linear actuator, whose joint value is no length.
+        """
+        if self.robot.is_linear.any():
+            raise InputError(f"straight_m: found lengths; expected displacements of the actuators of {self.robot.name}")
+        return firmware.wire_of(self.robot, _vector("straight_m", straight_m, self.robot.legs))
+
     def load(self, mass_kg: float, centre_m: ArrayLike | None = None) -> None:
         """Set what the platform carries from now on beside its own mass.
 
@@ -175,7 +197,7 @@ class LiveEstimator:
         time_s : float
             Later than at the step before; at the first step the wires are new.
         joint_m : (w,) array
-            Joint values, corrections included.
+            Joint values, corrections included; a drum's is the length of the whole wire (`wire_m`).
         tension_N : (w,) array, optional
             NaN where a sensor was not read.
         tilt_rad : (2,) array, optional
@@ -213,7 +235,18 @@ class LiveEstimator:
         given, linear = _vector(name, values, self.robot.legs), self.robot.is_linear
         _check(name, given, np.isfinite(given) | ~linear, "a finite number")
         _check(name, given, (np.isfinite(given) & (given > 0)) | linear, "a finite length above 0")
+        unlikely = plausible.wrong(self.robot, given[None]) if self._leaps(given) else None
+        if unlikely is not None:
+            (_, leg), expected = unlikely
+            raise InputError(f"{name}[{leg}]: found {given[leg]:g}; expected {expected}; wire_m() turns straight ones")
         return given
+
+    def _leaps(self, given: Floats) -> bool:
+        """Whether joint values are the first, or far from the last: only those may be of another kind."""
+        if self._last == -np.inf:
+            return True
+        last, drum = self._joint[-1], ~self.robot.is_linear
+        return bool((np.maximum(given, last) > _LEAP * np.minimum(given, last))[drum].any())
 
     def _step(self, time_s: float, joint: Floats, nominal: Floats, readings: Floats) -> LivePose:
         """A step with arguments that are right; of all sensors, ``(w + 2,)``, NaN where one was not read."""
@@ -334,7 +367,7 @@ class LiveEstimator:
         joint = mean[6 : 6 + w]
         return LivePose(
             time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, sd[6 : 6 + w],
-            joint - nominal, mean[6 + w :], float(live.mean()),
+            joint - nominal, (joint - nominal) / self.robot.lines, mean[6 + w :], float(live.mean()),
         )  # fmt: skip
 
 

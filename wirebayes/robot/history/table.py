@@ -13,6 +13,7 @@ from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import plausible
 from wirebayes.typing import Floats
 from wirebayes.units import nearest
 from wirebayes.user_files import csv_rows, read_text
@@ -21,7 +22,6 @@ POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
 TILT = ("roll_deg", "pitch_deg")
 _LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
-_FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def parse(
         raise InputError(f"{source}: {place(line)}, column time_s: found {found}; expected a time after {before} s")
     history = _history(robot, columns, names, cells)
     if history.joint_m is not None:
-        wrong = _wrong_joint(robot, history.joint_m)
+        wrong = plausible.wrong(robot, history.joint_m)
         if wrong is not None:
             (row, leg), expected = wrong
             (line, texts), name = numbered[row + 1], columns.needed[1 + leg]
@@ -138,21 +138,6 @@ def parse(
                 found += f", which pays out {history.joint_m[row, leg]:.4g} m"
             raise InputError(f"{source}: {place(line)}, column {name}: found {found}; expected {expected}")
     return history
-
-
-def _wrong_joint(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
-    """Row, leg and what was expected of the first of ``(t, w)`` that pays out nothing or can only be millimetres."""
-    home = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
-    wires = robot.lines * np.maximum(np.linalg.norm(robot.exit_m - home, axis=1), robot.span_m) + robot.beyond_m
-    most = _FAR * float(wires.max())
-    for bad, expected in (
-        (~(joint_m > 0) & ~robot.is_linear, "a length above 0"),
-        (np.abs(joint_m) > most, f"metres, at most {most:.3g}, {_FAR:g} times the robot's size"),
-    ):
-        if bad.any():
-            row, leg = np.argwhere(bad)[0].tolist()
-            return (row, leg), expected
-    return None
 
 
 def _check_header(where: str, names: Sequence[str], columns: Columns) -> None:

@@ -118,8 +118,8 @@ def solve(
     loose = np.flatnonzero(status == NOT_HELD)
     if loose.size:  # by wires that are taut; those that are just not slack may hold it yet
         pose = at[:, loose].T, found.rotation[loose]
-        stiff = one_sided.lowest_stiffness(robot, wires.part(loose), pose, (zero[:, loose].T, offset[:, loose].T))
-        status[loose[stiff > 0]] = FOUND
+        held = one_sided.held(robot, wires.part(loose), pose, (zero[:, loose].T, offset[:, loose].T))
+        status[loose[held]] = FOUND
     return found
 
 

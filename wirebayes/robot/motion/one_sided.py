@@ -9,6 +9,7 @@ minimum on the unit sphere is an eigenvector of the form that adds all wires of 
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -39,7 +40,27 @@ def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], le
     (n,) array
         N/m; an equilibrium is stable where it is above zero. NaN where there is no pose.
     """
-    known = np.isfinite(pose[0]).all(1)
+    known, _, least, _ = _form(robot, wires, pose, lengths)
+    return np.where(known, least, np.nan)
+
+
+def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> NDArray[np.bool_]:
+    """Whether wires that are just not slack make balances stable that the taut ones alone leave loose, ``(n,)``.
+
+    Parameters
+    ----------
+    robot, wires, pose, lengths
+        As for `lowest_stiffness`.
+    """
+    known, touching, least, largest = _form(robot, wires, pose, lengths)
+    return np.asarray(known & touching.any(0) & (least > _APART * largest))
+
+
+def _form(
+    robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats, Floats]:
+    """Where there is a pose, which wires touch, ``(w, n)``, and the least and largest stiffness."""
+    known = np.asarray(np.isfinite(pose[0]).all(1))
     turn, zero = np.moveaxis(pose[1], 0, -1), lengths[0].T
     shape = statics.geometry(robot, pose[0].T, turn)
     stretched = statics.stretched(robot, shape, np.broadcast_to(lengths[1], lengths[0].shape).T)
@@ -49,13 +70,14 @@ def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], le
     scale[3:] = 1.0 / robot.size_m
     both = np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)[1], -1, 0)
     both = np.where(np.isfinite(both), both, 0.0) * (scale * scale.T)
-    least = np.linalg.eigvalsh(both)[:, 0]
+    values = np.linalg.eigvalsh(both)
+    least = values[:, 0].copy()
     along = statics.jacobian(robot, shape) * robot.lines[:, None] * scale[:, None]
     taut = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)[1]
-    for k in np.flatnonzero(known & touching.any(0) & (least <= 0)):
+    for k in np.flatnonzero(known & touching.any(0) & (least <= _APART * values[:, -1])):
         on = touching[:, k]
         least[k] = _least_of(both[k], along[:, on, k] * np.sqrt(taut[on, k]))
-    return np.where(known, least, np.nan)
+    return known, touching, least, values[:, -1]
 
 
 def _least_of(both: Floats, one_way: Floats) -> Floats:

@@ -21,7 +21,9 @@ CANDIDATES, NEXT = 200, 5
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
 # simulated sessions of every shipped robot it was off by at most 2.7 times their sum.
 _FAR = 10.0
-MISFIT = 1.5  # mean squared residual; of as few as 40 readings that agree, one session in a hundred exceeds it
+# Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
+# lengths that are wrong cost a crash.
+SIGNIFICANT = 0.01
 
 
 def answer(
@@ -51,34 +53,47 @@ def answer(
     if prior.bias_sd_N > 0:
         given["tension_bias_sd_N"] = prior.bias_sd_N
         given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
+    contradicted = _contradicted(robot, prior, session, known)
     content: CalibrateJson = {
         "version": 1,
         "robot": robot.name,
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
+        "usable": usable(known) and not contradicted,
+        "misfit": float(known.misfit[0]),
         "prior": given,
         "with_creep_model": _lengths(robot, prior, known),
         "by_hooke_alone": _lengths(robot, prior, plain),
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed)),
-        "warnings": to_json(
-            [*_unsure(known, plain), *_contradicted(robot, prior, session, known), *doubts(robot, prior.line)]
-        ),
+        "warnings": to_json([*_unsure(known, plain), *contradicted, *doubts(robot, prior.line)]),
     }
     return content, calibrated(robot, prior, session, known)
 
 
+def usable(known: Calibration) -> bool:
+    """Whether the lengths may be set in a controller.
+
+    Parameters
+    ----------
+    known : Calibration
+        Of one robot.
+    """
+    return bool(known.converged[0] and known.p_joint[0] >= SIGNIFICANT)
+
+
 def _poses(robot: Robot, prior: Prior, known: Calibration) -> CalibratedPoses:
-    """Where the robot is, and the joint values of its home; none where the search did not converge."""
+    """Where the robot is, and the joint values of its home; none where nothing holds it or nothing was found."""
     if not known.converged[0]:  # nobody should send the robot anywhere by it
         return {"pose_now": None, "joint_values_for_home_m": None}
     turn = rotation.vector(known.rotation)[0]
     joint = corrected(robot, prior, known, robot.home_m, rotation.matrix(robot.home_rotation_rad))[0]
+    held = bool(np.isfinite(joint).all())
     found: CalibratedPoses = {
         "pose_now": {"position_m": known.position_m[0], "rotation_vector_rad": turn},
-        "joint_values_for_home_m": joint,
+        "joint_values_for_home_m": joint if held else None,
     }
-    if robot.drums is not None:
+    if robot.drums is not None and held:
         found["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
     return found
 
@@ -91,12 +106,13 @@ def _unsure(known: Calibration, plain: Calibration) -> list[Notice]:
     if astray:
         text = f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}"
         return [Notice("not-converged", text)]
-    misfit = float(known.misfit[0])
-    if misfit < MISFIT:
+    if known.p_joint[0] >= SIGNIFICANT:
         return []
     text = (
-        f"the wires cannot explain the readings (mean squared residual {misfit:.3g}, expected about 1): do not use "
-        "these lengths; check --wires, the readings' units and signs, and --tension-sd"
+        "robot and wires do not explain the readings together with the reference lengths (joint test, "
+        f"p = {known.p_joint[0]:.2g}, mean squared residual {known.misfit[0]:.3g}): do not use these lengths; check "
+        "exit and platform points, which are taken as exact, --wires, the readings' units and signs, --tension-sd and "
+        "--reference-sd"
     )
     return [Notice("misfit", text)]
 
@@ -124,6 +140,7 @@ def _lengths(robot: Robot, prior: Prior, known: Calibration) -> EstimatedLengths
     found: EstimatedLengths = {
         "converged": bool(known.converged[0]),
         "misfit": float(known.misfit[0]),
+        "p_joint": float(known.p_joint[0]),
         "length_m": {
             "mean": known.length_m[0],
             "sd": known.length_sd_m[0],

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 from wirebayes.linear_algebra import inv, solve
 from wirebayes.robot.mechanics.description import Robot
@@ -17,6 +17,8 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
 from wirebayes.robot.self_calibration.start import start
 from wirebayes.typing import Floats
+
+_UNLEARNT = 1e-6  # of a prior's variance: of a length of which the readings say less, there is nothing to be tested
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,8 @@ class Calibration:
         Where it was at the beginning of every hold.
     misfit : (m,) array
         Mean squared standardised residual; well above one when the model cannot explain the readings.
+    p_joint : (m,) array
+        Probability that readings and reference lengths as stated contradict model and priors as much (`_joint_test`).
     converged : (m,) bool array
     """
 
@@ -49,6 +53,7 @@ class Calibration:
     begun_m: Floats
     begun_rotation: Floats
     misfit: Floats
+    p_joint: Floats
     converged: NDArray[np.bool_]
 
     def interval(self, probability: float = 0.9) -> tuple[Floats, Floats]:
@@ -113,8 +118,35 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
     return Calibration(
         mean + white @ root.T, root @ spread @ root.T, here.length_m, np.sqrt(variance), here.creep,
         here.position_m[:, -1], here.rotation[:, -1], here.begun_m, here.begun_rotation, misfit,
-        converged & here.solved,
+        _joint_test(cost, readings.shape[1], white, spread, robot.legs), converged & here.solved,
     )  # fmt: skip
+
+
+def _joint_test(cost: Floats, count: int, white: Floats, spread: Floats, legs: int) -> Floats:
+    """Probability ``(m,)`` of readings and estimates that contradict model and priors at least as much.
+
+    Under the model the least sum of squares, residuals and unknowns in units of their errors, is chi-squared with as
+    many degrees of freedom as there are readings. Geometry that is wrong, but held exact, often hides in the reference
+    lengths, which are few among them all; so those are tested alone too: the covariance of their estimates is what the
+    readings took off that of their prior. The smaller of both probabilities counts, times two.
+
+    Parameters
+    ----------
+    cost : (m,) array
+        Sum of squares at the mode.
+    count : int
+        Number of readings.
+    white : (m, d) array
+        Mode in units of the prior, references first.
+    spread : (m, d, d) array
+        Posterior covariance in these units.
+    legs : int
+    """
+    reference = white[:, :legs, None]
+    learnt = (1.0 + _UNLEARNT) * np.eye(legs) - spread[:, :legs, :legs]
+    moved = (reference * solve(learnt, reference)).sum((1, 2))
+    least = np.minimum(chi2.sf(cost, count), chi2.sf(moved, legs))
+    return np.asarray(np.minimum(1.0, 2.0 * least))
 
 
 def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats, rotation: Floats) -> Floats:

@@ -10,6 +10,7 @@ from wirebayes.errors import InputError
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import plausible
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.typing import Floats
 from wirebayes.user_files import csv_rows, read_text
@@ -149,6 +150,11 @@ def parse(
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
     if motors and robot.drums is not None:
         joint = np.where(_motors(robot), paid_out(robot.drums, joint)[0], joint)
+    unlikely = plausible.wrong(robot, joint)
+    if unlikely is not None:
+        (row, leg), expected = unlikely
+        where = f"{source}: {place(numbered[row + 1][0])}, column {wanted[8 + leg]}"
+        raise InputError(f"{where}: found {table[row, 8 + leg]:.10g}; expected {expected}")
     motion = table[:, 8 + 2 * w : 8 + 3 * w] if moved else None
     measured = np.delete(table[:, 8 + w :], np.s_[w : 2 * w], axis=1) if moved else table[:, 8 + w :]
     read_here = np.isfinite(measured).all(1)
