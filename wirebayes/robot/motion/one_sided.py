@@ -70,7 +70,7 @@ def _form(
     scale[3:] = 1.0 / robot.size_m
     both = np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)[1], -1, 0)
     both = np.where(np.isfinite(both), both, 0.0) * (scale * scale.T)
-    values = np.linalg.eigvalsh(both)
+    values = np.asarray(np.linalg.eigvalsh(both), np.float64)
     least = values[:, 0].copy()
     along = statics.jacobian(robot, shape) * robot.lines[:, None] * scale[:, None]
     taut = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)[1]
