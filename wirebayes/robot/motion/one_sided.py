@@ -40,8 +40,7 @@ def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], le
     (n,) array
         N/m; an equilibrium is stable where it is above zero. NaN where there is no pose.
     """
-    known, _, least, _ = _form(robot, wires, pose, lengths)
-    return np.where(known, least, np.nan)
+    return _bounds(robot, wires, pose, lengths)[1]
 
 
 def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> NDArray[np.bool_]:
@@ -52,14 +51,14 @@ def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple
     robot, wires, pose, lengths
         As for `lowest_stiffness`.
     """
-    known, touching, least, largest = _form(robot, wires, pose, lengths)
-    return np.asarray(known & touching.any(0) & (least > _APART * largest))
+    touching, least, largest = _bounds(robot, wires, pose, lengths)
+    return np.asarray(touching & (least > _APART * largest))
 
 
-def _form(
+def _bounds(
     robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats, Floats]:
-    """Where there is a pose, which wires touch, ``(w, n)``, and the least and largest stiffness."""
+) -> tuple[NDArray[np.bool_], Floats, Floats]:
+    """Where any wire is just not slack, and least and largest stiffness, ``(n,)`` each; NaN where there is no pose."""
     known = np.asarray(np.isfinite(pose[0]).all(1))
     turn, zero = np.moveaxis(pose[1], 0, -1), lengths[0].T
     shape = statics.geometry(robot, pose[0].T, turn)
@@ -77,7 +76,7 @@ def _form(
     for k in np.flatnonzero(known & touching.any(0) & (least <= _APART * values[:, -1])):
         on = touching[:, k]
         least[k] = _least_of(both[k], along[:, on, k] * np.sqrt(taut[on, k]))
-    return known, touching, least, values[:, -1]
+    return np.asarray(touching.any(0)), np.where(known, least, np.nan), values[:, -1]
 
 
 def _least_of(both: Floats, one_way: Floats) -> Floats:
