@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.clock import UNDERSTOOD, has_moments, looks_like_a_moment
-from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, unit_of
+from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, is_foreign, unit_of
 from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.two_clocks import finest, parting, times_of
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.readings import shown
 from wirebayes.sentences import listed
@@ -17,35 +18,46 @@ from wirebayes.units import nearest
 IGNORE = "ignore"
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
-# Words of English, German, French, Spanish, Italian, Portuguese, Dutch, Japanese and Chinese, without accents.
+# Words of English, German, French, Spanish, Italian, Portuguese, Dutch, Polish, Russian, Japanese, Chinese and Korean,
+# without accents.
 _WORDS: dict[Role, tuple[str, ...]] = {
     "hold": (
         "hold", "step", "stage", "segment", "cycle", "stufe", "schritt", "haltestufe", "palier", "etape", "pas",
-        "escalon", "paso", "passo", "gradino", "stap", "degrau", "段階",
+        "escalon", "paso", "passo", "gradino", "stap", "degrau", "krok", "ступень", "шаг", "段階", "步骤", "步", "단계",
     ),
     "displacement": (
         "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
         "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp",
-        "変位", "伸び", "位移", "伸长",
+        "przemieszczenie", "wydłuzenie", "перемещение", "удлинение", "ход", "смещение",
+        "変位", "伸び", "ストローク", "位移", "伸长", "伸長", "變形", "变形", "행정", "변위", "신율",
     ),
     "time": (
         "time", "elapsed", "seconds", "timestamp", "clock", "zeit", "uhrzeit", "zeitpunkt", "temps", "duree", "heure",
-        "tiempo", "tempo", "hora", "tijd", "時間", "时间",
+        "tiempo", "tempo", "hora", "tijd", "czas", "время", "時間", "时间", "時刻", "시간",
     ),
     "tension": (
         "tension", "force", "load", "loadcell", "pull", "kraft", "last", "zugkraft", "spannkraft", "effort", "charge",
         "fuerza", "carga", "forza", "carico", "tensione", "tracao", "forca", "kracht", "trekkracht",
-        "荷重", "張力", "力", "拉力", "载荷", "张力",
+        "siła", "obciazenie", "сила", "нагрузка", "усилие", "натяжение",
+        "荷重", "試験力", "張力", "力", "拉力", "载荷", "负荷", "张力", "荷載", "하중", "장력",
     ),
     "temperature": (
-        "temperature", "temp", "temperatur", "temperatura", "temperatuur", "raumtemperatur", "温度",
+        "temperature", "temp", "temperatur", "temperatura", "temperatuur", "raumtemperatur", "температура", "温度", "溫度", "온도",
     ),
 }  # fmt: skip
 _LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit only
-    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t",), "tension": ("f", "t"), "temperature": ("t", "ϑ"),
+    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t"), "temperature": ("t", "ϑ"),
 }  # fmt: skip
+# What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
+_OF_SAMPLE: dict[Role, tuple[str, ...]] = {
+    "displacement": ("strain", "verformung", "deformation", "deformacion", "deformazione", "ε", "e", "应变", "ひずみ"),
+    "tension": (
+        "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "s", "应力", "応力",
+    ),
+}  # fmt: skip
+_NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
 _BRACKET = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 _TAILS = (r"(.+?)\s*/\s*(\S+)$", r"(.+),\s*(\S+)$", r"(.+?)\s+in\s+(\S+)$", r"(.+)[_\s]+(\S+)$")
@@ -102,10 +114,8 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
     for role in ROLES:
         likely = [i for i in free if _may_be(table, i, role)] if role not in roles else []
         try:
-            if len(likely) > 1:
-                raise _several(table, likely, role)
             if likely:
-                roles[role] = _column(table, likely[0], role, None)
+                roles[role] = _one(table, likely, role)
         except Undecided as question:
             open_questions.append(question)
     if open_questions:
@@ -116,6 +126,51 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
         if role not in roles:
             raise _missing(table, free, role)
     return roles
+
+
+def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
+    """The column of a quantity among those that may be it."""
+    of_wire = [i for i in likely if not _is_of_sample(table, i, role)]  # a force before a stress
+    different = _without_copies(table, of_wire or likely)
+    if len(different) == 1:
+        return _column(table, different[0], role, None)
+    if role == "time":
+        return _one_clock(table, different)
+    raise _several(table, different, role)
+
+
+def _is_of_sample(table: RawTable, index: int, role: Role) -> bool:
+    unit = unit_of(table.units[index], role) or name_and_unit(table.header[index], role)[1]
+    return unit is not None and unit.of_sample
+
+
+def _without_copies(table: RawTable, likely: Sequence[int]) -> list[int]:
+    """The columns without those that repeat the numbers of one before them, in one unit."""
+    out: list[int] = []
+    for index in likely:
+        if not any(is_copy(table, index, other) for other in out):
+            out.append(index)
+    return out
+
+
+def is_copy(table: RawTable, column: int, other: int) -> bool:
+    """Whether two columns hold the same cells under the same unit."""
+    units = [table.units[i] or next(iter(_BRACKET.findall(table.header[i])), ("", ""))[1] for i in (column, other)]
+    return units[0] == units[1] and table.column(column) == table.column(other)
+
+
+def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
+    """The best of several columns of time that agree; a question where they do not."""
+    columns = [_column(table, index, "time", None) for index in likely]
+    times = [times_of(table, column.index, column.unit) for column in columns]
+    clocks = [clock for clock in times if clock is not None]
+    if len(clocks) < len(columns):
+        raise _several(table, likely, "time")
+    for column, clock in zip(columns[1:], clocks[1:], strict=True):
+        row = parting(clocks[0], clock)
+        if row is not None:
+            raise _several(table, likely, "time", f", which tell different times from line {table.rows[row].line} on")
+    return columns[finest(clocks)]
 
 
 def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
@@ -178,7 +233,7 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
         if unit is None:
             raise InputError(f"--map: found the unit {stated!r} for {header}, expected one of {role}{_units(role)}")
         return Column(role, index, header, unit)
-    if row_text not in ("", "-", "–", "1") and from_row is None and not moments:
+    if row_text not in _NO_UNIT and from_row is None and not moments:
         raise table.complain(table.header_line + 1, index, f"the unit {row_text!r}", f"one of {role}{_units(role)}")
     if from_header and from_row and (from_header.factor, from_header.offset) != (from_row.factor, from_row.offset):
         found = f"the units {from_header.text} in the header and {from_row.text} under it"
@@ -215,6 +270,8 @@ def _may_be(table: RawTable, index: int, role: Role) -> bool:
         found = (unit_of(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
         if found:
             units[other] = found
+    if not units and _has_foreign_unit(header, row_unit):
+        return False
     if role == "hold":
         return not units and _speaks_of(header, role)
     name = name_and_unit(header, role)[0] if role in units else header
@@ -222,7 +279,26 @@ def _may_be(table: RawTable, index: int, role: Role) -> bool:
         return False
     if not units and any(_speaks_of(header, other) for other in ROLES if other != role) and role != "time":
         return _best(header) == role
+    if role in units and units[role].of_sample and _words(name) & set(_OF_SAMPLE[role]):
+        return True
     return _speaks_of(name, role) or (role in units and plain(name) in _LETTERS.get(role, ()))
+
+
+def _has_foreign_unit(header: str, row_unit: str) -> bool:
+    """Whether a column is said to be in a unit that no quantity of a test has."""
+    if row_unit not in _NO_UNIT:
+        return True
+    bracket = _BRACKET.match(header)
+    return bracket is not None and is_foreign(bracket[2])
+
+
+def known_words(text: str) -> int:
+    """How many different words of a text name a quantity."""
+    return sum(any(_is_word(word, role) for role in ROLES) for word in _words(text))
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[^\W\d_]+", plain(text)))
 
 
 def _best(header: str) -> Role | None:
@@ -236,7 +312,7 @@ def _best(header: str) -> Role | None:
 
 
 def _speaks_of(text: str, role: Role) -> bool:
-    return any(_is_word(word, role) for word in re.findall(r"[^\W\d_]+", plain(text)))
+    return any(_is_word(word, role) for word in _words(text))
 
 
 def _is_word(word: str, role: Role) -> bool:
@@ -257,10 +333,11 @@ def plain(text: str) -> str:
     return unicodedata.normalize("NFC", joined).strip(" .:_#")
 
 
-def _several(table: RawTable, likely: Sequence[int], role: Role) -> Undecided:
+def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") -> Undecided:
     names = [table.header[i] for i in likely]
+    how = how or f", each of which may be the {role}"
     return Undecided(
-        f"{table.sheet.path}, line {table.header_line}: found {listed(names)}, each of which may be the {role}",
+        f"{table.sheet.path}, line {table.header_line}: found {listed(names)}{how}",
         "which one to read",
         {f"--map {name}={role}": name for name in names},
     )
@@ -272,7 +349,11 @@ def _missing(table: RawTable, free: Sequence[int], role: Role) -> InputError:
             _column(table, index, role, None)  # its unit is another quantity's, which is said
     names = [name for name in table.header if name]
     unit = UNITS[role]
+    encoding = table.sheet.encoding
+    hint = ""
+    if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
+        hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
     return InputError(
         f"{table.sheet.path}, line {table.header_line}: found no column of {role} among {', '.join(names)}, expected "
-        f'one; say which with --map "HEADER={role}" (or "HEADER={role} [{unit}]" where the header has no unit)'
+        f'one; say which with --map "HEADER={role}" (or "HEADER={role} [{unit}]" where the header has no unit){hint}'
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench import clock, workbook
-from wirebayes.io.bench.columns import Column, understand
+from wirebayes.io.bench.columns import Column, known_words, understand
 from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
 from wirebayes.io.bench.holds import Cut, Readings, cut
@@ -36,6 +36,7 @@ _COLUMN_ROLES: dict[str, Role] = {
     "hold": "hold", "displacement_mm": "displacement", "time_s": "time", "tension_N": "tension",
     "temperature_C": "temperature",
 }  # fmt: skip
+_SIZE: dict[Role, str] = {"displacement": "length", "tension": "area"}  # what a strain and a stress are times of
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
 FAR_STEPS = 2.0  # and this many times the range of the test
 _MISSING = "; where a reading is missing, delete its row"
@@ -50,11 +51,14 @@ class About:
     ----------
     name, material : str
     length_mm : float
+    area_mm2 : float or None
+        Of its cross-section, where it is known: turns stresses into tensions.
     """
 
     name: str
     material: str
     length_mm: float
+    area_mm2: float | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
         With file, line and column; `Undecided` where the file can be read in several ways.
     """
     table = find_table(_sheet(path, choices))
-    columns = understand(table, choices.mapping)
+    columns = _of_sample(table, understand(table, choices.mapping), about)
     table, notes = _complete(table, columns)
     decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
     notes = [_read_as(table, columns, decimal), *notes]
@@ -162,6 +166,22 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     return Converted(experiment, rows, header, notes, recording)
 
 
+def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> dict[Role, Column]:
+    """Columns whose units are those of this sample: strains times its length, stresses times its area."""
+    size = {"displacement": about.length_mm, "tension": about.area_mm2}
+    out = dict(columns)
+    for role, column in columns.items():
+        if column.unit is None or not column.unit.of_sample:
+            continue
+        times = size[role]
+        if times is None:
+            found = f"a stress in {column.unit.text}"
+            expected = "--area-mm2 A, the sample's cross-section, or a column of forces"
+            raise table.complain(table.header_line, column.index, found, expected)
+        out[role] = replace(column, unit=replace(column.unit, factor=column.unit.factor * times))
+    return out
+
+
 def _sheet(path: Path, choices: Choices) -> Sheet:
     raw = read_raw(path)
     if raw.startswith(workbook.SIGNATURE):
@@ -170,7 +190,8 @@ def _sheet(path: Path, choices: Choices) -> Sheet:
         raise InputError(f"{path}: found a workbook of Excel 2003 or older, expected xlsx or text; save it as xlsx")
     if choices.sheet is not None:
         raise InputError(f"{path}: found a text file, expected a workbook for --sheet {choices.sheet}")
-    return sheet_of_text(path, decode(path, raw))
+    text, encoding = decode(path, raw, known_words)
+    return sheet_of_text(path, text, encoding)
 
 
 def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, list[str]]:
@@ -218,6 +239,7 @@ def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> 
         unit = "" if stated or column.unit is None else f" in {column.unit.text}"
         how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
         how += " (its weight)" if column.unit and column.unit.is_mass else ""
+        how += f" (times the {_SIZE[role]})" if column.unit and column.unit.of_sample else ""
         parts.append(f"{role} from {column.header!r}{unit}{how}")
     comma = ", decimal comma" if decimal == "comma" else ""
     return f"{table.sheet.described}{comma}; {listed(parts)}"

@@ -1,6 +1,11 @@
-"""Bytes of a text file as text: UTF-8, UTF-16 and UTF-32 with and without a mark, else Western European."""
+"""Bytes of a text file as text: UTF-8, UTF-16 and UTF-32 with and without a mark, else the code page that makes sense.
+
+A header of three short words among numbers is too little for the statistics of letters by which detectors decide, but
+it has to hold words that name quantities: the first code page that yields most of them is the file's.
+"""
 
 import codecs
+from collections.abc import Callable
 from pathlib import Path
 
 from wirebayes.errors import InputError
@@ -11,6 +16,10 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"),
 )  # fmt: skip
 _NUL_SHARE = 0.2  # of the bytes: UTF-16 of digits has a half, text none
+# What benches write where it is no Unicode, Western Europe first: China, Japan, Korea, Taiwan, Cyrillic, Central Europe.
+_CODE_PAGES = ("cp1252", "latin-1", "gb18030", "cp932", "cp949", "big5", "cp1251", "koi8-r", "cp866", "cp1250")
+UNICODE = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32")  # beyond doubt: not worth a word
+_LINES = 200  # that may hold a preamble and the header
 
 
 def read_raw(path: Path) -> bytes:
@@ -27,15 +36,24 @@ def read_raw(path: Path) -> bytes:
     return raw
 
 
-def decode(path: Path, raw: bytes) -> str:
-    """The text of a file whatever its encoding.
+def decode(path: Path, raw: bytes, known_words: Callable[[str], int]) -> tuple[str, str]:
+    """The text of a file whatever its encoding, and the name of its encoding.
+
+    Parameters
+    ----------
+    path : Path
+        Named in messages.
+    raw : bytes
+    known_words : function of a text that returns a number
+        How many different words of it name a quantity.
 
     Raises
     ------
     InputError
         It is no text.
     """
-    encoding = next((name for mark, name in _MARKS if raw.startswith(mark)), None) or _unmarked(raw)
+    marked = next((name for mark, name in _MARKS if raw.startswith(mark)), None)
+    encoding = marked or _unmarked(raw) or _code_page(raw, known_words)
     try:
         text = raw.decode(encoding)
     except UnicodeDecodeError as error:
@@ -45,20 +63,29 @@ def decode(path: Path, raw: bytes) -> str:
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise InputError(f"{path}, line {line}: found binary data, expected text (CSV) or a workbook (xlsx)")
-    return text
+    return text, encoding
 
 
-def _unmarked(raw: bytes) -> str:
+def _unmarked(raw: bytes) -> str | None:
+    """UTF-8 or UTF-16 without a mark; None where it is neither."""
     start = raw[:4096]
     if start.count(0) > _NUL_SHARE * len(start):
         return "utf-16-le" if start[1::2].count(0) > start[::2].count(0) else "utf-16-be"
+    return "utf-8" if _decoded(raw, "utf-8") is not None else None
+
+
+def _code_page(raw: bytes, known_words: Callable[[str], int]) -> str:
+    """The first code page of those whose text has most words that name quantities."""
+    words = {}
+    for page in _CODE_PAGES:
+        text = _decoded(raw, page)
+        if text is not None:
+            words[page] = known_words("\n".join(text.splitlines()[:_LINES]))
+    return max(words, key=lambda page: words[page])  # latin-1 decodes everything
+
+
+def _decoded(raw: bytes, encoding: str) -> str | None:
     try:
-        raw.decode("utf-8")
+        return raw.decode(encoding)
     except UnicodeDecodeError:
-        return "latin-1" if any(0x80 <= byte < 0xA0 for byte in raw) and _undefined(raw) else "cp1252"
-    return "utf-8"
-
-
-def _undefined(raw: bytes) -> bool:
-    """Bytes that the Windows page leaves out."""
-    return any(byte in (0x81, 0x8D, 0x8F, 0x90, 0x9D) for byte in raw)
+        return None

@@ -5,6 +5,8 @@ import re
 from pathlib import Path
 
 from wirebayes.errors import InputError
+from wirebayes.io.bench import labview
+from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Row, Sheet, is_value
 
 _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
@@ -16,8 +18,16 @@ _SEPARATOR = re.compile(
 )  # the first line that Excel writes and obeys
 
 
-def sheet_of_text(path: Path, text: str) -> Sheet:
+def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     """Split text into cells.
+
+    Parameters
+    ----------
+    path : Path
+        Named in messages.
+    text : str
+    encoding : str
+        In which it was written.
 
     Raises
     ------
@@ -25,6 +35,8 @@ def sheet_of_text(path: Path, text: str) -> Sheet:
         No sign splits the lines into columns of numbers.
     """
     lines = text.splitlines() or [""]
+    if labview.is_measurement(lines):
+        return labview.sheet_of_measurement(path, lines, encoding)
     longest = max(range(len(lines)), key=lambda i: len(lines[i]))
     if len(lines[longest]) > LONGEST_LINE:
         found = f"a line of {len(lines[longest])} characters"
@@ -40,7 +52,10 @@ def sheet_of_text(path: Path, text: str) -> Sheet:
         line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
         expected = "cells between commas, semicolons, tabs or spaces"
         raise InputError(f"{path}, line {line}: found no columns of numbers, expected {expected}")
-    return Sheet(path, _rows(lines, best), described=f"{_NAMES.get(best, best)} between cells")
+    described = f"{_NAMES.get(best, best)} between cells"
+    if encoding in UNICODE:
+        return Sheet(path, _rows(lines, best), described=described)
+    return Sheet(path, _rows(lines, best), described=f"{described}, {encoding.upper()}", encoding=encoding)
 
 
 def _score(lines: list[str], sign: str) -> tuple[float, int, int]:

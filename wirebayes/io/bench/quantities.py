@@ -26,13 +26,24 @@ _SPELLINGS = {
     "stunden": "h", "heures": "h", "newton": "N", "newtons": "N", "kn": "kN", "kp": "kgf", "pond": "gf", "p": "gf",
     "kg-f": "kgf", "kg_f": "kgf", "lb-f": "lbf", "lb_f": "lbf", "lbsf": "lbf", "lbs": "lb", "n": "N",
     "millimeter": "mm", "inches": "inch", "\"": "inch",
+    "毫米": "mm", "厘米": "cm", "米": "m", "ミリ": "mm", "秒": "s", "分": "min", "分钟": "min", "小时": "h", "牛": "N",
+    "牛顿": "N", "千牛": "kN", "千克": "kg", "公斤": "kg", "克": "g",
+    "мм": "mm", "см": "cm", "м": "m", "мкм": "µm", "с": "s", "сек": "s", "мин": "min", "ч": "h", "мс": "ms", "н": "N",
+    "кн": "kN", "кгс": "kgf", "гс": "gf", "кг": "kg", "г": "g",
 }  # fmt: skip
 _TEMPERATURES = {
     "c": "degC", "°c": "degC", "ºc": "degC", "℃": "degC", "degc": "degC", "deg c": "degC", "celsius": "degC",
     "f": "degF", "°f": "degF", "ºf": "degF", "℉": "degF", "degf": "degF", "deg f": "degF", "fahrenheit": "degF",
     "k": "kelvin", "kelvin": "kelvin",
 }  # fmt: skip
-_UNIT = re.compile(r"[-−]?[A-Za-zµμ°º℃℉\"][A-Za-zµμ°ºC._ -]{0,15}")
+# Elongations as a share of the length.
+_STRAINS = {
+    "%": 0.01, "percent": 0.01, "prozent": 0.01, "‰": 0.001, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "mm/m": 0.001,
+    "µm/m": 1e-6, "um/m": 1e-6, "µε": 1e-6, "ustrain": 1e-6, "microstrain": 1e-6, "strain": 1.0, "ε": 1.0,
+}  # fmt: skip
+_LETTER = r"[^\W\d_]"
+_UNIT = re.compile(rf"[-−]?({_LETTER}|[°º℃℉\"])({_LETTER}|[°º._ -]){{0,15}}")
+_SQUARE = re.compile(r"(\^|\*\*)?2$|²$")
 _PINT = {"displacement": "mm", "time": "s", "tension": "N", "temperature": "degC"}
 
 
@@ -50,6 +61,8 @@ class Unit:
         Where values are written ``a:b`` or ``a:b:c``: seconds of one of the first part of two.
     is_mass : bool
         A mass that stands for its weight.
+    of_sample : bool
+        A strain, which is times the sample's length in mm, or a stress, which is times its area in mm².
     """
 
     text: str
@@ -57,6 +70,7 @@ class Unit:
     offset: float = 0.0
     clock: float | None = None
     is_mass: bool = False
+    of_sample: bool = False
 
     def convert(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in our unit; to twelve digits, as factors are binary and units decimal."""
@@ -68,22 +82,53 @@ class Unit:
 def unit_of(text: str, role: Role) -> Unit | None:
     """A unit of a quantity, or None where the text is none.
 
-    A minus before it changes the sign. Where a force is needed, a mass stands for its weight (kg, g, lb).
+    A minus before it changes the sign. Where a force is needed, a mass stands for its weight (kg, g, lb) and a stress
+    for that on the sample's area; a strain stands for a displacement.
     """
     text = text.strip()
     if role == "hold":
         return None
     if role == "time" and text.lower() in CLOCKS:
         return Unit(text, clock=CLOCKS[text.lower()])
+    bare = text.lstrip("-−").strip()
+    sign = -1.0 if bare != text else 1.0
+    share = _of_sample(bare, role)
+    if share is not None:
+        return Unit(text, sign * share, of_sample=True)
     if not _UNIT.fullmatch(text):
         return None
-    bare = text.lstrip("-−").strip()
     name = _TEMPERATURES.get(bare.lower()) if role == "temperature" else _spelling(bare)
     found = None if name is None else _converted(name, role)
     if found is None:
         return None
-    sign = -1.0 if bare != text else 1.0
     return Unit(text, sign * found[0], found[1], is_mass=found[2])
+
+
+def _of_sample(text: str, role: Role) -> float | None:
+    """The factor of a unit of strain, to a share of the length, or of stress, to MPa."""
+    if role == "displacement":
+        return _STRAINS.get(text.lower().replace("μ", "µ"))
+    return _stress(text) if role == "tension" else None
+
+
+@cache
+def _stress(text: str) -> float | None:
+    numerator, slash, area = text.partition("/")
+    if slash and not _SQUARE.search(area):
+        return None
+    spelled = f"{_spelling(numerator)}/({_SQUARE.sub('', area)})**2" if slash else text
+    return _factor(spelled, "MPa") if _UNIT.fullmatch(numerator) else None
+
+
+def is_foreign(text: str) -> bool:
+    """Whether a text is the unit of a quantity that no column has: a speed, a voltage, a titre."""
+    text = text.strip().replace("²", "**2").replace("^", "**")
+    if len(text) < 2 and text != "V":
+        return False  # a letter tells one sensor from another
+    try:
+        return bool(_registry().parse_units(text))
+    except Exception:  # pint raises whatever its parser raises
+        return False
 
 
 def _spelling(text: str) -> str:
@@ -109,6 +154,15 @@ def _converted(name: str, role: Role) -> tuple[float, float, bool] | None:
         zero, one = (float(units.Quantity(v, unit).to(target).magnitude) for v in (0.0, 1.0))
         return float(f"{one - zero:.12g}"), float(f"{zero:.12g}"), is_mass
     return None
+
+
+def _factor(text: str, target: str) -> float | None:
+    """What a value in a unit is multiplied by to be in another; None where it is no unit, or of another quantity."""
+    units = _registry()
+    try:
+        return float(f"{units.Quantity(1.0, units.parse_units(text)).to(target).magnitude:.12g}")
+    except Exception:  # pint raises whatever its parser raises
+        return None
 
 
 @cache

@@ -65,12 +65,15 @@ class Sheet:
         Whether people know its columns by letters.
     described : str
         How it was read: delimiter or sheet.
+    encoding : str
+        Of a text file.
     """
 
     path: Path
     rows: tuple[Row, ...]
     lettered: bool = False
     described: str = ""
+    encoding: str = "utf-8"
 
     def column_name(self, column: int) -> str:
         """A column as people count it."""

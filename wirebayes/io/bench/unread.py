@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wirebayes.io.bench.columns import Column, ignored, plain
+from wirebayes.io.bench.columns import Column, ignored, is_copy, plain
 from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.readings import shown
@@ -54,7 +54,14 @@ def unread(
     for index in left:
         if index not in said:
             _check_one_specimen(table, index, displacement_mm, time_s)
-    return [f"not read: {listed([repr(table.header[i]) for i in left])}"] if left else []
+    names = [repr(table.header[i]) + _same_as(table, i, columns) for i in left]
+    return [f"not read: {listed(names)}"] if left else []
+
+
+def _same_as(table: RawTable, index: int, columns: Mapping[Role, Column]) -> str:
+    """Which of the columns that are read a column repeats."""
+    copied = next((c for c in columns.values() if is_copy(table, index, c.index)), None)
+    return f" (the same numbers as {copied.header!r})" if copied else ""
 
 
 def _check_one_specimen(table: RawTable, index: int, x: Floats, time: Floats) -> None:

@@ -1,0 +1,81 @@
+"""LabVIEW's measurement files (LVM): two preambles, units in the second one, and segments below each other."""
+
+from pathlib import Path
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.sheet import Row, Sheet, is_value
+
+_SIGNATURE = "LabVIEW Measurement"
+_END = "***End_of_Header***"
+_TIMES = "X_Value"  # one column of times for all channels, or one before each of them
+
+
+def is_measurement(lines: list[str]) -> bool:
+    """Whether lines are those of an LVM file."""
+    return lines[0].strip("\ufeff\t ,").startswith(_SIGNATURE)
+
+
+def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") -> Sheet:
+    """The cells of an LVM file: the header of its channels, their units, and the readings of all segments.
+
+    Parameters
+    ----------
+    path : Path
+        Named in messages.
+    lines : list of str
+    encoding : str
+        In which they were written.
+
+    Raises
+    ------
+    InputError
+        There is no table of channels, or a later segment has other ones.
+    """
+    stated = next((line for line in lines if line.startswith("Separator")), "Separator\tTab")
+    sign = "," if "comma" in stated.lower() else "\t"
+    split = [[cell.strip() for cell in line.split(sign)] for line in lines]
+    heads = [i for i, cells in enumerate(split) if cells[0].startswith(_TIMES) or _is_head(split, i)]
+    if not heads:
+        raise InputError(f"{path}, line {len(lines)}: found no line {_TIMES}, expected a table of channels below it")
+    header, *others = heads
+    rows = [Row(header + 1, _filled(split[header])), _units(split, header)]
+    for head in others:
+        if split[head] != split[header]:
+            found = f"the channels {', '.join(filter(None, split[head]))}"
+            raise InputError(f"{path}, line {head + 1}: found {found}, expected those of line {header + 1}")
+    for number, cells in enumerate(split[header + 1 :], start=header + 2):
+        first = next((cell for cell in cells if cell), "")
+        if is_value(first):  # the preamble of another segment begins with words
+            rows.append(Row(number, _filled(cells)))
+    return Sheet(path, tuple(row for row in rows if row.cells), described="LabVIEW measurement", encoding=encoding)
+
+
+def _is_head(split: list[list[str]], i: int) -> bool:
+    """Whether a line stands below the second end of a header, in files whose times have another name."""
+    return i > 0 and split[i - 1][0] == _END and not is_value(split[i][0]) and len([c for c in split[i] if c]) > 1
+
+
+def _units(split: list[list[str]], header: int) -> Row:
+    """The row of units that the preamble of the channels states: one for each of them, times before or between."""
+    names = split[header]
+    labels, dimensions, line = list[str](), list[str](), header
+    for i, cells in enumerate(split[:header]):
+        if cells[0] == "Y_Unit_Label":
+            labels, line = cells[1:], i
+        elif cells[0] == "X_Dimension":
+            dimensions = cells[1:]
+    seconds = "s" if dimensions and all(d in ("", "Time") for d in dimensions) else ""
+    units, channel = list[str](), 0
+    for name in names:
+        if name.startswith(_TIMES):
+            units.append(seconds)
+        else:
+            units.append(labels[channel] if channel < len(labels) and name != "Comment" else "")
+            channel += 1
+    return Row(line + 1, _filled(units))
+
+
+def _filled(cells: list[str]) -> tuple[str, ...]:
+    """Cells without the empty ones at the end."""
+    count = max((i for i, cell in enumerate(cells, start=1) if cell), default=0)
+    return tuple(cells[:count])
