@@ -95,14 +95,20 @@ def test_a_recording_becomes_holds_of_thinned_readings(tmp_path):
     made = convert(path, About("wire", "line", 1000.0), Choices())
     holds = made.experiment.holds
     assert [hold.displacement_mm for hold in holds] == pytest.approx([level for *_, level in truth], abs=0.005)
-    assert all(1.3 < hold.time_s[0] < 1.9 and 59.5 < hold.duration_s < 61.0 for hold in holds)  # moves take 1 s
+    assert all(
+        1.3 < hold.time_s[0] < 1.9 and 59.5 < hold.time_s[-1] < hold.duration_s <= 61.1 for hold in holds
+    )  # moves take 1 s
     assert all(15 < hold.time_s.size <= KEPT for hold in holds)
-    assert any(f"{len(made.rows)} of" in note for note in made.notes)
+    readings = [row for row in made.rows if row[3] is not None]
+    assert any(f"{len(readings)} of" in note for note in made.notes)
+    # a hold lasts until the next one begins, in the middle of the move between them
+    starts = made.recording.start_s
+    assert [hold.duration_s for hold in holds[:-1]] == pytest.approx(np.diff(starts))
     assert made.experiment.resolution_N == 0.001
     assert made.recording is not None
     assert made.recording.start_s == pytest.approx([begin / 10.0 - 0.5 for begin, *_ in truth], abs=0.1)
     recorded = {f for _, f in zip(time, tension, strict=True)}
-    assert all(value in recorded for row in made.rows for value in row[3:])  # readings are kept, not averaged
+    assert all(value in recorded for row in readings for value in row[3:])  # readings are kept, not averaged
 
 
 WIRE = {"k1": 1200.0, "B": 0.5, "U": 0.8, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.0, "setting_sd": 0.0}
@@ -211,7 +217,7 @@ def test_rows_that_are_written_twice_are_left_out_as_before(tmp_path):
     rows = [f"{i},{1 + i // 12},{2 + i // 12 - i / 100:.2f}\n" * 2 for i in range(48)]
     path.write_text("Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
     made = convert(path, About("wire", "line", 1000.0), Choices())
-    assert len(made.rows) == 48
+    assert sum(row[3] is not None for row in made.rows) == 48
     assert "rows that repeat the row above left out: 48" in made.notes
 
 

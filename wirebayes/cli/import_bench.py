@@ -52,6 +52,16 @@ def import_bench(
         float | None,
         typer.Option("--zero-mm", metavar="MM", help="Displacement at which the wire has its zero-tension length."),
     ] = None,
+    area_mm2: Annotated[
+        float | None,
+        typer.Option(
+            "--area-mm2", metavar="A", help="Cross-section of the sample, which turns stresses into tensions."
+        ),
+    ] = None,
+    control: Annotated[
+        Literal["displacement", "force"] | None,
+        typer.Option("--control", help="What was set in each hold, where it is not evident; force: weights."),
+    ] = None,
     seed: Seed = 0,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -67,7 +77,7 @@ def import_bench(
 
     imported = run(
         raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
-        time_since=time_since, sheet=sheet, zero_mm=zero_mm, output=output,
+        time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control, output=output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
     )  # fmt: skip
     for line in imported.messages:

@@ -1,5 +1,7 @@
 """``import.json``: what was understood of raw files of a bench."""
 
+from typing import Literal
+
 from wirebayes.notice import Warned
 
 
@@ -9,7 +11,9 @@ class ImportedExperiment(Warned):
     raw: str
     length_mm: float
     material: str
+    control: Literal["displacement", "force"]
     resolution_N: float | None
+    resolution_mm: float | None
     holds: int
     readings: int
     notes: list[str]

@@ -14,6 +14,7 @@ from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.notice import named, to_json
 from wirebayes.user_files import read_bytes
+from wirebayes.wire.protocol import Control
 from wirebayes.workflows.options import PathLike, above_zero, check_choice, words
 from wirebayes.workflows.results import IMPORTED, ImportedTests, Place
 
@@ -31,6 +32,8 @@ def import_bench(
     time_since: TimeSince | None = None,
     sheet: str | None = None,
     zero_mm: float | None = None,
+    area_mm2: float | None = None,
+    control: Control | None = None,
     output: PathLike | None = None,
     ask: Callable[[Undecided], str] | None = None,
 ) -> ImportedTests:
@@ -61,6 +64,10 @@ def import_bench(
         Of a workbook with readings in several sheets.
     zero_mm : float, optional
         Reading of the displacement where the wire has its zero-tension length.
+    area_mm2 : float, optional
+        Cross-section of the samples, which turns stresses into tensions.
+    control : {"displacement", "force"}, optional
+        What was set in each hold, where the readings leave it open.
     output : path, optional
         Folder for ``NAME.toml``, ``NAME.csv`` and the picture ``NAME.svg``; a temporary one when left out.
     ask : function of an undecided question that returns one of its answers, optional
@@ -90,18 +97,22 @@ def import_bench(
         check_choice("decimal", decimal, get_args(Decimal))
     if time_since is not None:
         check_choice("time_since", time_since, get_args(TimeSince))
-    above_zero(("--length-mm", length_mm))
+    if control is not None:
+        check_choice("control", control, get_args(Control))
+    above_zero(("--length-mm", length_mm), *([] if area_mm2 is None else [("--area-mm2", area_mm2)]))
     paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
     names = _names(paths, name)
-    choices = Choices(words(mapping), decimal, time_since, sheet, None if zero_mm is None else float(zero_mm))
+    choices = Choices(words(mapping), decimal, time_since, sheet, None if zero_mm is None else float(zero_mm), control)
     tests: list[Converted] = []
     for path, called in zip(paths, names, strict=True):
-        test, choices = _decided(path, About(called, material or called, float(length_mm)), choices, ask)
+        about = About(called, material or called, float(length_mm), None if area_mm2 is None else float(area_mm2))
+        test, choices = _decided(path, about, choices, ask)
         tests.append(test)
     configuration = {
         "command": "import", "version": __version__,
         "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
-        "names": names, "length_mm": float(length_mm), "material": material, **vars(choices),
+        "names": names, "length_mm": float(length_mm), "material": material, "area_mm2": area_mm2,
+        **vars(choices),
     }  # fmt: skip
     place = Place.at(output)
     with open_run(place.path, configuration) as run:
@@ -151,10 +162,14 @@ def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> N
         sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {path.name}", *test.notes)]
         tables.append(toml_of(experiment, sentences))
         understood(experiment, folder / f"{experiment.name}.svg", test.recording)
+        steps = experiment.control == "displacement"
         content["experiments"][experiment.name] = {
             "raw": path.name, "length_mm": experiment.length_mm, "material": experiment.material,
-            "resolution_N": experiment.resolution_N or None, "holds": len(experiment.holds),
-            "readings": len(test.rows), "notes": test.notes, "warnings": to_json(data_checks.of_experiment(experiment)),
+            "control": experiment.control,
+            "resolution_N": (experiment.resolution or None) if steps else None,
+            "resolution_mm": None if steps else (experiment.resolution or None),
+            "holds": len(experiment.recorded_holds), "readings": sum(h.time_s.size for h in experiment.holds),
+            "notes": test.notes, "warnings": to_json(data_checks.of_experiment(experiment)),
         }  # fmt: skip
         write_text(folder / f"{experiment.name}.toml", tables[-1])
     if len(tests) > 1:

@@ -9,7 +9,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.clock import UNDERSTOOD, has_moments, looks_like_a_moment
 from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, is_foreign, unit_of
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.two_clocks import finest, parting, times_of
+from wirebayes.io.bench.two_clocks import best, clock_of, parting
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.readings import shown
 from wirebayes.sentences import listed
@@ -23,7 +23,8 @@ _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 _WORDS: dict[Role, tuple[str, ...]] = {
     "hold": (
         "hold", "step", "stage", "segment", "cycle", "stufe", "schritt", "haltestufe", "palier", "etape", "pas",
-        "escalon", "paso", "passo", "gradino", "stap", "degrau", "krok", "ступень", "шаг", "段階", "步骤", "步", "단계",
+        "escalon", "paso", "passo", "gradino", "stap", "degrau", "krok",
+        "ступень", "шаг", "段階", "步骤", "步", "단계",
     ),
     "displacement": (
         "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
@@ -44,15 +45,19 @@ _WORDS: dict[Role, tuple[str, ...]] = {
         "荷重", "試験力", "張力", "力", "拉力", "载荷", "负荷", "张力", "荷載", "하중", "장력",
     ),
     "temperature": (
-        "temperature", "temp", "temperatur", "temperatura", "temperatuur", "raumtemperatur", "температура", "温度", "溫度", "온도",
+        "temperature", "temp", "temperatur", "temperatura", "temperatuur", "raumtemperatur", "температура",
+        "温度", "溫度", "온도",
     ),
 }  # fmt: skip
 _LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit only
-    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t"), "temperature": ("t", "ϑ"),
+    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t"),
+    "temperature": ("t", "ϑ"),
 }  # fmt: skip
 # What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
 _OF_SAMPLE: dict[Role, tuple[str, ...]] = {
-    "displacement": ("strain", "verformung", "deformation", "deformacion", "deformazione", "ε", "e", "应变", "ひずみ"),
+    "displacement": (
+        "strain", "verformung", "deformation", "deformacion", "deformazione", "ε", "e", "应变", "ひずみ",
+    ),
     "tension": (
         "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "s", "应力", "応力",
     ),
@@ -154,7 +159,13 @@ def _without_copies(table: RawTable, likely: Sequence[int]) -> list[int]:
 
 
 def is_copy(table: RawTable, column: int, other: int) -> bool:
-    """Whether two columns hold the same cells under the same unit."""
+    """Whether two columns hold the same cells under the same unit.
+
+    Parameters
+    ----------
+    table : RawTable
+    column, other : int
+    """
     units = [table.units[i] or next(iter(_BRACKET.findall(table.header[i])), ("", ""))[1] for i in (column, other)]
     return units[0] == units[1] and table.column(column) == table.column(other)
 
@@ -162,15 +173,15 @@ def is_copy(table: RawTable, column: int, other: int) -> bool:
 def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
     """The best of several columns of time that agree; a question where they do not."""
     columns = [_column(table, index, "time", None) for index in likely]
-    times = [times_of(table, column.index, column.unit) for column in columns]
-    clocks = [clock for clock in times if clock is not None]
+    found = [clock_of(table, column.index, column.unit) for column in columns]
+    clocks = [clock for clock in found if clock is not None]
     if len(clocks) < len(columns):
         raise _several(table, likely, "time")
-    for column, clock in zip(columns[1:], clocks[1:], strict=True):
+    for clock in clocks[1:]:
         row = parting(clocks[0], clock)
         if row is not None:
             raise _several(table, likely, "time", f", which tell different times from line {table.rows[row].line} on")
-    return columns[finest(clocks)]
+    return columns[best(clocks)]
 
 
 def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:

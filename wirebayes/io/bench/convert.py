@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.io.bench import clock, workbook
 from wirebayes.io.bench.columns import Column, known_words, understand
+from wirebayes.io.bench.control import recognised
 from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
-from wirebayes.io.bench.holds import Cut, Readings, cut
+from wirebayes.io.bench.holds import cut, stretches
 from wirebayes.io.bench.numerals import decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.recorded import Cut, Readings
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet, is_number, is_value
 from wirebayes.io.bench.stamps import is_coarse, spread
@@ -31,12 +33,15 @@ from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
 from wirebayes.io.toml_keys import Keys
 from wirebayes.sentences import listed
 from wirebayes.typing import Floats
+from wirebayes.wire.protocol import Control
 
 _COLUMN_ROLES: dict[str, Role] = {
     "hold": "hold", "displacement_mm": "displacement", "time_s": "time", "tension_N": "tension",
     "temperature_C": "temperature",
 }  # fmt: skip
 _SIZE: dict[Role, str] = {"displacement": "length", "tension": "area"}  # what a strain and a stress are times of
+RESOLUTION: dict[Control, str] = {"displacement": "resolution_N", "force": "resolution_mm"}
+READS: dict[Control, Role] = {"displacement": "tension", "force": "displacement"}  # by what is set
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
 FAR_STEPS = 2.0  # and this many times the range of the test
 _MISSING = "; where a reading is missing, delete its row"
@@ -122,48 +127,132 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     table, notes = _complete(table, columns)
     decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
     notes = [_read_as(table, columns, decimal), *notes]
-    texts = {role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
-             and not (role == "time" and clock.has_moments(table, column.index))}  # fmt: skip
-    values = {role: _converted(columns[role], text) for role, text in texts.items()}
+    texts: dict[Role, list[str]] = {
+        role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
+        and not (role == "time" and clock.has_moments(table, column.index))
+    }  # fmt: skip
+    values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
     notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
-
-    def complain(row: int, role: str, found: str, expected: str) -> InputError:
-        return table.complain(table.rows[row].line, columns[role].index, found, expected)  # type: ignore[index]
-
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
-    step = evident_step(texts["displacement"]) or 0.0
-    unit = columns["displacement"].unit
-    readings = Readings(
-        values["displacement"], values["time"], hold, of_day, step * abs(unit.factor if unit else 1.0),
-        columns["time"].header, complain,
-    )  # fmt: skip
-    holds = cut(readings, choices.time_since)
+    recorded = _Recorded(table, columns, texts, values, hold, of_day)
+    control = choices.control or _control(recorded)
+    holds = cut(recorded.readings(control), choices.time_since)
     holds, thin = _thin(holds)
-    notes += numbering + holds.notes + thin + _missing_holds(holds)
-    resolution = _resolution(columns["tension"], texts["tension"])
+    notes += _what_was_set(control) + numbering + holds.notes + thin + _missing_holds(holds) + _one_hold(holds)
+    resolution = _resolution(columns[READS[control]], texts[READS[control]])
     if resolution:
-        notes.append(f"tensions are written in steps of {resolution:g} N: that is their resolution")
+        read, unit = READS[control], UNITS[READS[control]]
+        notes.append(f"{read}s are written in steps of {resolution:g} {unit}: that is their resolution")
     header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
-    rows: list[list[Any]] = []
-    origin: list[int] = []
-    for of_hold, number, level, times in zip(
-        holds.rows, holds.number, holds.displacement_mm, holds.time_s, strict=True
-    ):
-        for row, time in zip(of_hold, times, strict=True):
-            line = [number, level, _tidy(time), float(values["tension"][row])]
-            rows.append(line if "temperature" not in values else [*line, float(values["temperature"][row])])
-            origin.append(int(row))
-    experiment = _experiment(table, columns, header, rows, origin, about, resolution)
+    rows, origin = _rows(holds, values, control)
+    experiment = _experiment(table, columns, header, rows, origin, about, resolution, control)
     _check_direction(table, columns["displacement"], experiment)
     recording = None
     if holds.of_test:
-        since = values["time"] - values["time"][0]
+        since = holds.clock_s - holds.clock_s[0]
         starts = np.array([since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)])
         recording = Recording(since, values["displacement"], values["tension"], starts)
     return Converted(experiment, rows, header, notes, recording)
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """What a file records, before it is known what was set.
+
+    Attributes
+    ----------
+    table : RawTable
+    columns : dict of Role to Column
+    texts : dict of Role to list of str
+        Numbers as they were written.
+    values : dict of Role to (r,) array
+    hold : (r,) array of int or None
+    of_day : bool
+        Whether times are moments of a day.
+    """
+
+    table: RawTable
+    columns: dict[Role, Column]
+    texts: dict[Role, list[str]]
+    values: dict[Role, Floats]
+    hold: NDArray[np.int64] | None
+    of_day: bool
+
+    def complain(self, row: int, role: str, found: str, expected: str) -> InputError:
+        """The error of a cell.
+
+        Parameters
+        ----------
+        row : int
+            Of the table, from 0.
+        role : str
+            Of the column.
+        found, expected : str
+            As the message shows them.
+        """
+        return self.table.complain(self.table.rows[row].line, self.columns[role].index, found, expected)  # type: ignore[index]
+
+    def readings(self, control: Control) -> Readings:
+        """The same, by what was set."""
+        role: Literal["displacement", "tension"] = "displacement" if control == "displacement" else "tension"
+        unit = self.columns[role].unit
+        step = (evident_step(self.texts[role]) or 0.0) * abs(unit.factor if unit else 1.0)
+        return Readings(
+            role, self.values[role], self.values[READS[control]], self.values["time"], self.hold, self.of_day, step,
+            self.columns["time"].header, self.complain,
+        )  # fmt: skip
+
+
+def _control(recorded: _Recorded) -> Control:
+    """What was set, as the readings show it."""
+    unit = recorded.columns["tension"].unit
+    place = f"{recorded.table.sheet.path}, line {recorded.table.header_line}"
+    return recognised(
+        stretches(recorded.readings("force")), recorded.values["displacement"], recorded.values["tension"],
+        unit is not None and unit.is_mass, place,
+    )  # fmt: skip
+
+
+def _what_was_set(control: Control) -> list[str]:
+    if control == "displacement":
+        return []
+    return ["a test under weights or force control: tensions stay within holds while displacements drift"]
+
+
+def _one_hold(holds: Cut) -> list[str]:
+    if len(holds.rows) > 1:
+        return []
+    return [
+        "one hold: its readings do not tell the stiffness from the stretch at displacement zero; if that is known, say "
+        "preload_mm in the TOML file (0 where displacements count from the zero-tension length)"
+    ]
+
+
+def _rows(holds: Cut, values: Mapping[Any, Floats], control: Control) -> tuple[list[list[Any]], list[int]]:
+    """Rows of the readings' CSV, and the row of the table that each comes from.
+
+    A hold that went on after its last reading has a row without a reading at its end.
+    """
+    rows: list[list[Any]] = []
+    origin: list[int] = []
+    read = values[READS[control]]
+    for of_hold, number, level, times, end in zip(
+        holds.rows, holds.number, holds.setting, holds.time_s, holds.end_s, strict=True
+    ):
+        readings: list[tuple[float, float | None, int]] = [
+            (_tidy(time), float(read[row]), int(row)) for row, time in zip(of_hold, times, strict=True)
+        ]
+        if end is not None and _tidy(end) > readings[-1][0]:
+            readings.append((_tidy(end), None, readings[-1][2]))
+        for time, value, row in readings:
+            x, tension = (level, value) if control == "displacement" else (value, level)
+            temperature = None if value is None or "temperature" not in values else float(values["temperature"][row])
+            rows.append([number, x, time, tension, temperature][: 5 if "temperature" in values else 4])
+            origin.append(row)
+    return rows, origin
 
 
 def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> dict[Role, Column]:
@@ -287,7 +376,9 @@ def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[A
 def _check_direction(table: RawTable, column: Column, experiment: Experiment) -> None:
     """Refuse a displacement counted downwards: the wire pulls the more, the further it is below zero."""
     holds = experiment.recorded_holds
-    place, pull = (np.array(v) for v in zip(*((h.displacement_mm, h.tension_N.mean()) for h in holds), strict=True))
+    place, pull = (
+        np.array(v) for v in zip(*((np.mean(h.displacement_mm), np.mean(h.tension_N)) for h in holds), strict=True)
+    )
     if place.max() > 0 or not falls(place, pull):
         return
     found = f"displacements down to {place.min():g} mm, the further down the more tension"
@@ -371,14 +462,15 @@ def _tidy(time: float) -> float:
 
 def _experiment(
     table: RawTable, columns: dict[Role, Column], header: tuple[str, ...], rows: list[list[Any]], origin: list[int],
-    about: About, resolution: float | None,
+    about: About, resolution: float | None, control: Control,
 ) -> Experiment:  # fmt: skip
     """The experiment checked as the reader of files checks its own, blaming the raw file's lines."""
     keys = {"name": about.name, "material": about.material, "length_mm": about.length_mm}
-    extra = {"resolution_N": resolution} if resolution else {}
+    extra: dict[str, Any] = {"control": control} if control != "displacement" else {}
+    extra |= {RESOLUTION[control]: resolution} if resolution else {}
 
     def readings() -> Table:
-        texts = [[str(value) if isinstance(value, int) else repr(value) for value in row] for row in rows]
+        texts = [["" if value is None else repr(value) for value in row] for row in rows]
         return _RawReadings(table.sheet.path, list(header), texts, table, columns, origin)
 
     return experiment_of(_Options(table.sheet.path, "", None, keys | extra), readings)
@@ -419,8 +511,10 @@ def toml_of(experiment: Experiment, comments: Sequence[str] = ()) -> str:
     lines = [f"# {comment}" for comment in comments]
     lines += ["[[experiment]]", f"name = {_string(experiment.name)}", f"material = {_string(experiment.material)}"]
     lines.append(f"length_mm = {experiment.length_mm!r}")
-    if experiment.resolution_N:
-        lines.append(f"resolution_N = {experiment.resolution_N!r}")
+    if experiment.control != "displacement":
+        lines.append(f"control = {_string(experiment.control)}")
+    if experiment.resolution:
+        lines.append(f"{RESOLUTION[experiment.control]} = {experiment.resolution!r}")
     lines.append(f"readings = {_string(experiment.name + '.csv')}")
     return "\n".join(lines) + "\n"
 

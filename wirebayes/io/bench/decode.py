@@ -16,7 +16,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"),
 )  # fmt: skip
 _NUL_SHARE = 0.2  # of the bytes: UTF-16 of digits has a half, text none
-# What benches write where it is no Unicode, Western Europe first: China, Japan, Korea, Taiwan, Cyrillic, Central Europe.
+# What benches write where it is no Unicode: Western Europe first, then East Asia, Cyrillic, Central Europe.
 _CODE_PAGES = ("cp1252", "latin-1", "gb18030", "cp932", "cp949", "big5", "cp1251", "koi8-r", "cp866", "cp1250")
 UNICODE = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32")  # beyond doubt: not worth a word
 _LINES = 200  # that may hold a preamble and the header

@@ -1,6 +1,6 @@
-"""A continuous recording divided into holds: where the displacement stays constant, between moves.
+"""A continuous recording divided into holds: where what is set stays constant, between moves.
 
-The displacement is divided where its mean changes most, repeatedly (binary segmentation), until no division explains
+The setting is divided where its mean changes most, repeatedly (binary segmentation), until no division explains
 more than noise would. Neighbours at one level are joined; segments that are short or sloping are moves.
 """
 
@@ -41,17 +41,19 @@ class Plateau:
     left: int
 
 
-def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
-    """Where the displacement stays.
+def plateaus(x: Floats, time: Floats, step: float, shortest: float = SHORTEST_SHARE) -> list[Plateau]:
+    """Where the setting stays.
 
     Parameters
     ----------
     x : (r,) array
-        Displacement.
+        What was set: the displacement, or the tension.
     time : (r,) array
         Rising.
     step : float
-        To which displacements are written; 0 where it is not known.
+        To which settings are written; 0 where it is not known.
+    shortest : float
+        Share of the usual duration below which a stretch is a pause of a move.
 
     Returns
     -------
@@ -74,7 +76,7 @@ def plateaus(x: Floats, time: Floats, step: float) -> list[Plateau]:
             continue
         begin, end = _trimmed(x, begin, end, scatter)
         left, end = end, end - _hidden(x, begin, end, scatter) if end - begin > LONG * EDGE else end
-        if end - begin >= FEWEST and lasts >= SHORTEST_SHARE * usual:
+        if end - begin >= FEWEST and lasts >= shortest * usual:
             found.append(Plateau(begin, end, float(np.median(x[begin:end])), left))
     return found
 

@@ -132,8 +132,8 @@ def is_foreign(text: str) -> bool:
 
 
 def _spelling(text: str) -> str:
-    if text.endswith("N"):  # mN and MN differ in more than spelling
-        return text
+    if text.endswith("N") or text == "Nm":  # mN and MN, a torque and a nanometre differ in more than spelling
+        return text.replace("Nm", "N*m")
     return _SPELLINGS.get(text.lower(), text)
 
 

@@ -1,6 +1,7 @@
 """Two columns of time in one file: compared, so that one is read where both tell the same."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,37 +11,62 @@ from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.typing import Floats
 
-SAME_RATE = 1e-3  # of the time that has passed: a quartz is a hundred times better, a rounded unit is not
+SAME_RATE = 1e-3  # of the time that has passed: a quartz is a hundred times better
 
 
-def times_of(table: RawTable, column: int, unit: Unit | None) -> Floats | None:
-    """Times of a column in s, as far as they can be read without knowing the file's decimal sign; else None."""
+@dataclass(frozen=True)
+class Clock:
+    """A column of times.
+
+    Attributes
+    ----------
+    time_s : (r,) array
+    tick_s : float
+        The step to which they are written.
+    """
+
+    time_s: Floats
+    tick_s: float
+
+    @property
+    def restarts(self) -> bool:
+        """Whether it starts again somewhere."""
+        return bool((np.diff(self.time_s) < 0).any())
+
+
+def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
+    """A column as far as it can be read without knowing the file's decimal sign; else None.
+
+    Parameters
+    ----------
+    table : RawTable
+    column : int
+    unit : Unit or None
+        None for clocks and dates.
+    """
+    cells = [cell.replace(",", ".") for cell in table.column(column)]
+    places = max(len(cell.partition(".")[2]) for cell in cells)
     try:
         if has_moments(table, column):
-            return seconds(table, column, unit)[0]
-        values = np.array([float(cell.replace(",", ".")) for cell in table.column(column)])
+            return Clock(seconds(table, column, unit)[0], 10.0**-places)
+        values = np.array([float(cell) for cell in cells])
     except (InputError, ValueError):
         return None
-    return values * (1.0 if unit is None else unit.factor)
+    factor = 1.0 if unit is None else unit.factor
+    return Clock(values * factor, abs(factor) * 10.0**-places)
 
 
-def parting(first: Floats, second: Floats) -> int | None:
+def parting(first: Clock, second: Clock) -> int | None:
     """The first row at which two clocks have run apart, since one of them started again; None where they agree."""
-    starts = np.concatenate([[True], (np.diff(first) < 0) | (np.diff(second) < 0)])
+    a, b = first.time_s, second.time_s
+    starts = np.concatenate([[True], (np.diff(a) < 0) | (np.diff(b) < 0)])
     begin = np.maximum.accumulate(np.where(starts, np.arange(len(starts)), 0))
-    passed = first - first[begin], second - second[begin]
-    ticks = max(_tick(first), _tick(second))
-    apart = np.abs(passed[0] - passed[1]) > ticks * (1.0 + 1e-9) + SAME_RATE * np.maximum(*passed)
-    rows = np.flatnonzero(apart)
+    passed_a, passed_b = a - a[begin], b - b[begin]
+    allowed = 1.01 * max(first.tick_s, second.tick_s) + SAME_RATE * np.maximum(passed_a, passed_b)
+    rows = np.flatnonzero(np.abs(passed_a - passed_b) > allowed)
     return int(rows[0]) if len(rows) else None
 
 
-def finest(clocks: Sequence[Floats]) -> int:
-    """Which of several clocks that agree is read: one that never starts again, then the one of the smallest step."""
-    return min(range(len(clocks)), key=lambda i: (bool((np.diff(clocks[i]) < 0).any()), _tick(clocks[i])))
-
-
-def _tick(times: Floats) -> float:
-    """The smallest step of a clock."""
-    steps = np.diff(times)
-    return float(steps[steps > 0].min(initial=np.inf)) if (steps > 0).any() else 0.0
+def best(clocks: Sequence[Clock]) -> int:
+    """Which of several clocks that agree is read: one that never starts again, then the one of the finest step."""
+    return min(range(len(clocks)), key=lambda i: (clocks[i].restarts, clocks[i].tick_s))

@@ -6,6 +6,7 @@ from typing import Literal
 
 from wirebayes.errors import InputError
 from wirebayes.sentences import listed
+from wirebayes.wire.protocol import Control
 
 Decimal = Literal["point", "comma"]
 TimeSince = Literal["hold", "test"]
@@ -27,6 +28,8 @@ class Choices:
         Of a workbook.
     zero_mm : float
         Reading of the displacement where the wire has its zero-tension length.
+    control : {"displacement", "force"} or None
+        What was set in each hold.
     """
 
     mapping: tuple[str, ...] = ()
@@ -34,6 +37,7 @@ class Choices:
     time_since: TimeSince | None = None
     sheet: str | None = None
     zero_mm: float | None = None
+    control: Control | None = None
 
     def with_option(self, option: str) -> "Choices":
         """These choices and one more, as the command line spells it: ``--decimal comma``."""

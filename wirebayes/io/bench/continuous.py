@@ -1,0 +1,125 @@
+"""Holds of a continuous recording: where what was set stays, each from the middle of the move to it.
+
+A wire creeps while it moves, to first order as if the whole move were made at that moment.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
+from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
+from wirebayes.typing import Floats
+
+ARRIVING = 2  # readings by which the end of a move is known: none of them counts
+LONG = 10  # times as many readings: shorter holds have none to spare
+AFTER_MOVE = 0.1  # of a hold at most is left out after a slow move
+SLACK = 0.05  # of what is read in the hold: a rest before it with less says nothing of the wire
+COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
+
+
+def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
+    """Holds of a continuous recording.
+
+    Raises
+    ------
+    InputError
+        The setting never stays, a stretch of it would be dropped, or times do not rise.
+    """
+    x, time = readings.setting, readings.time_s
+    stays = np.flatnonzero(np.diff(time) <= 0)
+    if len(stays):
+        row = int(stays[0]) + 1
+        found = f"{time[row]:g} s after {time[row - 1]:g} s"
+        raise readings.complain(row, "time", found, "times that rise")
+    found_holds = plateaus(x, time, readings.step)
+    kept = sum(p.end - p.begin for p in found_holds)
+    if not found_holds or kept < COVERED * len(x):
+        raise _too_few(readings, found_holds, kept)
+    if len(found_holds) == 1:
+        _check_only_hold(readings, found_holds[0])
+    lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
+    moves = [float(time[p.begin] - time[left]) for p, left in zip(found_holds, lefts, strict=True)]
+    zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
+    moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
+    rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
+    noise = noise_of(x, readings.step)
+    holds = f"{len(rows)} hold{'s' * (len(rows) != 1)}"
+    notes = [
+        *resets,
+        f"a continuous recording of {len(x)} readings: {holds} where the {readings.role} stays within "
+        f"{noise:.2g} {readings.unit} or so, {len(x) - kept} readings of moves dropped",
+        f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
+        f"{np.median(moves):.3g} s (median), and readings as soon after one are left out",
+    ]
+    since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
+    last_s = float(time[found_holds[-1].left - 1])
+    ends: list[float | None] = [end - zero for end, zero in zip([*zeros[1:], last_s], zeros, strict=True)]
+    return Cut(rows, list(range(1, len(rows) + 1)), [level_of(x[r]) for r in rows], since, ends, True, notes, time)
+
+
+def _check_only_hold(readings: Readings, hold: Plateau) -> None:
+    """Refuse a recording in which the setting stays elsewhere, too, but too shortly for a hold beside the only one.
+
+    A rest before the test, in which next to nothing was read, is none.
+    """
+    x, rows = readings.setting, len(readings.setting)
+    of_hold = abs(float(np.median(readings.read[hold.begin : hold.end])))
+    for rest in plateaus(x, readings.time_s, readings.step, shortest=0.0):
+        if rest.begin < hold.end and hold.begin < rest.end:
+            continue
+        slack = abs(float(np.median(readings.read[rest.begin : rest.end]))) <= SLACK * of_hold
+        if rest.end <= hold.begin and slack:
+            continue
+        raise _too_few(readings, [hold], rows)
+
+
+def _too_few(readings: Readings, found_holds: Sequence[Plateau], kept: int) -> InputError:
+    """The error of a recording without holds; a stretch that is short beside the only one passes for a move."""
+    rows = len(readings.time_s)
+    role = readings.role
+    other = "tension" if role == "displacement" else "displacement"
+    expected = f"{role}s that are held while {other} is read"
+    if len(found_holds) == 1 and kept >= COVERED * rows:
+        hold = found_holds[0]
+        before, after = hold.begin, rows - hold.left
+        if max(before, after) >= FEWEST:
+            row, where = (hold.begin, "from here on") if before >= after else (hold.left, "up to here")
+            passed = f"{before} readings before" if before >= after else f"{after} readings after"
+            found = f"one {role} that is held, {where}; the {passed} were taken for a move"
+            expected += "; if those are a hold, number the holds in a column, without the readings of the move"
+            return readings.complain(row, role, found, expected)
+    share = f"{100.0 * kept / rows:.0f} % of the readings"
+    found = f"a {role} that stays in {share}, {len(found_holds)} time{'s' * (len(found_holds) != 1)}"
+    row = found_holds[0].end if found_holds and found_holds[0].end < rows else 0
+    return readings.complain(row, role, found, f"{expected} (or a column of hold numbers)")
+
+
+def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:
+    """When the wire was moved to a hold: the mean time of the displacement's change, from the last reading before it.
+
+    Creep that follows each small part of a move adds up, to first order in the move's duration, to that of the whole
+    move made at this moment.
+    """
+    of_hold = time[hold.begin : hold.end]
+    paused = len(of_hold) < CONTINUOUS or time[hold.begin] - time[left] > PAUSE * float(np.median(np.diff(of_hold)))
+    if hold.begin == left or (hold.begin == left + 1 and paused):
+        return float(time[hold.begin])  # nothing was recorded on the way
+    on_the_way = x[left : hold.begin + 1].copy()
+    on_the_way[-1] = hold.level
+    whole = hold.level - on_the_way[0]
+    to_go = np.trapezoid(hold.level - on_the_way, time[left : hold.begin + 1])
+    lasts = float(time[hold.begin] - time[left])
+    return float(time[left]) + (float(np.clip(to_go / whole, 0.0, lasts)) if whole else 0.5 * lasts)
+
+
+def _after_move(time: Floats, hold: Plateau, move_s: float) -> NDArray[np.int64]:
+    """The rows of a hold that are as long after the move before it as that move took, or nearly all."""
+    rows = np.arange(hold.begin, hold.end)
+    since = time[rows] - time[hold.begin]
+    if move_s <= 0.0 or len(rows) <= LONG * ARRIVING:
+        return rows
+    wait = min(move_s, AFTER_MOVE * float(since[-1]))
+    return rows[max(ARRIVING, int(np.searchsorted(since, wait))) :]

@@ -1,0 +1,107 @@
+"""What was set in each hold: the displacement, as a machine does, or the tension, as weights do.
+
+Under steps the tension relaxes while the displacement stays; under weights the displacement creeps while the tension
+stays. Which of the two drifts within holds decides, in steps of the test: no scatter is taken for a drift.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from wirebayes.io.bench.undecided import Undecided
+from wirebayes.typing import Floats
+from wirebayes.wire.protocol import Control
+
+Rows = NDArray[np.int64]
+
+BY_CHANCE = 1e-3  # that scatter alone has such a trend: files without creep are common, and then steps are the rule
+BY_CHANCE_CONSTANT = 0.01  # where every hold has one tension to the last digit, which no relaxing wire has
+MORE = 3.0  # times as much of a step the one that is read must drift: less may be the compliance of a frame
+SEEN = 0.02  # of a step: smaller drifts of both are a machine's settling
+BLOCKS = 12  # means of a hold in which a trend is looked for: noise of a drive is no independent noise
+ROUNDING = 1e-6  # of what the trend explains: numbers without any noise are a computer's
+THIRD = 3  # the drift of a hold is from the mean of its first third to that of its last
+
+
+def recognised(by_tension: Sequence[Rows], displacement: Floats, tension: Floats, is_mass: bool, place: str) -> Control:
+    """What was set.
+
+    Parameters
+    ----------
+    by_tension : sequence of (k,) arrays of int
+        Rows of each stretch of three readings or more in which the tension stays.
+    displacement, tension : (r,) array
+    is_mass : bool
+        Whether tensions are given as masses.
+    place : str
+        Where the columns stand, for the question.
+
+    Raises
+    ------
+    Undecided
+        Both drift alike.
+    """
+    if not by_tension:
+        return "displacement"
+    creeps, relaxes = (trend_by_chance(by_tension, values) for values in (displacement, tension))
+    constant = all(np.ptp(tension[rows]) == 0.0 for rows in by_tension)
+    if constant and np.ptp(displacement[by_tension[0]]) > 0 and (is_mass or creeps < BY_CHANCE_CONSTANT):
+        return "force"
+    if creeps > BY_CHANCE:
+        return "displacement"
+    of_displacement, of_tension = (drift(by_tension, values) for values in (displacement, tension))
+    if of_displacement > MORE * of_tension:
+        return "force"
+    if of_tension > MORE * of_displacement or relaxes > BY_CHANCE or of_displacement < SEEN:
+        return "displacement"
+    answers = {"--control displacement": "the displacement", "--control force": "the tension, by weights or a machine"}
+    found = "displacement and tension that both drift within holds"
+    raise Undecided(f"{place}: found {found}", "which was set", answers)
+
+
+def trend_by_chance(groups: Sequence[Rows], values: Floats) -> float:
+    """How likely readings without a trend show as much of one as these.
+
+    Creep and relaxation are fast at first and slow down, so a trend is a straight line over the logarithm of the place
+    in the hold; what is left beside it is the noise.
+
+    Parameters
+    ----------
+    groups : sequence of (k,) arrays of int
+        Rows of each hold.
+    values : (r,) array
+
+    Returns
+    -------
+    float
+        The smaller probability of two tests, times two: of trends that go one way, and of any in each hold.
+    """
+    along, squares, left, free = [], [], 0.0, 0
+    for rows in groups:
+        blocks = np.array([part.mean() for part in np.array_split(values[rows], min(len(rows), BLOCKS))])
+        place = np.log1p(np.arange(len(blocks)))
+        place -= place.mean()
+        away = blocks - blocks.mean()
+        along.append(float(place @ away))
+        squares.append(float(place @ place))
+        left += float(away @ away) - along[-1] ** 2 / squares[-1]
+        free += len(blocks) - 2
+    explained = np.array(along) ** 2 / np.array(squares)
+    if not explained.any():
+        return 1.0
+    variance = max(left, ROUNDING * float(explained.sum())) / free
+    one_way = 2.0 * float(stats.t.sf(abs(sum(along)) / np.sqrt(sum(squares) * variance), free))
+    either = float(stats.f.sf(explained.mean() / variance, len(groups), free))
+    return min(1.0, 2.0 * min(one_way, either))
+
+
+def drift(groups: Sequence[Rows], values: Floats) -> float:
+    """By how much of a step values drift in a hold, counted along the step that led to it, on average."""
+    levels = np.array([np.median(values[rows]) for rows in groups])
+    steps = np.diff(levels, prepend=0.0 if len(groups) == 1 else levels[0] - np.sign(levels[-1] - levels[0]))
+    size = float(np.median(np.abs(steps[1:]))) if len(groups) > 1 else abs(float(levels[0]))
+    changes = [np.mean(values[rows[-third:]]) - np.mean(values[rows[:third]])
+               for rows in groups for third in (max(1, len(rows) // THIRD),)]  # fmt: skip
+    return abs(float(np.mean(np.sign(steps) * changes))) / size if size else 0.0

@@ -1,0 +1,123 @@
+"""Readings as a bench recorded them, and as holds: what the steps of an import hand on."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.quantities import UNITS
+from wirebayes.typing import Floats
+
+Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expected
+Rows = NDArray[np.int64]
+
+CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand
+PAUSE = 1.5  # of the usual interval between readings: a longer one is a pause in the recording
+STEADY = 0.25  # of the smallest step: less scatter in a hold is the encoder's
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Columns of numbers as a bench recorded them, in our units.
+
+    Attributes
+    ----------
+    role : {"displacement", "tension"}
+        What was set.
+    setting, read, time_s : (r,) array
+        What was set, what was read, and when.
+    hold : (r,) array of int or None
+    of_day : bool
+        Whether times are moments of a day, which restart nowhere.
+    step, time_name : float, str
+        To what the setting was rounded, 0 where it is not known; what the file calls the time.
+    complain : function
+        Makes the error of a cell.
+    """
+
+    role: Literal["displacement", "tension"]
+    setting: Floats
+    read: Floats
+    time_s: Floats
+    hold: NDArray[np.int64] | None
+    of_day: bool
+    step: float
+    time_name: str
+    complain: Complain
+
+    @property
+    def unit(self) -> str:
+        """Of the setting."""
+        return UNITS[self.role]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Readings cut into holds.
+
+    Attributes
+    ----------
+    rows : list of (k,) arrays of int
+        Of each hold.
+    number : list of int
+    setting : list of float
+        The displacement or the tension that was set.
+    time_s : list of (k,) arrays
+        Since the hold began.
+    end_s : list of float or None
+        When the hold ended, since it began; None where the recording does not say.
+    of_test : bool
+        Whether the file counts time from the beginning of the test.
+    notes : list of str
+        What was done, in sentences.
+    clock_s : (r,) array
+        Times of all rows as they were read, pieces of a recording joined.
+    """
+
+    rows: list[NDArray[np.int64]]
+    number: list[int]
+    setting: list[float]
+    time_s: list[Floats]
+    end_s: list[float | None]
+    of_test: bool
+    notes: list[str]
+    clock_s: Floats
+
+
+def restarts(readings: Readings) -> NDArray[np.bool_]:
+    """Where a clock that counts from a beginning starts again."""
+    falls = np.concatenate([[False], np.diff(readings.time_s) < 0])
+    return falls & (not readings.of_day)
+
+
+def changes(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Where a value is another than the one before."""
+    return np.concatenate([[False], np.diff(values) != 0])
+
+
+def groups_between(border: NDArray[np.bool_]) -> list[Rows]:
+    """The rows between borders; each is the first row of a group."""
+    return np.split(np.arange(len(border)), np.flatnonzero(border))
+
+
+def is_continuous(groups: Sequence[Rows]) -> bool:
+    """Whether groups have more readings than anybody writes by hand."""
+    return float(np.median([len(rows) for rows in groups])) >= CONTINUOUS
+
+
+def wanders(x: Floats, groups: Sequence[Rows]) -> bool:
+    """Whether a setting changes within a hold by more than a measured one scatters."""
+    within = max(float(np.ptp(x[rows])) for rows in groups)
+    steps = np.abs(np.diff([float(np.median(x[rows])) for rows in groups]))
+    steps = steps[steps > within]
+    return within > 0 and (not len(steps) or within > STEADY * float(steps.min()))
+
+
+def level_of(x: Floats) -> float:
+    """The median of displacements of one hold, with the digits that its standard error leaves."""
+    level, error = float(np.median(x)), float(np.std(x)) / np.sqrt(len(x))
+    digits = 6 if error == 0.0 else int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    return round(level, digits) + 0.0
