@@ -36,6 +36,13 @@ KINDS = {
     "unheld": Kind("No tensions hold the platform at a pose, or not those of every draw.", True),
     "fall": Kind("The platform falls or loses its hold, or is close to it.", True),
     "slack": Kind("A wire goes slack, or keeps little of its tension.", True),
+    "break": Kind("The tension falls to nothing and stays there: the wire broke or slipped.", True),
+    "saturation": Kind("A sensor or its amplifier stood at its upper limit while the setting moved.", True),
+    "clipped": Kind("A sensor or its amplifier stood at its lower limit while the setting moved.", True),
+    "tared": Kind(
+        "The tension falls to nothing and rises from there: the sensor was zeroed, or the wire slipped.", True
+    ),
+    "dropout": Kind("The tension falls to nothing for some readings and comes back.", True),
     "gross-error": Kind("A single reading looks wrong, and was set aside where it would have decided.", True),
     "data": Kind("Readings are not what a bench gives: their order, units, signs or noise.", True),
     "prior": Kind("The prior decides the answer, or contradicts the readings.", True),

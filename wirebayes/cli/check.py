@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import AsJson, ExperimentFile, ExperimentName, OwnEffects, Quiet, Seed
+from wirebayes.cli.options import AsJson, DropBreaks, ExperimentFile, ExperimentName, OwnEffects, Quiet, Seed
 
 
 def check(
@@ -18,6 +18,7 @@ def check(
     seed: Seed = 0,
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
+    drop_breaks: DropBreaks = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -30,7 +31,10 @@ def check(
     from wirebayes.workflows.check import check as run
 
     with progress() as report:
-        checked = run(file, experiment=experiment, own_effects=own_effects, seed=seed, output=output, progress=report)
+        checked = run(
+            file, experiment=experiment, own_effects=own_effects, drop_breaks=drop_breaks, seed=seed, output=output,
+            progress=report,
+        )  # fmt: skip
     for line in checked.messages:
         print(line, file=sys.stderr)
     print_answer(checked, as_json=as_json, quiet=quiet, kept=output is not None)

@@ -4,6 +4,7 @@ import sys
 
 from wirebayes.cli.options import (
     AsJson,
+    DropBreaks,
     ElasticLawOption,
     ExperimentFile,
     ExperimentName,
@@ -27,6 +28,7 @@ def discover(
     history: HistoryOption = "saturating",
     without: Without = None,
     own_effects: OwnEffects = None,
+    drop_breaks: DropBreaks = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -41,7 +43,8 @@ def discover(
     with progress() as report:
         findings = run(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
-            without=without or (), own_effects=own_effects, seed=seed, output=output, progress=report,
+            without=without or (), own_effects=own_effects, drop_breaks=drop_breaks, seed=seed,
+            output=output, progress=report,
         )  # fmt: skip
     for line in findings.messages:
         print(line, file=sys.stderr)

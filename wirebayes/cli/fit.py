@@ -7,6 +7,7 @@ import typer
 
 from wirebayes.cli.options import (
     AsJson,
+    DropBreaks,
     ElasticLawOption,
     ExperimentFile,
     ExperimentName,
@@ -43,6 +44,7 @@ def fit(
         bool,
         typer.Option("--check/--no-check", help="Check each fit against up to 999 refitted simulations (1 to 10 s)."),
     ] = True,
+    drop_breaks: DropBreaks = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -58,8 +60,8 @@ def fit(
     with progress() as report:
         fitted = run(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
-            likelihood=likelihood, effects=effect or (), own_effects=own_effects, together=together, check=check,
-            seed=seed, output=output, progress=report,
+            likelihood=likelihood, effects=effect or (), own_effects=own_effects, drop_breaks=drop_breaks,
+            together=together, check=check, seed=seed, output=output, progress=report,
         )  # fmt: skip
     for line in fitted.messages:
         print(line, file=sys.stderr)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from wirebayes.cli.options import AsJson, Output, Quiet, Seed
+from wirebayes.cli.options import AsJson, DropBreaks, Output, Quiet, Seed
 
 if TYPE_CHECKING:
     from wirebayes.io.bench.undecided import Undecided
@@ -54,14 +54,13 @@ def import_bench(
     ] = None,
     area_mm2: Annotated[
         float | None,
-        typer.Option(
-            "--area-mm2", metavar="A", help="Cross-section of the sample, which turns stresses into tensions."
-        ),
+        typer.Option("--area-mm2", metavar="A", help="Cross-section of the sample, for stresses."),
     ] = None,
     control: Annotated[
         Literal["displacement", "force"] | None,
         typer.Option("--control", help="What was set in each hold, where it is not evident; force: weights."),
     ] = None,
+    drop_breaks: DropBreaks = False,
     seed: Seed = 0,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -77,7 +76,8 @@ def import_bench(
 
     imported = run(
         raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
-        time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control, output=output,
+        time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control, drop_breaks=drop_breaks,
+        output=output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
     )  # fmt: skip
     for line in imported.messages:

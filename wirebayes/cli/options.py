@@ -39,6 +39,9 @@ LikelihoodOption = Annotated[
 OwnEffects = Annotated[
     Path | None, typer.Option("--own-effects", metavar="FILE.py", help="A Python file with effects of your own.")
 ]
+DropBreaks = Annotated[
+    bool, typer.Option("--drop-breaks", help="Leave out readings of breaks, of a sensor at its limit, and of dropouts.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON instead of a few lines.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing on standard output.")]
 Without = Annotated[

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.io import gross_events
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, times_run_on
 from wirebayes.notice import Notice
@@ -96,9 +97,14 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
     list of Notice
         What, where, what to change; empty for readings as a bench gives them.
     """
+    events = gross_events.of_readings(protocol, values, resolution)
+    gross = [Notice(event.kind, event.text) for event in events]
+    protocol, values = gross_events.left(protocol, values, events)
+    if not protocol.mask.any():
+        return gross
     readings = Readings(protocol, values, resolution)
     found = (check(readings) for check in CHECKS[protocol.control])
-    return [Notice("data", sentence) for sentence in found if sentence]
+    return [*gross, *(Notice("data", sentence) for sentence in found if sentence)]
 
 
 def of_experiment(experiment: Experiment) -> list[Notice]:

@@ -23,6 +23,7 @@ def check(
     *,
     experiment: str | None = None,
     own_effects: PathLike | None = None,
+    drop_breaks: bool = False,
     seed: int = 0,
     output: PathLike | None = None,
     progress: Progress | None = None,
@@ -39,6 +40,8 @@ def check(
         This experiment only.
     own_effects : path, optional
         A Python file with effects of your own.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
     seed : int
     output : path, optional
         Folder for ``check.json`` and a picture of each experiment, ``NAME.svg``; a temporary one when left out.
@@ -68,7 +71,7 @@ def check(
     'no'
     """
     seed, own, report = check_seed(seed), path_of(own_effects), progress or silent
-    experiments = experiments_of(source, experiment)
+    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)
     configuration = {
         "command": "check", "version": __version__, "seed": seed, "own_effects": source_of(own),

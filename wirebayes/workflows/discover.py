@@ -52,6 +52,7 @@ def discover(
     history: History = "saturating",
     without: str | Sequence[str] = (),
     own_effects: PathLike | None = None,
+    drop_breaks: bool = False,
     seed: int = 0,
     output: PathLike | None = None,
     progress: Progress | None = None,
@@ -76,6 +77,8 @@ def discover(
         Effects to leave out of the catalogue.
     own_effects : path, optional
         A Python file with effects of your own, which join the catalogue.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
     seed : int
     output : path, optional
         Folder for the results, resumed or refused as by `fit`.
@@ -105,7 +108,7 @@ def discover(
     check_choice("history", history, get_args(History))
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, left_out = path_of(own_effects), words(without)
-    experiments = experiments_of(source, experiment)
+    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     if train_holds is not None:
         experiments = [e.first(train_holds) for e in experiments]
     kinds = catalogue_without(left_out, catalogue(own))

@@ -44,6 +44,7 @@ def fit(
     likelihood: Likelihood = "chain",
     effects: str | Sequence[str] = (),
     own_effects: PathLike | None = None,
+    drop_breaks: bool = False,
     together: str | None = None,
     check: bool = True,
     seed: int = 0,
@@ -75,6 +76,8 @@ def fit(
         Fit all samples of this material at once.
     check : bool
         Check each fit against up to 999 refitted simulations, half of them where these decide.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
     seed : int
         Same seed, same machine: same draws.
     output : path, optional
@@ -114,7 +117,7 @@ def fit(
         check_choice(option, value, known)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, keys = path_of(own_effects), words(effects)
-    experiments = experiments_of(source, experiment)
+    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     file = experiments[0].source
     if train_holds is not None:
         experiments = [e.first(train_holds) for e in experiments]

@@ -2,20 +2,22 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
 from wirebayes import __version__
 from wirebayes.errors import InputError
-from wirebayes.io import data_checks
+from wirebayes.io import data_checks, gross_events
 from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
 from wirebayes.io.bench.undecided import Choices, Decimal, TimeSince, Undecided
+from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.notice import named, to_json
 from wirebayes.user_files import read_bytes
 from wirebayes.wire.protocol import Control
-from wirebayes.workflows.options import PathLike, above_zero, check_choice, words
+from wirebayes.workflows.options import PathLike, above_zero, check_choice, without_breaks, words
 from wirebayes.workflows.results import IMPORTED, ImportedTests, Place
 
 TOGETHER = "experiments"  # the file of all, where there are several
@@ -34,6 +36,7 @@ def import_bench(
     zero_mm: float | None = None,
     area_mm2: float | None = None,
     control: Control | None = None,
+    drop_breaks: bool = False,
     output: PathLike | None = None,
     ask: Callable[[Undecided], str] | None = None,
 ) -> ImportedTests:
@@ -68,6 +71,8 @@ def import_bench(
         Cross-section of the samples, which turns stresses into tensions.
     control : {"displacement", "force"}, optional
         What was set in each hold, where the readings leave it open.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
     output : path, optional
         Folder for ``NAME.toml``, ``NAME.csv`` and the picture ``NAME.svg``; a temporary one when left out.
     ask : function of an undecided question that returns one of its answers, optional
@@ -107,11 +112,12 @@ def import_bench(
     for path, called in zip(paths, names, strict=True):
         about = About(called, material or called, float(length_mm), None if area_mm2 is None else float(area_mm2))
         test, choices = _decided(path, about, choices, ask)
-        tests.append(test)
+        tests.append(_without_breaks(test) if drop_breaks else test)
     configuration = {
         "command": "import", "version": __version__,
         "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
         "names": names, "length_mm": float(length_mm), "material": material, "area_mm2": area_mm2,
+        "drop_breaks": drop_breaks,
         **vars(choices),
     }  # fmt: skip
     place = Place.at(output)
@@ -149,6 +155,22 @@ def _decided(
             if ask is None:
                 raise
             choices = choices.with_option(ask(question))
+
+
+def _without_breaks(test: Converted) -> Converted:
+    """A test without the readings of its gross events: their rows say that the hold went on, and no more."""
+    events = gross_events.of_experiment(test.experiment)
+    kept = without_breaks(test.experiment)
+    dropped = {int(i) for event in events for i in event.readings}
+    read = test.header.index(READ[test.experiment.control])
+    rows, count = [], 0
+    for row in test.rows:
+        gone = row[read] is not None and count in dropped
+        count += row[read] is not None
+        rows.append([None if gone and column == read else value for column, value in enumerate(row)])
+    while count - 1 in dropped and rows[-1][read] is None:
+        rows.pop()
+    return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *(f"left out: {e.text}" for e in events)])
 
 
 def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.experiment import Experiment, read_experiments, select
+from wirebayes.io import gross_events
+from wirebayes.io.experiment import ENOUGH, Experiment, counted, enough, read_experiments, select
 from wirebayes.units import nearest
 
 PathLike = str | os.PathLike[str]
@@ -38,14 +39,41 @@ def words(value: str | Iterable[str] | None) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value or ())
 
 
-def experiments_of(source: Source, name: str | None = None) -> list[Experiment]:
+def experiments_of(source: Source, name: str | None = None, *, drop_breaks: bool = False) -> list[Experiment]:
     """The experiments of a file, or those given, or the named one of them.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+    name : str, optional
+    drop_breaks : bool
+        Whether readings of breaks, limits and dropouts are left out.
 
     Raises
     ------
     InputError
-        The file is wrong, there is no such experiment, or two have one name.
+        The file is wrong, there is no such experiment, or two have one name; what is left out leaves too few readings.
     """
+    experiments = _experiments_of(source, name)
+    return [without_breaks(e) for e in experiments] if drop_breaks else experiments
+
+
+def without_breaks(experiment: Experiment) -> Experiment:
+    """The experiment without the readings of its gross events.
+
+    Raises
+    ------
+    InputError
+        There are too few others.
+    """
+    kept = gross_events.without(experiment, gross_events.of_experiment(experiment))
+    if not enough(kept.holds):
+        found = f"{counted(kept.holds)} beside breaks, limits and dropouts"
+        raise InputError(f"{experiment.source}, experiment {experiment.name}: found {found}, expected {ENOUGH}")
+    return kept
+
+
+def _experiments_of(source: Source, name: str | None) -> list[Experiment]:
     if isinstance(source, str | os.PathLike):
         return select(read_experiments(Path(source)), name)
     if isinstance(source, Experiment):

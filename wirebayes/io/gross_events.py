@@ -1,0 +1,259 @@
+"""Gross events of a test: a break, a sensor at its limit, a zeroed sensor, a dropout, each with its readings.
+
+What is compared are readings with readings and settings with settings of the same test, so no unit matters. One list
+for `import`, `check`, `fit` and `discover`: they name the same events in the same words, and leave out the same
+readings where that is asked for.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import Hold, frozen
+from wirebayes.sentences import listed
+from wirebayes.typing import Floats
+from wirebayes.wire.protocol import Protocol
+
+NOTHING = 0.03  # of the reading before: no wire relaxes so far from one reading to the next
+SUBSTANTIAL = 0.1  # of the largest reading: a fall from less may be a wire that goes slack
+KEPT = 0.7  # of its first reading a hold keeps until a fall that is one; a wire that relaxes by more may go slack
+SUDDEN = 3.0  # times the time of the reading before: by then creep has gone on little further
+STAYED = 0.5  # of the reading before a dropout: the wire is still there; less is another zero
+AT_LIMIT = 3  # readings at one value, in two holds at least
+MOVED = 5.0  # steps and noise levels by which readings at a limit should differ: not by chance the same
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something gross that happened to the readings of a test.
+
+    Attributes
+    ----------
+    kind : str
+        ``break``, ``dropout``, ``tared``, ``saturation`` or ``clipped``.
+    text : str
+        What, where, what to do.
+    readings : (n,) array of int
+        Which of the test's readings, counted through all holds.
+    """
+
+    kind: str
+    text: str
+    readings: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Test:
+    """The readings of a test in one row.
+
+    Attributes
+    ----------
+    hold, number : (n,) array of int
+        Position among the recorded holds, and number, of each reading's hold.
+    setting, time_s, read : (n,) array
+    noise : float
+        Standard deviation of a reading beside the course of its hold; rounding at least.
+    what, unit : str
+        What is read.
+    """
+
+    hold: NDArray[np.int64]
+    number: NDArray[np.int64]
+    setting: Floats
+    time_s: Floats
+    read: Floats
+    noise: float
+    what: str
+    unit: str
+
+    def place(self, i: int) -> str:
+        """Where a reading stands."""
+        return f"hold {self.number[i]} from {self.time_s[i]:g} s on"
+
+    def holds(self, readings: NDArray[np.int64]) -> str:
+        """The holds of some readings, in words."""
+        numbers = np.unique(self.number[readings])
+        if len(numbers) > 2 and np.isin(self.number[readings[0] : readings[-1] + 1], numbers).all():
+            return f"holds {numbers[0]} to {numbers[-1]}"
+        return f"hold{'s' * (len(numbers) > 1)} {listed([str(n) for n in numbers])}"
+
+
+def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list[Event]:
+    """The gross events of a test.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    readings : (H, R) array
+        Tensions, or displacements where tensions were set; padded as the protocol is.
+    resolution : float
+        To which they were rounded; 0 where it is not stated.
+
+    Returns
+    -------
+    list of Event
+        In order of the test; none where the readings are as a bench gives them.
+    """
+    rows, _ = np.nonzero(protocol.mask)
+    if len(rows) < AT_LIMIT:
+        return []
+    each = [row[mask] for row, mask in zip(readings, protocol.mask, strict=True) if mask.any()]
+    forces = protocol.control == "displacement"
+    test = _Test(
+        np.unique(rows, return_inverse=True)[1], protocol.number[rows], protocol.setting[rows],
+        protocol.time_s[protocol.mask], readings[protocol.mask], _noise(each, resolution),
+        "tension" if forces else "displacement", "N" if forces else "mm",
+    )  # fmt: skip
+    # an elongation that returns to zero is a recovery, not a fall to nothing
+    found = [*(_falls(test) if forces else []), *_limits(test, resolution)]
+    return sorted(found, key=lambda event: int(event.readings[0]))
+
+
+def of_experiment(experiment: Experiment) -> list[Event]:
+    """The gross events of one test."""
+    return of_readings(experiment.protocol(), experiment.readings(), experiment.resolution)
+
+
+def left(protocol: Protocol, readings: Floats, events: Sequence[Event]) -> tuple[Protocol, Floats]:
+    """Protocol and readings without those of some events; holds keep their durations.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    readings : (H, R) array
+    events : sequence of Event
+    """
+    if not events:
+        return protocol, readings
+    kept = protocol.mask.copy()
+    rows, columns = np.nonzero(protocol.mask)
+    gone = np.concatenate([event.readings for event in events])
+    kept[rows[gone], columns[gone]] = False
+    first = np.argsort(~kept, axis=1, kind="stable")  # what is kept moves to the front of its hold
+
+    def moved(values: Floats) -> Floats:
+        return np.take_along_axis(np.where(kept, values, 0.0), first, axis=1)
+
+    warming = None if protocol.warming_K is None else moved(protocol.warming_K)
+    mask = np.take_along_axis(kept, first, axis=1)
+    return replace(protocol, time_s=moved(protocol.time_s), mask=mask, warming_K=warming), moved(readings)
+
+
+def without(experiment: Experiment, events: Sequence[Event]) -> Experiment:
+    """The experiment without the readings of some events.
+
+    Holds keep their durations; one that keeps no reading is unrecorded. Nothing is kept after a last reading.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    events : sequence of Event
+    """
+    dropped = np.unique(np.concatenate([np.empty(0, np.int64), *(event.readings for event in events)]))
+    holds: list[Hold] = []
+    begin = 0
+    for hold in experiment.holds:
+        own = np.arange(begin, begin + hold.time_s.size)
+        begin += hold.time_s.size
+        keep = ~np.isin(own, dropped)
+        if keep.all():
+            holds.append(hold)
+            continue
+        temperature = None if hold.temperature_C is None else frozen(hold.temperature_C[keep])
+        holds.append(replace(
+            hold, number=hold.number if keep.any() else None, time_s=frozen(hold.time_s[keep]),
+            readings=frozen(hold.readings[keep]), temperature_C=temperature if keep.any() else None,
+        ))  # fmt: skip
+    while holds and not holds[-1].recorded:
+        holds.pop()
+    if holds and begin - 1 in dropped:  # how long the last one was as it should be, its last reading says
+        holds[-1] = replace(holds[-1], duration_s=float(holds[-1].time_s[-1]))
+    return replace(experiment, holds=tuple(holds))
+
+
+def _noise(each: Sequence[Floats], resolution: float) -> float:
+    bends = [np.diff(row, 2) / np.sqrt(6.0) for row in each if len(row) > 2]
+    spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
+    return max(spread, resolution / np.sqrt(12.0))
+
+
+def _falls(test: _Test) -> list[Event]:
+    """Runs of readings that fall to nothing where the displacement did not: to the end, for a while, or to a new zero.
+
+    A wire that is unloaded may go slack, so it counts only within a hold or where the wire was stretched further.
+    """
+    read, events = test.read, list[Event]()
+    least = max(SUBSTANTIAL * float(read.max()), MOVED * test.noise)
+    i = 1
+    while i < len(read):
+        before = float(read[i - 1])
+        stretched = test.hold[i] == test.hold[i - 1] or test.setting[i] > test.setting[i - 1]
+        if before < least or not stretched or abs(read[i]) > NOTHING * before or not _held_before(test, i):
+            i += 1
+            continue
+        nothing = np.abs(read[i:]) <= NOTHING * before
+        end = i + (len(nothing) if nothing.all() else int(np.argmin(nothing)))
+        events.append(_fall(test, i, end))
+        i = len(read) if events[-1].kind != "dropout" else end
+    return events
+
+
+def _held_before(test: _Test, i: int) -> bool:
+    """Whether the tension had stayed before a fall: a wire may creep until it is slack, but not all at once."""
+    own = test.read[:i][test.hold[:i] == test.hold[i]]
+    sudden = test.time_s[i] <= SUDDEN * test.time_s[i - 1]
+    if len(own) > 1 and sudden:
+        return bool(own[-1] >= KEPT * own[0])
+    earlier = [test.read[test.hold == h] for h in np.unique(test.hold[test.hold < test.hold[i]])]
+    kept = [row[-1] / row[0] for row in earlier if len(row) > 1 and row[0] > 0]
+    return len(kept) > 1 and float(np.median(kept)) >= KEPT
+
+
+def _fall(test: _Test, begin: int, end: int) -> Event:
+    """The event of readings that fell to nothing, by what came after them."""
+    read, place = test.read, test.place(begin)
+    if end == len(read):
+        text = f"tension falls to 0 in {place} and stays there: did the wire break or slip? leave these readings out"
+        return Event("break", text, np.arange(begin, end))
+    if read[end] >= STAYED * read[begin - 1]:
+        count = end - begin
+        times = f"{count} reading{'s' * (count != 1)}"
+        text = f"tension falls to 0 in {place} for {times} and comes back: did the sensor drop out? leave them out"
+        return Event("dropout", text, np.arange(begin, end))
+    text = (
+        f"tension falls to 0 in {place} and rises from there: was the sensor zeroed, or did the wire slip? leave these "
+        "readings out, or add the tension that was taken off"
+    )
+    return Event("tared", text, np.arange(begin, len(read)))
+
+
+def _limits(test: _Test, resolution: float) -> list[Event]:
+    """The same extreme value again and again while the setting moves."""
+    events = []
+    set_what = "displacement" if test.unit == "N" else "tension"
+    step = max(resolution, test.noise)
+    for kind, value, word in (("saturation", test.read.max(), "largest"), ("clipped", test.read.min(), "smallest")):
+        at = np.flatnonzero(test.read == value)
+        expected = _slope_beside(test, at) * float(np.ptp(test.setting[at]))
+        slack = abs(value) <= NOTHING * float(np.abs(test.read).max())  # such a wire rightly reads nothing
+        if len(at) < AT_LIMIT or slack or expected <= MOVED * step:
+            continue
+        text = (
+            f"{len(at)} readings in {test.holds(at)} all read {value:g} {test.unit}, the {word} of the test, while the "
+            f"{set_what} changes: the sensor or its amplifier is at its limit; leave these readings out"
+        )
+        events.append(Event(kind, text, at))
+    return events
+
+
+def _slope_beside(test: _Test, at: NDArray[np.int64]) -> float:
+    """How far readings change with the setting between neighbouring holds without readings at a limit; the median."""
+    free = np.setdiff1d(test.hold, test.hold[at])
+    settings = np.array([test.setting[test.hold == h][0] for h in free])
+    means = np.array([test.read[test.hold == h].mean() for h in free])
+    moves = np.diff(settings)
+    slopes = np.abs(np.diff(means)[moves != 0.0] / moves[moves != 0.0])
+    return float(np.median(slopes)) if len(slopes) else 0.0
