@@ -76,8 +76,8 @@ def import_bench(
 
     imported = run(
         raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
-        time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control, drop_breaks=drop_breaks,
-        output=output,
+        time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control,
+        drop_breaks=drop_breaks, output=output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
     )  # fmt: skip
     for line in imported.messages:

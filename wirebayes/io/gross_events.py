@@ -20,6 +20,7 @@ from wirebayes.wire.protocol import Protocol
 NOTHING = 0.03  # of the reading before: no wire relaxes so far from one reading to the next
 SUBSTANTIAL = 0.1  # of the largest reading: a fall from less may be a wire that goes slack
 KEPT = 0.7  # of its first reading a hold keeps until a fall that is one; a wire that relaxes by more may go slack
+FEWEST, KEPT_IN_ALL = 3, 0.85  # earlier holds that show how little the wire relaxes, where its own hold cannot
 SUDDEN = 3.0  # times the time of the reading before: by then creep has gone on little further
 STAYED = 0.5  # of the reading before a dropout: the wire is still there; less is another zero
 AT_LIMIT = 3  # readings at one value, in two holds at least
@@ -209,7 +210,7 @@ def _held_before(test: _Test, i: int) -> bool:
         return bool(own[-1] >= KEPT * own[0])
     earlier = [test.read[test.hold == h] for h in np.unique(test.hold[test.hold < test.hold[i]])]
     kept = [row[-1] / row[0] for row in earlier if len(row) > 1 and row[0] > 0]
-    return len(kept) > 1 and float(np.median(kept)) >= KEPT
+    return len(kept) >= FEWEST and min(kept) >= KEPT_IN_ALL
 
 
 def _fall(test: _Test, begin: int, end: int) -> Event:
