@@ -9,7 +9,7 @@ ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
     {"errors", "typing", "notice"},
     {"json_files"},
-    {"linear_algebra", "resampling"},
+    {"linear_algebra", "means", "resampling"},
     {"units", "interrupt", "user_files"},
     {"workers"},
     {"wire"},
@@ -25,7 +25,7 @@ LAYERS: list[set[str]] = [
     {"workflows"},
     {"cli"},
 ]
-NEUTRAL = {"errors", "typing", "notice", "json_files", "linear_algebra", "resampling", "units", "user_files"}
+NEUTRAL = {"errors", "typing", "notice", "json_files", "linear_algebra", "means", "resampling", "units", "user_files"}
 ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
 MAY_USE_ROBOT = {"report", "reproduce", "workflows", "cli", "__init__"}
 

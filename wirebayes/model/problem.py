@@ -12,6 +12,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
+from wirebayes.means import geometric_mean
 from wirebayes.model import likelihoods
 from wirebayes.model.prior import Power, Prior, from_table, possible, scaled, wire_defaults
 from wirebayes.model.scales import NATURAL, Scales, Units, scales_of
@@ -237,9 +238,10 @@ class Problem:
 
     def _exponents(self, units: Units) -> dict[str, Power]:
         """For B and k2 of every material the exponent, and the logarithm of the ratio of the units raised to it."""
+        # a difference of logarithms, so that what was added in one unit goes to the last bit in the other
         logs = {
-            "B": ("U", np.log(_ratio("N", self.units, units))),
-            "k2": ("N", np.log(_ratio("s", self.units, units))),
+            "B": ("U", np.log(self.units.tension_N) - np.log(units.tension_N)),
+            "k2": ("N", np.log(self.units.time_s) - np.log(units.time_s)),
         }
         out = {}
         for name in (*self.names, *self.prior.fixed):
@@ -433,9 +435,7 @@ def _sample_in(sample: Sample, old: Units, new: Units) -> Sample:
 
 def _reference_length(members: Sequence[Experiment]) -> float:
     """Geometric mean of the lengths, mm: B belongs to it."""
-    lengths = {e.length_mm for e in members}
-    # one length is its own mean to the last bit, which exp(log) is not
-    return float(np.exp(np.mean(np.log([e.length_mm for e in members])))) if len(lengths) > 1 else max(lengths)
+    return geometric_mean(e.length_mm for e in members)
 
 
 def _material_priors(

@@ -6,12 +6,13 @@ in them (`wirebayes.model.prior`). Natural units, mm, N and s, come back where r
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from wirebayes.io.experiment import Experiment
+from wirebayes.means import geometric_mean
 
 _SMALLEST_STEP = 1e-3  # of the length: stands in where a test has no displacement at all
 TYPICAL_K1_N = 2000.0  # a light line, where nothing is said of a wire that is not tested yet
@@ -136,13 +137,3 @@ def typical_tension(tensions: Sequence[float] | np.ndarray) -> float:
     if positive.size:
         return float(np.median(positive))
     return float(np.abs(values).max(initial=0.0)) or 1.0
-
-
-def geometric_mean(values: Iterable[float]) -> float:
-    """Geometric mean of positive numbers; times a power of two where they all are, to the last bit."""
-    every = np.array(list(values), float)
-    if (every == every[0]).all():
-        return float(every[0])
-    mantissas, exponents = np.frexp(every)
-    whole, rest = divmod(int(exponents.sum()), len(every))
-    return float(np.ldexp(np.exp(np.log(mantissas).mean() + np.log(2.0) * rest / len(every)), whole))

@@ -11,10 +11,11 @@ from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
 from wirebayes.model.problem import FINEST, Sample
 from wirebayes.notice import Notice
+from wirebayes.results.prior_influence import leaning
 from wirebayes.typing import Floats
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 
-LOOSE_STEPS = 0.5  # setting error over the typical step: the displacements hardly order the holds then
+LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends at a half of: it presses against that
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
 QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer than a load cell resolves
 FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
@@ -40,7 +41,15 @@ def warnings(fit: Fit, sample: Sample) -> list[Notice]:
     prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
     readings = sample.readings[..., 0]
     of_readings = data_checks.warnings(sample.protocol, readings, sample.resolution)
-    return [*of_readings, *of_posterior(own, prior, sample)]
+    first = sample is fit.problem.samples[0]
+    columns = [name for name in fit.problem.names if _belongs(name, sample, shared=first)]
+    return [*of_readings, *of_posterior(own, prior, sample), *leaning(fit.problem.prior, theta, columns)]
+
+
+def _belongs(name: str, sample: Sample, *, shared: bool) -> bool:
+    """Whether a column is the sample's own, or one that it shares, which is said once."""
+    _, bracket, mark = name.partition("[")
+    return mark.rstrip("]") == sample.name if bracket and mark.rstrip("]") != sample.material else shared
 
 
 def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample: Sample) -> list[Notice]:

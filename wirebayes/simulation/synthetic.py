@@ -17,9 +17,10 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, SET, Hold, frozen
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
+from wirebayes.means import geometric_mean
 from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
-from wirebayes.model.scales import TYPICAL_K1_N, geometric_mean, planned_scales
+from wirebayes.model.scales import TYPICAL_K1_N, planned_scales
 from wirebayes.typing import Array
 from wirebayes.units import nearest
 from wirebayes.wire.control import READ_UNIT

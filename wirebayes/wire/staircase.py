@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.means import geometric_mean
 from wirebayes.wire import compiled, laws
 from wirebayes.wire.control import SETTINGS
 from wirebayes.wire.creep import Creep
@@ -364,4 +365,4 @@ def tension_reference(tensions: Sequence[float] | NDArray[Any]) -> float:
     """Geometric mean of the positive tensions, N; the constant that some effects and coordinates refer to."""
     values = np.asarray(tensions, float)
     values = values[values > 0]
-    return float(np.exp(np.log(values).mean())) if values.size else 1.0
+    return geometric_mean(values) if values.size else 1.0

@@ -1,0 +1,148 @@
+"""The same test in other units has the same answer: nothing in the toolkit has a scale of its own."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.effects import named
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.inference.transform import LogPosterior
+from wirebayes.io.arrays import from_arrays
+from wirebayes.io.experiment import Experiment
+from wirebayes.means import geometric_mean
+from wirebayes.model.problem import build
+from wirebayes.model.scales import NATURAL, Units, scales_of
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+
+EFFECTS = ("toe", "creep_threshold", "second_relaxation", "sensor_drift", "clamp_transient", "steady_creep")
+POWERS = [Units(2.0**-7, 2.0**10, 2.0**6), Units(2.0**9, 2.0**-20, 2.0**-10)]
+OTHERS = [Units(25.4, 4.448, 60.0), Units(1e-2, 1e-6, 1e4), Units(1e3, 1e6, 1e-3)]
+
+
+def simulated(seed: int, names: tuple[str, ...] = ("a",)) -> list[Experiment]:
+    """Steps up and down with readings of their own and rests, samples of different lengths."""
+    rng = np.random.default_rng(seed)
+    benches = [
+        Bench(name, length_mm=700.0 + 300.0 * i, resolution_N=0.0, displacements_mm=(1, 2.5, 3, 4, 6, 5.0, 7.5),
+              times_s=[[0.0, 20.0 + j, 75.0] for j in range(7)])
+        for i, name in enumerate(names)
+    ]  # fmt: skip
+    made = draw(benches, Truth({"k1": 900.0, "sensor_sd": 0.01, "setting_sd": 0.03, "preload": 0.5}), seed)
+    return [
+        from_arrays(
+            [n for n in sample.protocol.number for _ in range(4)],
+            [x for x in sample.protocol.setting for _ in range(4)],
+            [t for row in sample.protocol.time_s for t in (*row, row[-1] + 15.0)],
+            [y for row in sample.readings[..., 0] for y in (*row, np.nan)],
+            length_mm=sample.protocol.length_mm, name=sample.name, material="line", resolution_N=0.01 * rng.uniform(),
+        )
+        for sample in made.problem.samples
+    ]  # fmt: skip
+
+
+def under_weights(seed: int) -> list[Experiment]:
+    rng = np.random.default_rng(seed)
+    holds, x, t, y, carried = [], [], [], [], 0.0
+    for j, weight in enumerate((1.0, 2.0, 4.0, 3.0, 5.0)):
+        times = np.array([0.0, 10.0, 60.0, 200.0])
+        crept = carried + (0.08 * weight**0.9 - carried) * (1.0 - np.exp(-0.05 * times**0.7))
+        read = (1000.0 + crept) * (1.0 + weight / 800.0) - 1000.3 + 0.005 * rng.normal(size=4)
+        holds += [j + 1] * 4
+        x += read.tolist()
+        t += times.tolist()
+        y += [weight] * 4
+        carried = crept[-1]
+    return [from_arrays(holds, x, t, y, length_mm=1000.0, name="w", material="line", control="force")]
+
+
+def rewritten(experiment: Experiment, by: Units) -> Experiment:
+    """The same test with lengths, tensions and times multiplied."""
+    setting, reading = by.length_mm, by.tension_N
+    if experiment.control == "force":
+        setting, reading = reading, setting
+    holds = [
+        replace(
+            hold,
+            setting=hold.setting * setting,
+            readings=hold.readings * reading,
+            duration_s=hold.duration_s * by.time_s,
+            time_s=hold.time_s * by.time_s,
+            start_s=hold.start_s * by.time_s,
+        )
+        for hold in experiment.holds
+    ]
+    length = experiment.length_mm * by.length_mm
+    return replace(experiment, length_mm=length, resolution=experiment.resolution * reading, holds=tuple(holds))
+
+
+CASES = [
+    (simulated(1), (), "chain"),
+    (simulated(2), EFFECTS, "chain"),
+    (simulated(3), (), "hold"),
+    (simulated(4, ("a", "b")), ("toe", "sensor_nonlinearity"), "chain"),
+    (under_weights(5), ("creep_threshold", "sensor_drift"), "chain"),
+    (under_weights(6), (), "hold"),
+]
+
+
+def problems(case, by):
+    experiments, effects, likelihood = case
+    chosen = [named(name) for name in effects]
+    one = build(experiments, chosen, likelihood=likelihood)
+    other = build([rewritten(e, by) for e in experiments], chosen, likelihood=likelihood)
+    return one.in_units(one.own_units), other.in_units(other.own_units)
+
+
+@pytest.mark.parametrize("by", POWERS)
+@pytest.mark.parametrize("case", CASES)
+def test_for_powers_of_two_the_problem_in_its_own_units_has_the_same_bits(case, by):
+    one, other = problems(case, by)
+    for a, b in zip(one.samples, other.samples, strict=True):
+        for field in ("length_mm", "setting", "time_s", "mask", "duration_s"):
+            np.testing.assert_array_equal(getattr(a.protocol, field), getattr(b.protocol, field))
+        np.testing.assert_array_equal(a.readings, b.readings)
+        assert a.resolution == b.resolution and a.model == b.model
+    rng = np.random.default_rng(0)
+    z = LogPosterior(one).coordinates.to_sampled(one.prior.rvs(50, rng))
+    np.testing.assert_array_equal(LogPosterior(one)(z), LogPosterior(other)(z))
+
+
+@pytest.mark.parametrize("by", OTHERS)
+@pytest.mark.parametrize("case", CASES)
+def test_for_other_factors_the_log_posterior_is_the_same_at_mapped_parameters(case, by):
+    one, other = problems(case, by)
+    theta = one.prior.rvs(200, np.random.default_rng(0))
+    for a, b in ((one, other), (one, one.in_units(NATURAL).in_units(one.units))):
+        target, again = LogPosterior(a), LogPosterior(b)
+        value = target(target.coordinates.to_sampled(theta))
+        mapped = again(again.coordinates.to_sampled(theta))
+        np.testing.assert_allclose(mapped, value, rtol=1e-9, atol=1e-9)
+
+
+def test_a_fit_in_other_units_has_the_same_draws():
+    (experiment,) = simulated(7)
+    by = Units(2.0**7, 2.0**-10, 2.0**6)
+    policy = Policy(ensembles=2, walkers=32, ess=100, rounds=2, most_rounds=2, round_draws=512, most_steps=32)
+    one, other = (fit(build([e]), 3, policy=policy) for e in (experiment, rewritten(experiment, by)))
+    U, N = (one.flat[:, one.problem.names.index(name)] for name in ("U", "N"))
+    units = {"k1": by.tension_N, "B": by.length_mm * by.tension_N**-U, "U": 1.0, "k2": by.time_s**-N, "N": 1.0,
+             "preload": by.length_mm, "sensor_sd": by.tension_N, "setting_sd": by.length_mm}  # fmt: skip
+    for i, name in enumerate(one.problem.names):
+        np.testing.assert_allclose(other.flat[:, i], one.flat[:, i] * units[name], rtol=1e-12)
+
+
+def test_scales_are_those_of_the_test():
+    (experiment,) = simulated(1)
+    found = scales_of([experiment])
+    assert (found.step_mm, found.range_mm, found.hold_s) == (1.25, 7.5, 90.0)
+    weights = scales_of(under_weights(5))
+    assert (weights.tension_N, weights.step_N, weights.hold_s) == (3.0, 1.5, 200.0)
+
+
+@pytest.mark.parametrize("factor", [2.0**-30, 2.0**7])
+def test_a_geometric_mean_is_multiplied_to_the_last_bit(factor):
+    values = [0.3, 7.0, 11.3]
+    assert geometric_mean(values) == pytest.approx(np.exp(np.mean(np.log(values))), rel=1e-15)
+    assert geometric_mean([factor * v for v in values]) == factor * geometric_mean(values)

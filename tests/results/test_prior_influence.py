@@ -1,0 +1,40 @@
+"""A posterior that would move with its prior is said to lean on it."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wirebayes.model.prior import Power, Prior
+from wirebayes.results.prior_influence import leaning
+
+RNG = np.random.default_rng(0)
+
+
+def draws(sd: float) -> np.ndarray:
+    return stats.norm.ppf((np.arange(20000) + 0.5) / 20000)[:, None] * sd
+
+
+@pytest.mark.parametrize(("sd", "leans"), [(0.88, False), (0.93, True)])
+def test_a_normal_posterior_leans_where_its_interval_would_move_by_a_standard_deviation(sd: float, leans: bool) -> None:
+    """Of a posterior of variance v under a prior of one, a prior of sd two makes v / (1 - 3/4 v): at v = .904²."""
+    prior = Prior({"preload": stats.norm(0.0, 1.0)}, {}, frozenset())
+    found = leaning(prior, draws(sd), prior.names)
+    assert bool(found) == leans
+    assert all(notice.kind == "prior" and "preload" in notice.text for notice in found)
+
+
+def test_another_parameter_may_lean_on_a_prior() -> None:
+    one = draws(0.97)[:, 0]
+    theta = np.column_stack([np.exp(one), np.exp(-one + 0.01 * RNG.normal(size=len(one)))])
+    free = {"B": stats.lognorm(1.0), "k2": stats.lognorm(50.0)}
+    (found,) = leaning(Prior(free, {}, frozenset(free)), theta, ("B",))
+    assert "the prior of B" in found.text and "B, k2" in found.text
+
+
+def test_what_is_known_of_a_parameter_of_another_s_unit_is_its_product() -> None:
+    """B times 4 to the power U is known well; B itself varies with U as widely as its prior at 1 N would."""
+    U = RNG.normal(1.0, 0.7, 20000)
+    theta = np.column_stack([np.exp(0.05 * RNG.normal(size=20000) - U * np.log(4.0)), U])
+    free = {"B": stats.lognorm(1.0), "U": stats.uniform(-9.0, 20.0)}
+    prior = Prior(free, {}, frozenset({"B"}), {"B": Power("U", float(np.log(4.0)))})
+    assert leaning(prior, theta, prior.names) == []

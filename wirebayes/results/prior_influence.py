@@ -1,0 +1,79 @@
+"""Where a posterior leans on a prior: intervals that would move if the prior were twice as wide."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from wirebayes.model.prior import Prior, fast_logpdf, logit_normal
+from wirebayes.notice import Notice
+from wirebayes.typing import Array
+
+WIDER = 2.0  # times as wide: a prior that two people may well disagree about
+MOVED = 1.0  # posterior standard deviations by which an end of the 90 % interval moves
+
+
+def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
+    """A sentence for each prior that decides an interval.
+
+    The posterior under a wider prior is that of the draws, weighted by the ratio of the two priors.
+
+    Parameters
+    ----------
+    prior : Prior
+    theta : (n, d) array
+        Draws of the posterior, in the prior's columns.
+    columns : sequence of str
+        Which priors are looked at.
+    """
+    before = np.quantile(theta, _ENDS, axis=0)
+    spread = np.maximum(theta.std(axis=0, ddof=1), np.finfo(float).tiny)
+    known = prior.known(theta)
+    order = np.argsort(theta, axis=0)
+    out = []
+    for name in columns:
+        i = prior.names.index(name)
+        wide = _wider(prior.distributions[name])
+        if wide is None:
+            continue
+        log_weight = fast_logpdf(wide)(known[:, i]) - fast_logpdf(prior.distributions[name])(known[:, i])
+        weight = np.exp(log_weight - log_weight.max())
+        after = np.stack([_weighted_ends(theta[order[:, j], j], weight[order[:, j]]) for j in range(theta.shape[1])], 1)
+        moved = np.abs(after - before).max(axis=0) > MOVED * spread
+        if moved.any():
+            out.append(_notice(name, [prior.names[j] for j in np.flatnonzero(moved)]))
+    return out
+
+
+_ENDS = (0.05, 0.95)  # of the interval that is reported
+
+
+def _weighted_ends(ordered: Array, weight: Array) -> Array:
+    """(2,) the ends of the 90 % interval of weighted draws (n,), in rising order."""
+    share = (np.cumsum(weight) - 0.5 * weight) / weight.sum()
+    return np.interp(_ENDS, share, ordered)
+
+
+def _wider(distribution: Any) -> Any:
+    """The same distribution twice as wide; None where its ends say what is possible, as uniform ones do."""
+    name = distribution.dist.name
+    shapes, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
+    if name == "lognorm":
+        return stats.lognorm(WIDER * shapes[0], loc=loc, scale=scale)
+    if name == "logitnorm":
+        return logit_normal(shapes[0], WIDER * shapes[1], loc=loc, scale=scale)
+    if name == "norm":
+        return stats.norm(loc, WIDER * scale)
+    if name == "halfnorm":
+        return stats.halfnorm(loc, WIDER * scale)
+    return None
+
+
+def _notice(name: str, moved: Sequence[str]) -> Notice:
+    what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {', '.join(moved)}"
+    return Notice(
+        "prior",
+        f"with the prior of {name} twice as wide, {what} would move by more than a standard deviation: the readings "
+        f"leave it open, and the prior decides; state what is known of {name} ([prior.{name.split('[')[0]}])",
+    )
