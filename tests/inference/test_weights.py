@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from tests.simulated import simulated_tests
+from wirebayes.effects import CATALOGUE
+from wirebayes.errors import InputError
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth
+from wirebayes.workflows.discover import check_one_control
 
 TIMES = (0.0, 15.0, 30.0, 60.0, 120.0, 300.0)
 WIRE = {"k1": 900.0, "B": 0.2, "U": 0.8, "k2": 0.03, "N": 0.8}
@@ -58,3 +61,16 @@ def test_a_law_whose_wire_cannot_carry_the_weights_has_no_likelihood(both: dict[
     problem = build([both["weights"]], law="modified")
     theta = np.array([[k1, 0.2, 0.8, 0.03, 0.8, -3.0, 0.006, 0.02] for k1 in (4.9, 900.0)])
     assert np.isfinite(problem.log_likelihood(theta)).tolist() == [False, True]
+
+
+def test_an_instrument_s_amplitude_is_not_shared_by_steps_and_weights(both: dict[str, Experiment]) -> None:
+    drift, stiffening = CATALOGUE["sensor_drift"](), CATALOGUE["strain_stiffening"]()
+    with pytest.raises(
+        InputError, match="found sensor_drift, an effect of an instrument, in a fit of steps and weights"
+    ):
+        build(list(both.values()), (drift,))
+    assert "strain_stiffening.c" in build(list(both.values()), (stiffening,)).names
+    assert build([both["weights"]], (drift,)).names[-4:-3] == ("sensor_drift.a",)
+    with pytest.raises(InputError, match=r"found steps \(steps\) and weights \(weights\), expected one of the two"):
+        check_one_control(list(both.values()))
+    check_one_control([both["weights"]])
