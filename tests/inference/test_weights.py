@@ -10,6 +10,7 @@ from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
+from wirebayes.model.scales import NATURAL
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.workflows.discover import check_one_control
 
@@ -33,8 +34,9 @@ def draws(experiments: list[Experiment]) -> dict[str, np.ndarray]:
     """Of the first experiment's parameters, by the normal approximation weighted by the posterior."""
     rng = np.random.default_rng(0)
     block = fitted(experiments, (), "hooke", "saturating", rng)
-    problem = block.target.problem
-    return problem.parameters(rough_draws.draws(block.target, block.modes, rng), problem.samples[0])
+    own, natural = block.target.problem, block.target.problem.in_units(NATURAL)
+    theta = own.theta_in(NATURAL, rough_draws.draws(block.target, block.modes, rng))
+    return natural.parameters(theta, natural.samples[0])
 
 
 def test_a_pair_of_tests_agrees_with_the_wire_and_is_sharper_together(both: dict[str, Experiment]) -> None:
