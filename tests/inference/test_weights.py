@@ -1,5 +1,7 @@
 """One wire under steps and under weights: both find it, and together they know it better."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,3 +78,29 @@ def test_an_instrument_s_amplitude_is_not_shared_by_steps_and_weights(both: dict
     with pytest.raises(InputError, match=r"found steps \(steps\) and weights \(weights\), expected one of the two"):
         check_one_control(list(both.values()))
     check_one_control([both["weights"]])
+
+
+@pytest.mark.parametrize("powers", [(10, 7, 6), (-20, 3, -4)])
+def test_weights_in_other_units_are_the_same_problem_to_the_last_bit(
+    both: dict[str, Experiment], powers: tuple[int, int, int]
+) -> None:
+    """Tensions, lengths and times times powers of two: in the test's own units nothing has changed."""
+    tension, length, time = (2.0**power for power in powers)
+    test = both["weights"]
+    holds = [
+        replace(
+            hold,
+            setting=hold.setting * tension,
+            readings=hold.readings * length,
+            time_s=hold.time_s * time,
+            duration_s=hold.duration_s * time,
+            start_s=hold.start_s * time,
+        )
+        for hold in test.holds
+    ]
+    other = replace(test, holds=tuple(holds), length_mm=test.length_mm * length, resolution=test.resolution * length)
+    first, second = (p.in_units(p.own_units) for p in (build([test]), build([other])))
+    theta = first.prior.rvs(200, np.random.default_rng(1))
+    values = first.log_likelihood(theta) + first.prior.log_density()(theta)
+    assert np.isfinite(values).any()
+    np.testing.assert_array_equal(values, second.log_likelihood(theta) + second.prior.log_density()(theta))
