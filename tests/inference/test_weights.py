@@ -1,14 +1,20 @@
 """One wire under steps and under weights: both find it, and together they know it better."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.simulated import simulated_tests
+from wirebayes.effects import CATALOGUE
+from wirebayes.errors import InputError
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
+from wirebayes.model.scales import NATURAL
 from wirebayes.simulation.synthetic import Bench, Truth
+from wirebayes.workflows.discover import check_one_control
 
 TIMES = (0.0, 15.0, 30.0, 60.0, 120.0, 300.0)
 WIRE = {"k1": 900.0, "B": 0.2, "U": 0.8, "k2": 0.03, "N": 0.8}
@@ -30,8 +36,9 @@ def draws(experiments: list[Experiment]) -> dict[str, np.ndarray]:
     """Of the first experiment's parameters, by the normal approximation weighted by the posterior."""
     rng = np.random.default_rng(0)
     block = fitted(experiments, (), "hooke", "saturating", rng)
-    problem = block.target.problem
-    return problem.parameters(rough_draws.draws(block.target, block.modes, rng), problem.samples[0])
+    own, natural = block.target.problem, block.target.problem.in_units(NATURAL)
+    theta = own.theta_in(NATURAL, rough_draws.draws(block.target, block.modes, rng))
+    return natural.parameters(theta, natural.samples[0])
 
 
 def test_a_pair_of_tests_agrees_with_the_wire_and_is_sharper_together(both: dict[str, Experiment]) -> None:
@@ -58,3 +65,42 @@ def test_a_law_whose_wire_cannot_carry_the_weights_has_no_likelihood(both: dict[
     problem = build([both["weights"]], law="modified")
     theta = np.array([[k1, 0.2, 0.8, 0.03, 0.8, -3.0, 0.006, 0.02] for k1 in (4.9, 900.0)])
     assert np.isfinite(problem.log_likelihood(theta)).tolist() == [False, True]
+
+
+def test_an_instrument_s_amplitude_is_not_shared_by_steps_and_weights(both: dict[str, Experiment]) -> None:
+    drift, stiffening = CATALOGUE["sensor_drift"](), CATALOGUE["strain_stiffening"]()
+    with pytest.raises(
+        InputError, match="found sensor_drift, an effect of an instrument, in a fit of steps and weights"
+    ):
+        build(list(both.values()), (drift,))
+    assert "strain_stiffening.c" in build(list(both.values()), (stiffening,)).names
+    assert build([both["weights"]], (drift,)).names[-4:-3] == ("sensor_drift.a",)
+    with pytest.raises(InputError, match=r"found steps \(steps\) and weights \(weights\), expected one of the two"):
+        check_one_control(list(both.values()))
+    check_one_control([both["weights"]])
+
+
+@pytest.mark.parametrize("powers", [(10, 7, 6), (-20, 3, -4)])
+def test_weights_in_other_units_are_the_same_problem_to_the_last_bit(
+    both: dict[str, Experiment], powers: tuple[int, int, int]
+) -> None:
+    """Tensions, lengths and times times powers of two: in the test's own units nothing has changed."""
+    tension, length, time = (2.0**power for power in powers)
+    test = both["weights"]
+    holds = [
+        replace(
+            hold,
+            setting=hold.setting * tension,
+            readings=hold.readings * length,
+            time_s=hold.time_s * time,
+            duration_s=hold.duration_s * time,
+            start_s=hold.start_s * time,
+        )
+        for hold in test.holds
+    ]
+    other = replace(test, holds=tuple(holds), length_mm=test.length_mm * length, resolution=test.resolution * length)
+    first, second = (p.in_units(p.own_units) for p in (build([test]), build([other])))
+    theta = first.prior.rvs(200, np.random.default_rng(1))
+    values = first.log_likelihood(theta) + first.prior.log_density()(theta)
+    assert np.isfinite(values).any()
+    np.testing.assert_array_equal(values, second.log_likelihood(theta) + second.prior.log_density()(theta))

@@ -306,8 +306,9 @@ def build(
     Raises
     ------
     InputError
-        If a prior in the file names no parameter, or is malformed.
+        If a prior in the file names no parameter, or is malformed, or one amplitude would belong to two instruments.
     """
+    check_instruments(experiments, effects)
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
         materials.setdefault(experiment.material, []).append(experiment)
@@ -431,6 +432,23 @@ def _sample_in(sample: Sample, old: Units, new: Units) -> Sample:
         resolution=sample.resolution * read,
         model=changed,
     )
+
+
+def check_instruments(experiments: Sequence[Experiment], effects: Sequence[Effect]) -> None:
+    """Refuse to share the amplitude of an instrument between steps and weights, which are read by different ones.
+
+    Raises
+    ------
+    InputError
+    """
+    if len({experiment.control for experiment in experiments}) < 2:
+        return
+    shared = [effect.name for effect in effects if effect.scope in ("instrument", "environment")]
+    if shared:
+        raise InputError(
+            f"{experiments[0].source}: found {shared[0]}, an effect of an instrument, in a fit of steps and weights "
+            "together, expected effects of the wire alone: the two are read by different instruments; fit them apart"
+        )
 
 
 def _reference_length(members: Sequence[Experiment]) -> float:
