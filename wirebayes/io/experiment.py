@@ -76,6 +76,12 @@ class Experiment:
     control: Control = "displacement"
     preload_mm: float | None = None
 
+    def __repr__(self) -> str:
+        holds, readings = len(self.recorded_holds), sum(hold.time_s.size for hold in self.recorded_holds)
+        set_ = "" if self.control == "displacement" else ", tensions set"
+        what = f"{self.length_mm:g} mm of {self.material}, {holds} holds, {readings} readings{set_}"
+        return f"Experiment({self.name}: {what})"
+
     @property
     def resolution_N(self) -> float:
         """Step to which tensions were rounded; 0.0 where they were set."""

@@ -1,0 +1,211 @@
+"""The answer of every result in a few lines, with units: on a terminal, and in Python with `print`."""
+
+from collections import Counter
+from textwrap import wrap
+from typing import cast
+
+from wirebayes.json_files.batch import BatchJson
+from wirebayes.json_files.calibrate import CalibrateJson
+from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
+from wirebayes.json_files.comparison import ComparedModels
+from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.imported import ImportedExperiment
+from wirebayes.json_files.plan import JudgedProtocol
+from wirebayes.json_files.pose import Drift, PoseJson
+from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.json_files.values import UNITS, Quantiles
+from wirebayes.sentences import likely, p_in_words, unit_text
+
+_NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
+
+
+def of_fit(summary: SummaryJson) -> list[str]:
+    """Of a fit: its state, the parameters and the creep, with units and 90 % intervals."""
+    derived = summary["derived"]
+    state = "converged" if summary["converged"] else "NOT CONVERGED"
+    passed = summary["model_check"]["passed"] if "model_check" in summary else None
+    checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
+    names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
+    parameters = ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
+    creep = f"creep after 2 min at {derived['tension_N']:g} N {_band(derived['creep_2min_mm'])} mm"
+    return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
+
+
+_SHOWN = ("k1", "B", "U", "k2", "N")
+
+
+def _effects(summary: SummaryJson) -> list[str]:
+    return [key.split("@")[0] for key in summary["effects"]]
+
+
+def of_findings(name: str, report: ExperimentFindings) -> list[str]:
+    """Of one experiment that something may be missing in: what, how large, and what it is worth."""
+    verdict, effects = report["verdict"], ", ".join(report["effects"])
+    finding = _NAMED.get(verdict, f"{verdict}: {effects}")
+    if verdict == "ambiguous":
+        finding = f"ambiguous: {likely(report)}"
+    if verdict == "partial":
+        are = "are" if report["effects"][1:] else "is"
+        finding = f"{effects} {are} missing, and something that is not in the catalogue"
+    lines = [f"{name}: {finding} ({p_in_words(report['p_global'], report['p_simulations'])})"]
+    if verdict == "unknown" and likely(report):
+        lines.append(f"  beside it most likely {likely(report)}; none of these is established")
+    for effect, size in report["amplitudes"].items():
+        at = "" if size["hold"] is None else f" at hold {size['hold']}"
+        unit = "" if size["unit"] == "-" else f" {size['unit']}"
+        lines.append(f"  {effect}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
+    like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
+    if like and verdict in ("named", "ambiguous"):
+        lines.append(f"  hard to distinguish on this protocol: {', '.join(like)}")
+    gain = report["held_out"]
+    before, after = (read(gain[model], "rmse") for model in ("plain", "final"))
+    if report["effects"] and None not in (before, after):
+        lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}")
+    return lines
+
+
+def of_import(name: str, test: ImportedExperiment) -> list[str]:
+    """Of a raw file: what was found in it and what was done."""
+    sample = f"{test['length_mm']:g} mm of {test['material']}"
+    return [
+        f"{name}: {test['holds']} holds, {test['readings']} readings, {sample}",
+        *(f"  {note}" for note in test["notes"]),
+    ]
+
+
+def of_batch(found: BatchJson) -> list[str]:
+    """Of many experiments: how many, what was found, and which stand apart."""
+    rows, far = found["experiments"], found["outliers"]
+    failed = sum(row["error"] is not None for row in rows)
+    converged = sum(bool(row["converged"]) for row in rows)
+    lines = [f"{len(rows)} experiments: {converged} converged, {failed} failed"]
+    verdicts = Counter(row["verdict"] for row in rows if row["verdict"])
+    if verdicts:
+        lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
+    lines += [f"  apart: {outlier['sentence']}" for outlier in far[:_MOST_LINES]]
+    return lines + ([f"  and {len(far) - _MOST_LINES} more outliers"] if len(far) > _MOST_LINES else [])
+
+
+def of_plan(row: JudgedProtocol) -> list[str]:
+    """Of a planned test: its rank and length, and what would be known afterwards."""
+    budget = "" if row["within_budget"] else ", longer than the available time"
+    lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
+    known = [
+        f"{name} {row['parameters'][name]['sd']:.2g} {unit_text(UNITS[name])}".rstrip()
+        for name in _SHOWN
+        if name in row["parameters"]
+    ]
+    creep = row["creep"]
+    known.append(f"creep after 1 h at {creep['tension_N']:.3g} N {creep['creep_1h_mm']['sd']:.2g} mm")
+    lines.append(f"  expected sd: {', '.join(known)}")
+    if row["robot"] is not None and row["robot"]["drift_sd_mm"] is not None:
+        lines.append(f"  drift of the robot after 1 h: sd {row['robot']['drift_sd_mm']:.2g} mm")
+    return lines
+
+
+_MOST_LINES = 10  # of outliers, on a terminal
+
+
+def of_check(name: str, test: CheckedExperiment) -> list[str]:
+    """Of a test that is not fitted yet: its holds, and what it can determine."""
+    recorded = f"{test['recorded_holds']} holds, {test['readings']} readings in {test['duration_s'] / 60.0:.3g} min"
+    unit = unit_read(test, "resolution")
+    step = read(test, "resolution")
+    steps = f", written in steps of {step:g} {unit}" if step else ""
+    lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
+    if test["temperature_C"]:
+        lines.append("  temperature from {:.3g} to {:.3g} °C".format(*test["temperature_C"]))
+    weights = test["control"] == "force"
+    lines.append(f"  {'hold':>4} {'weight' if weights else 'displacement':>13} {'begins':>9} {'lasts':>9}  readings")
+    for hold in test["holds"]:
+        course = "none: held, not recorded"
+        if hold["number"] is not None:
+            first, last = read(hold, "first"), read(hold, "last")
+            course = f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
+        place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
+        begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
+        number = "-" if hold["number"] is None else hold["number"]
+        lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
+    for source in ("data", "data and prior", "prior"):
+        ranges = [
+            f"{p} {_with_unit(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == source
+        ]
+        lines += _wrapped(f"parameters from the {source}", ranges)
+    for shows, words in _SHOWS.items():
+        effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
+        lines += _wrapped(words, [_size(e, found) for e, found in effects])
+    count = len(test["warnings"])
+    lines.append(f"  {count} warning{'s' * (count > 1)}, on standard error" if count else "  nothing suspicious")
+    return lines
+
+
+_SHOWS = {
+    "yes": "effects that would be detected, from this size on",
+    "if unusually large": "effects that would be detected if unusually large",
+    "no": "effects that it cannot show",
+}
+
+
+def _size(effect: str, found: EffectSize) -> str:
+    if found["amplitude_80"] is None:
+        return f"{effect} ({found['reason']})"
+    return f"{effect} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
+
+
+def _wrapped(title: str, items: list[str]) -> list[str]:
+    """A list in lines that a terminal shows whole."""
+    if not items:
+        return []
+    whole = [item.replace(" ", "\u00a0") for item in items]  # no item is broken
+    lines = wrap(f"{title}: {', '.join(whole)}", 110, initial_indent="  ", subsequent_indent="    ")
+    return [line.replace("\u00a0", " ") for line in lines]
+
+
+def of_comparison(name: str, table: ComparedModels) -> str:
+    """Of one experiment: which models predict what they have not seen best."""
+    best, *others = [row["name"] for row in table["models"] if row["failed"] is None] or ["none"]
+    return f"{name}: {best} predicts left-out holds best" + (f", then {', '.join(others[:2])}" if others else "")
+
+
+def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
+    """Of a robot: how far its platform moves, for each spread of specimens."""
+    if not found["feasible"]:
+        return [f"{found['robot']}: {found['sentence']}"]
+    lines = []
+    measured = "history" in found and cast(PoseHistoryJson, found)["history"]["kind"] == "measured"
+    moved = "is away from where it is meant to be" if measured else "has drifted"
+    for drift in found["drift"]:
+        far, time = drift["distance_mm"], drift["times_s"][-1]
+        if known_at_the_end(drift):
+            lines.append(
+                f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
+                f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
+            )
+    return lines or [f"{found['robot']}: no draw of the wires could be solved"]
+
+
+def of_calibration(found: CalibrateJson) -> list[str]:
+    """Of a calibration: every wire's length."""
+    known = found["with_creep_model"]
+    if not known["converged"]:
+        return [f"{found['robot']}: not converged, no lengths to use"]
+    length = known["length_m"]
+    rows = zip(length["mean"], length["q05"], length["q95"], strict=True)
+    lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
+    return [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
+
+
+def _with_unit(quantity: Parameter | ParameterRange) -> str:
+    return f"{_band(quantity)} {unit_text(quantity['unit'])}".rstrip()
+
+
+def _band(quantity: Quantiles | ParameterRange | None) -> str:
+    return "-" if quantity is None else f"{quantity['q50']:.4g} [{quantity['q05']:.4g}, {quantity['q95']:.4g}]"
+
+
+def known_at_the_end(drift: Drift) -> bool:
+    """Whether any draw holds the platform at the last time."""
+    middle = drift["distance_mm"]["q50"]
+    return middle is not None and middle[-1] is not None
