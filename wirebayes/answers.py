@@ -10,13 +10,13 @@ from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterR
 from wirebayes.json_files.comparison import ComparedModels
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.imported import ImportedExperiment
-from wirebayes.json_files.plan import JudgedProtocol
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 from wirebayes.json_files.pose import Drift, PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import UNITS, Quantiles
-from wirebayes.sentences import likely, p_in_words, unit_text
+from wirebayes.sentences import likely, listed, number, p_in_words, quantity, span, unit_text
 
 _NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
 
@@ -209,3 +209,174 @@ def known_at_the_end(drift: Drift) -> bool:
     """Whether any draw holds the platform at the last time."""
     middle = drift["distance_mm"]["q50"]
     return middle is not None and middle[-1] is not None
+
+
+def fit_in_a_sentence(summary: SummaryJson) -> str:
+    """How much the wire creeps and how stiff it is, with intervals.
+
+    Parameters
+    ----------
+    summary : dict
+    """
+    derived, k1 = summary["derived"], summary["parameters"].get("k1")
+    trusted = summary["converged"] and summary.get("model_check", {}).get("passed") is not False
+    doubt = "" if trusted else "If the model were right: "
+    creep = derived["creep_2min_mm"]
+    if creep is None or k1 is None:
+        return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
+    stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
+    stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
+    return (
+        f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {derived['tension_N']:g} N, "
+        f"and its stiffness is {stiff} per unit of strain; intervals hold 90 %."
+    )
+
+
+def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
+    """What is missing, how large it is, and what it takes away of the error on holds that were not used.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    report : dict
+        Its part of ``discovery.json``.
+    """
+    effects = [effect.replace("_", " ") for effect in report["effects"]]
+    are = "are" if effects[1:] else "is"
+    candidates = likely(report, lambda effect: effect.replace("_", " "))
+    what = {
+        "nothing-missing": "nothing is missing: the plain model and its noise explain these readings",
+        "unknown": "something is missing that no effect in the catalogue explains"
+        + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
+        "ambiguous": f"something is missing; these readings do not tell what: {candidates}",
+        "named": f"{listed(effects)} {are} missing",
+        "partial": f"{listed(effects)} {are} missing, and something else that no effect in the catalogue explains",
+    }[report["verdict"]]
+    sizes = [quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for a in report["amplitudes"].values()]
+    size = f", of size {listed(sizes)}" if sizes else ""
+    held = report["held_out"]
+    before, after = (read(held[model], "rmse") for model in ("plain", "final"))
+    gain = ""
+    if report["effects"] and before is not None and after is not None:
+        gain = f"; with {'them' if effects[1:] else 'it'} the error on unused holds goes from {number(before)} to "
+        gain += f"{number(after)} {unit_read(held['plain'])}"
+    sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
+    return f"{name}: {what}{size}{gain}{sure}."
+
+
+def comparison_in_words(name: str, table: ComparedModels) -> str:
+    """The ranking of the models.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    table : dict
+        Its part of ``comparison.json``.
+    """
+    good = [row for row in table["models"] if row["failed"] is None]
+    if not good:
+        return f"{name}: no model could be judged."
+    best, *others = good
+    gain = best["difference"]
+    against = ""
+    if gain is not None and best["name"] != table["base"]:
+        against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in elpd against {table['base']}"
+    then = f"; then come {listed([row['name'] for row in others[:3]])}" if others else ""
+    rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
+    return f"{name}: {best['name']} predicts left-out holds best{against}{then}{rest}."
+
+
+def batch_in_sentences(found: BatchJson) -> list[str]:
+    """A sentence a finding: how many were fitted, what is missing in which, which stand apart.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    rows = found["experiments"]
+    materials = {row["material"] for row in rows if row["material"]}
+    kinds = f"{len(materials)} materials" if len(materials) > 1 else "one material"
+    failed = [row["name"] for row in rows if row["error"]]
+    out = [f"{_count(len(rows), 'test')} of {kinds}: {sum(bool(row['converged']) for row in rows)} converged."]
+    out += [f"Not fitted: {_some(failed)}."] if failed else []
+    clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
+    out += [f"Nothing is missing in {_count(len(clean), 'test')}."] if clean else []
+    effects = Counter(effect for row in rows for effect in row["effects"])
+    for effect, count in effects.most_common():
+        where = [row["name"] for row in rows if effect in row["effects"]]
+        out.append(f"{effect.replace('_', ' ').capitalize()}: in {_count(count, 'test')} ({_some(where)}).")
+    unknown = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
+    out += [f"Something without a name: in {_some(unknown)}."] if unknown else []
+    refused = [row["name"] for row in rows if row["check"] == "failed" and row["verdict"] is None]
+    out += [f"The model does not describe the readings of {_some(refused)}."] if refused else []
+    out += [outlier["sentence"].rstrip(".") + "." for outlier in found["outliers"][:_MOST_LINES]]
+    return out
+
+
+def _count(number_of: int, what: str) -> str:
+    return f"one {what}" if number_of == 1 else f"{number_of} {what}s"
+
+
+def _some(names: list[str], most: int = 6) -> str:
+    """Names as a sentence lists them, the first of many."""
+    more = [f"{len(names) - most} more"] if len(names) > most else []
+    return listed([*names[:most], *more])
+
+
+def pose_in_a_sentence(found: PoseJson) -> str:
+    """How far the platform moves, with the conditions behind it.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    if not found["feasible"]:
+        return found["sentence"]
+    known = [drift for drift in found["drift"] if known_at_the_end(drift)]
+    if not known:
+        return f"No draw of the wires holds {found['robot']} to the end."
+    drift = known[-1]
+    far, tilt, time = drift["distance_mm"], drift["tilt_deg"], drift["times_s"][-1]
+    moved, turned = (quantity(q["q50"][-1], q["q05"][-1], q["q95"][-1], unit) for q, unit in ((far, "mm"), (tilt, "")))
+    spread = drift["specimen_spread"]
+    alike = f"if wires cut from one line differ by {100 * spread:g} %" if spread else "if all wires are alike"
+    return (
+        f"The platform of {found['robot']} moves by {moved} and tilts by {turned} degrees within {number(time)} s of "
+        f"standing still, {alike}; intervals hold 90 %."
+    )
+
+
+def plan_in_a_sentence(found: PlanJson) -> str:
+    """The test to do, and what would be known after it.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    best = found["protocols"][0]
+    creep = best["creep"]["creep_1h_mm"]
+    what = f" ({best['words']})" if best["words"] else ""
+    return (
+        f"Do {best['name']}{what}: within {number(best['duration_min'])} min it would make known the creep after an "
+        f"hour at {number(best['creep']['tension_N'])} N to ± {number(creep['sd'], 2)} mm (now ± "
+        f"{number(creep['guess_sd'], 2)} mm, standard deviations)."
+    )
+
+
+def calibration_in_a_sentence(found: CalibrateJson) -> str:
+    """How well the lengths are known.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    known = found["with_creep_model"]
+    if not known["converged"]:
+        return "Not converged: there are no lengths to use."
+    sd = [1e3 * value for value in known["length_m"]["sd"]]
+    return (
+        f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {span(min(sd), max(sd), 2)} mm "
+        f"(standard errors), from {found['read']} of {found['holds']} holds."
+    )
