@@ -183,6 +183,12 @@ class Page:
     sections: Sequence[Section]
     footer: str = ""
 
+    @property
+    def grave(self) -> Notices | None:
+        """The warnings that stand before the answer: those that the first section begins with."""
+        first = next((block for section in self.sections[:1] for block in section.blocks[:1]), None)
+        return first if isinstance(first, Notices) and first.notices[0].first else None
+
 
 def embedded(path: Path) -> str:
     """A picture file as a data address."""

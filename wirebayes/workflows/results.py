@@ -218,6 +218,37 @@ class Posterior(Result[SummaryJson]):
         """All groups of ``posterior.nc`` in memory, as ArviZ takes them."""
         return store.datatree(self.folder)
 
+    def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
+        """Draw the readings, hold after hold, with the curve of the model through them and its 90 % band.
+
+        Parameters
+        ----------
+        experiment : str, optional
+            Needed where several were fitted together.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; new ones when left out.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            It was fitted hold by hold, which has no curve from hold to hold.
+
+        Examples
+        --------
+        >>> posterior.plot().get_ylabel()
+        'tension, N'
+        """
+        from wirebayes.report.pictures.curve import on_axes  # matplotlib only where it is needed
+
+        stored = self.stored(experiment)
+        if stored.likelihood == "hold":
+            raise InputError(f"{self.folder}: found a fit with likelihood hold, expected a chain: it has a curve")
+        return on_axes(stored, axes)
+
     def save(self, folder: PathLike) -> Path:
         """Store the posterior, as ``fit`` would where it is all that was fitted, else its two files alone.
 

@@ -101,6 +101,33 @@ def through_the_readings(stored: Stored, title: str = "") -> Figure:
     return figure
 
 
+def on_axes(stored: Stored, axes: Any = None) -> Any:
+    """The readings with the curve through them, on axes of the user's.
+
+    Parameters
+    ----------
+    stored : Stored
+    axes : matplotlib.axes.Axes, optional
+        New ones when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    if axes is None:
+        import matplotlib.pyplot as plt  # only for users, who look at it on a screen
+
+        axes = plt.subplots()[1]
+    found, control = curve(stored), stored.sample.protocol.control
+    draw_curve(axes, stored, found, CHAIN, "the model, 90 % band")
+    draw_readings(axes, stored, found)
+    name_holds(axes, stored)
+    axes.set_ylabel(f"{READ[control]}, {READ_UNIT[control]}")
+    axes.set_title(stored.sample.name)
+    axes.legend(frameon=False)
+    return axes
+
+
 def draw_curve(axes: Any, stored: Stored, found: Curve, colour: str, label: str) -> None:
     """The median and the band of every recorded hold.
 
