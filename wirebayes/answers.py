@@ -283,7 +283,8 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     against = ""
     if gain is not None and best["name"] != table["base"]:
         against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in elpd against {table['base']}"
-    then = f"; then come {listed([row['name'] for row in others[:3]])}" if others else ""
+    come = "come" if others[1:] else "comes"
+    then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
     rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
     return f"{name}: {best['name']} predicts left-out holds best{against}{then}{rest}."
 
