@@ -46,13 +46,6 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
 def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
     row = {"error": None, "check": None, "verdict": "nothing-missing", "material": "m", "converged": True}
     row = row | {"effects": list[str]()}
-        "error": None,
-        "check": None,
-        "verdict": "nothing-missing",
-        "material": "m",
-        "converged": True,
-        "effects": [],
-    }
     rows = [row | {"name": "a"}, row | {"name": "b", "verdict": "named", "effects": ["toe"]}]
     found = {"experiments": rows, "outliers": []}
     assert answers.batch_in_sentences(found) == [  # type: ignore[arg-type]
