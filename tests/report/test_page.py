@@ -351,6 +351,7 @@ def test_the_page_of_a_pose_that_cannot_be_held_says_so(tmp_path):
         "robot": "table",
         "mass_kg": 2.0,
         "feasible": False,
+        "sentence": "No tensions within the bounds hold the platform at this pose.",
         "pose": {"position_m": [0.0, 0.1, 0.25], "rotation_vector_rad": [0.0, 0.0, 0.0]},
         "warnings": [
             {"kind": "slack", "text": "wire 3 is slack"},
