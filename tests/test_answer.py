@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from wirebayes.cli import answer
+from wirebayes.sentences import p_in_words
 from wirebayes.workflows.results import Calibration, Comparison, Findings, Place, Pose
 
 HELD_OUT = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": 0.05}}
@@ -14,11 +15,11 @@ SLIP = {
     "verdict": "ambiguous", "effects": ["grip_slip", "toe"], "set": ["grip_slip", "unknown", "toe"],
     "probabilities": {"grip_slip": 0.62, "toe": 0.14, "unknown": 0.17, "ageing": 0.07},
     "group": ["grip_slip", "toe", "ageing", "unknown"],
-    "p_global": 0.001, "held_out": HELD_OUT, "next_measurement": "Unload.",
+    "p_global": 0.001, "p_simulations": 999, "held_out": HELD_OUT, "next_measurement": "Unload.",
     "amplitudes": {"grip_slip": {"mean": 0.31, "q05": 0.25, "q95": 0.38, "unit": "mm", "hold": 4}},
 }  # fmt: skip
 CLEAN = {"verdict": "nothing-missing", "effects": [], "set": [], "probabilities": {}, "group": [],
-         "p_global": 0.4, "held_out": HELD_OUT,
+         "p_global": 0.4, "p_simulations": 199, "held_out": HELD_OUT,
          "next_measurement": "Hold longer.", "amplitudes": {}}  # fmt: skip
 
 
@@ -30,8 +31,8 @@ def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
 
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
-    assert answer.answer(found) == [
-        "a: ambiguous: grip_slip (62 %), nothing known (17 %) or toe (14 %) (p = 0.001)",
+    assert found.lines() == [
+        "a: ambiguous: grip_slip (62 %), nothing known (17 %) or toe (14 %) (p < 0.001)",
         "  grip_slip at hold 4 0.31 [0.25, 0.38] mm",
         "  hard to distinguish on this protocol: ageing",
         "  held-out holds: rmse 0.25 -> 0.05 N",
@@ -40,12 +41,21 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
     assert answer.next_step(found) == "a: Unload. b: Hold longer."
 
 
+@pytest.mark.parametrize(
+    ("p", "simulations", "words"),
+    [(0.001, 999, "p < 0.001"), (0.003, 334, "p < 0.01"), (0.01, 199, "p = 0.01"), (0.005, 199, "p < 0.01"),
+     (0.34, 199, "p = 0.34"), (0.05, 19, "p < 0.1")],
+)  # fmt: skip
+def test_a_p_value_says_no_more_than_its_simulations_can(p: float, simulations: int, words: str) -> None:
+    assert p_in_words(p, simulations) == words
+
+
 def test_a_part_that_has_a_name_is_said_with_the_rest_that_has_none(tmp_path: Path) -> None:
     part = SLIP | {"verdict": "partial", "effects": ["grip_slip"]}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": part}})
-    assert answer.answer(found)[0] == "a: grip_slip is missing, and something that is not in the catalogue (p = 0.001)"
+    assert found.lines()[0] == "a: grip_slip is missing, and something that is not in the catalogue (p < 0.001)"
     two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"a": part | {"effects": ["grip_slip", "toe"]}}})
-    assert answer.answer(two)[0].startswith("a: grip_slip, toe are missing, and something")
+    assert two.lines()[0].startswith("a: grip_slip, toe are missing, and something")
 
 
 def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp_path: Path) -> None:
@@ -54,29 +64,29 @@ def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp
     likely = open_ | {"set": ["toe", "unknown"], "probabilities": {"toe": 0.89, "ageing": 0.03, "unknown": 0.08}}
     alone = open_ | {"set": ["unknown"], "probabilities": {"toe": 0.04, "unknown": 0.96}}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": likely, "b": alone}})
-    assert answer.answer(found) == [
-        "a: something is missing that is not in the catalogue (p = 0.001)",
+    assert found.lines() == [
+        "a: something is missing that is not in the catalogue (p < 0.001)",
         "  beside it most likely toe (89 %) or nothing known (8 %); none of these is established",
-        "b: something is missing that is not in the catalogue (p = 0.001)",
+        "b: something is missing that is not in the catalogue (p < 0.001)",
     ]
 
 
 def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:
     models = [{"name": n, "failed": f} for n, f in (("toe", None), ("plain", None), ("ageing", "no fit"))]
     found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"a": {"models": models}}})
-    assert answer.answer(found) == ["a: toe predicts left-out holds best, then plain"]
+    assert found.lines() == ["a: toe predicts left-out holds best, then plain"]
 
 
 def test_a_pose_that_cannot_be_held_says_why(tmp_path: Path) -> None:
     found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": False, "sentence": "Too heavy."})
-    assert answer.answer(found) == ["r: Too heavy."]
+    assert found.lines() == ["r: Too heavy."]
 
 
 def test_a_pose_says_its_drift_for_each_spread(tmp_path: Path) -> None:
     far = {"q05": [0.0, 0.5], "q50": [0.0, 1.0], "q95": [0.0, 2.0]}
     drift = [{"specimen_spread": 0.05, "times_s": [0.0, 600.0], "distance_mm": far}]
     found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": True, "drift": drift})
-    (line,) = answer.answer(found)
+    (line,) = found.lines()
     assert line == "r: after 600 s the platform has drifted by 1 mm [0.5, 2] (specimen spread 5 %)"
 
 
@@ -84,11 +94,9 @@ def test_a_calibration_offers_no_lengths_unless_it_converged(tmp_path: Path) -> 
     known = {"converged": True, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
     content = {"robot": "r", "with_creep_model": known, "usable": True, "warnings": []}
     good = stored(Calibration, tmp_path, "calibrate.json", content)
-    assert answer.answer(good) == ["r: zero-tension lengths in m: 1.00000 [0.90000, 1.10000]"]
+    assert good.lines() == ["r: zero-tension lengths in m: 1.00000 [0.90000, 1.10000]"]
     bad = {"robot": "r", "with_creep_model": known | {"converged": False}}
-    assert answer.answer(stored(Calibration, tmp_path, "calibrate.json", bad)) == [
-        "r: not converged, no lengths to use"
-    ]
+    assert stored(Calibration, tmp_path, "calibrate.json", bad).lines() == ["r: not converged, no lengths to use"]
 
 
 def test_json_is_the_summary_and_quiet_is_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,13 +115,13 @@ def test_a_pose_that_no_draw_keeps_to_the_end_is_said_to_be_none(tmp_path: Path)
     band = {"q05": [0.0, None], "q50": [0.0, None], "q95": [0.0, None]}
     drift = {"distance_mm": band, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
     lost = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": True, "drift": [drift], "wires": {}})
-    assert answer.answer(lost) == ["r: no draw of the wires could be solved"]
+    assert lost.lines() == ["r: no draw of the wires could be solved"]
     band = {"q05": [0.0, 1.0], "q50": [0.0, 1.5], "q95": [0.0, 2.0]}
     held = stored(
         Pose, tmp_path, "pose.json",
         {"robot": "r", "feasible": True, "drift": [drift | {"distance_mm": band}], "wires": {}},
     )  # fmt: skip
-    assert answer.answer(held)[0].startswith("r: after 60 s the platform has drifted by 1.5 mm [1, 2]")
+    assert held.lines()[0].startswith("r: after 60 s the platform has drifted by 1.5 mm [1, 2]")
 
 
 def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:
@@ -127,14 +135,14 @@ def test_lengths_that_did_not_converge_are_not_for_the_controller(tmp_path: Path
     known = {"converged": False, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
     content = {"robot": "r", "with_creep_model": known, "usable": False, "warnings": []}
     bad = stored(Calibration, tmp_path, "calibrate.json", content)
-    assert answer.next_step(bad).startswith("wirebayes calibrate with more poses")
+    assert answer.next_step(bad).startswith("wirebayes calibrate FILE.toml with more poses")
     known = known | {"converged": True}
     content = {"robot": "r", "with_creep_model": known, "usable": True, "warnings": []}
     good = stored(Calibration, tmp_path, "calibrate.json", content)
     assert answer.next_step(good) == f"set the lengths of {tmp_path / 'calibrate.json'} in the controller"
     content = content | {"usable": False}
     wrong = stored(Calibration, tmp_path, "calibrate.json", content)
-    assert answer.next_step(wrong).startswith("wirebayes calibrate with more poses")
+    assert answer.next_step(wrong).startswith("wirebayes calibrate FILE.toml with more poses")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
 """Pieces of the sentences that people read on a terminal, on a page and in a message."""
 
+import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from wirebayes.json_files.discovery import Answer
 
@@ -27,3 +29,78 @@ def likely(found: Answer, spoken: Callable[[str], str] = str) -> str:
     if all(name == "unknown" for name, _ in ranked):
         return ""
     return listed([f"{'nothing known' if n == 'unknown' else spoken(n)} ({100 * p:.0f} %)" for n, p in ranked], "or")
+
+
+def p_in_words(p: float, simulations: int) -> str:
+    """A p-value with as much as its simulations can tell.
+
+    Parameters
+    ----------
+    p : float
+    simulations : int
+        Data sets of which it is a share: with them it cannot be less than one in all of them and the data.
+    """
+    floor = 1.0 / (simulations + 1)
+    if p > 1.5 * floor:
+        return f"p = {p:.2g}"
+    return f"p < {10.0 ** math.ceil(math.log10(floor)):g}"
+
+
+def quantity(middle: float, low: float, high: float, unit: str = "") -> str:
+    """A number with its 90 % interval and unit, as a sentence has it.
+
+    Parameters
+    ----------
+    middle, low, high : float
+    unit : str
+        As in files; 1 and - are none.
+    """
+    shown = unit_text(unit)
+    return f"{number(middle)}{' ' if shown else ''}{shown} ({span(low, high)})"
+
+
+def unit_text(unit: str) -> str:
+    """A unit as people write it; nothing for a pure number."""
+    return "" if unit in ("1", "-") else unit.replace("^-U", "⁻ᵁ").replace("^-N", "⁻ᴺ")
+
+
+def number(value: Any, digits: int = 3) -> str:
+    """A number for people: significant digits, no exponent where none is needed; a dash for nothing."""
+    if value is None or value != value:
+        return "–"
+    if isinstance(value, bool | str):
+        return str(value)
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\u202f").replace("-", "−")
+    if value == 0:
+        return "0"
+    size = abs(value)
+    if size >= 1e6 or size < 1e-4:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}·10{''.join(_RAISED[c] for c in str(int(exponent)))}"
+    decimals = max(0, digits - 1 - _order(value, digits))
+    return f"{value:,.{decimals}f}".replace(",", "\u202f").replace("-", "−")
+
+
+def _order(value: float, digits: int) -> int:
+    """Power of ten of the rounded value."""
+    return int(f"{abs(value):.{digits - 1}e}".split("e")[1])
+
+
+def span(low: Any, high: Any, digits: int = 3) -> str:
+    """An interval for people.
+
+    Parameters
+    ----------
+    low, high : float
+    digits : int
+        Significant ones.
+
+    Returns
+    -------
+    str
+    """
+    return f"{number(low, digits)} … {number(high, digits)}"
+
+
+_RAISED = dict(zip("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻", strict=True))

@@ -84,7 +84,7 @@ def flat(text: str) -> str:
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", text))).lower()
 
 
-SLOW = ("pose", "calibrate")
+SLOW = ("pose", "calibrate", "compare", "discover", "batch")
 
 
 @pytest.mark.parametrize(

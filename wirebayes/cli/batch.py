@@ -17,6 +17,7 @@ from wirebayes.cli.options import (
     Seed,
     TrainHolds,
     Without,
+    folder_for,
 )
 
 Files = Annotated[list[Path], typer.Argument(metavar="FILE.toml...", help="Experiment files.")]
@@ -24,7 +25,7 @@ Files = Annotated[list[Path], typer.Argument(metavar="FILE.toml...", help="Exper
 
 def batch(
     files: Files,
-    output: Output,
+    output: Output = None,
     seed: Seed = 0,
     discover: Annotated[
         bool,
@@ -52,7 +53,7 @@ def batch(
     from wirebayes.workers import load_early
 
     load_early()
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.batch import batch as run
 
@@ -60,8 +61,9 @@ def batch(
         many = run(
             files, discover=discover, check=check, posteriors=posteriors, keep_going=keep_going,
             train_holds=train_holds, elastic_law=elastic_law, history=history, without=without or (),
-            own_effects=own_effects, scheduler=scheduler, seed=seed, output=output, progress=report,
+            own_effects=own_effects, scheduler=scheduler, seed=seed,
+            output=folder_for("batch", files[0], output), progress=report,
         )  # fmt: skip
     for line in many.messages:
         print(line, file=sys.stderr)
-    conclude(many, as_json=as_json, quiet=quiet)
+    conclude(many, Given(str(files[0])), as_json=as_json, quiet=quiet)

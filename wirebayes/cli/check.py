@@ -26,7 +26,7 @@ def check(
 
     Exit code 0 means that the file can be used, 2 that it cannot. With --output: DIR/check.json and DIR/NAME.svg.
     """
-    from wirebayes.cli.answer import print_answer
+    from wirebayes.cli.answer import Given, print_answer
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.check import check as run
 
@@ -37,4 +37,4 @@ def check(
         )  # fmt: skip
     for line in checked.messages:
         print(line, file=sys.stderr)
-    print_answer(checked, as_json=as_json, quiet=quiet, kept=output is not None)
+    print_answer(checked, Given(str(file)), as_json=as_json, quiet=quiet, kept=output is not None)

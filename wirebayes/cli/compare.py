@@ -16,6 +16,7 @@ from wirebayes.cli.options import (
     Quiet,
     Seed,
     TrainHolds,
+    folder_for,
 )
 
 Only = Annotated[
@@ -26,7 +27,7 @@ Only = Annotated[
 
 def compare(
     file: ExperimentFile,
-    output: Output,
+    output: Output = None,
     seed: Seed = 0,
     experiment: ExperimentName = None,
     train_holds: TrainHolds = None,
@@ -46,7 +47,7 @@ def compare(
     from wirebayes.workers import load_early
 
     load_early()
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.compare import carry_out, plan
 
@@ -58,8 +59,8 @@ def compare(
     for line in said:  # before the work, which takes minutes
         typer.echo(line, err=True)
     with progress() as report:
-        found = carry_out(planned, output, report)
+        found = carry_out(planned, folder_for("compare", file, output), report)
     for line in found.messages:
         if line not in said:
             typer.echo(line, err=True)
-    conclude(found, as_json=as_json, quiet=quiet)
+    conclude(found, Given(str(file)), as_json=as_json, quiet=quiet)

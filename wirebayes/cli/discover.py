@@ -15,12 +15,13 @@ from wirebayes.cli.options import (
     Seed,
     TrainHolds,
     Without,
+    folder_for,
 )
 
 
 def discover(
     file: ExperimentFile,
-    output: Output,
+    output: Output = None,
     seed: Seed = 0,
     experiment: ExperimentName = None,
     train_holds: TrainHolds = None,
@@ -36,7 +37,7 @@ def discover(
     from wirebayes.workers import load_early
 
     load_early()
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.discover import discover as run
 
@@ -44,8 +45,8 @@ def discover(
         findings = run(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
             without=without or (), own_effects=own_effects, drop_breaks=drop_breaks, seed=seed,
-            output=output, progress=report,
+            output=folder_for("discover", file, output), progress=report,
         )  # fmt: skip
     for line in findings.messages:
         print(line, file=sys.stderr)
-    conclude(findings, as_json=as_json, quiet=quiet)
+    conclude(findings, Given(str(file)), as_json=as_json, quiet=quiet)

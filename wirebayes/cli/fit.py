@@ -18,12 +18,13 @@ from wirebayes.cli.options import (
     Quiet,
     Seed,
     TrainHolds,
+    folder_for,
 )
 
 
 def fit(
     file: ExperimentFile,
-    output: Output,
+    output: Output = None,
     seed: Seed = 0,
     experiment: ExperimentName = None,
     train_holds: TrainHolds = None,
@@ -53,7 +54,7 @@ def fit(
 
     if check:
         load_early()
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.fit import fit as run
 
@@ -61,8 +62,9 @@ def fit(
         fitted = run(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
             likelihood=likelihood, effects=effect or (), own_effects=own_effects, drop_breaks=drop_breaks,
-            together=together, check=check, seed=seed, output=output, progress=report,
+            together=together, check=check, seed=seed,
+            output=folder_for("fit", file, output), progress=report,
         )  # fmt: skip
     for line in fitted.messages:
         print(line, file=sys.stderr)
-    conclude(fitted, as_json=as_json, quiet=quiet)
+    conclude(fitted, Given(str(file)), as_json=as_json, quiet=quiet)

@@ -17,10 +17,10 @@ def import_bench(
         list[Path],
         typer.Argument(metavar="RAW…", help="Files of a bench: text with columns or xlsx; one experiment each."),
     ],
-    output: Output,
     length_mm: Annotated[
         float, typer.Option("--length-mm", metavar="L", help="Zero-tension length of the sample before the test.")
     ],
+    output: Output = None,
     material: Annotated[
         str | None,
         typer.Option("--material", metavar="M", help="Samples of one material may be fitted together; default: N."),
@@ -77,7 +77,7 @@ def import_bench(
     imported = run(
         raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
         time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control,
-        drop_breaks=drop_breaks, output=output,
+        drop_breaks=drop_breaks, output=Path(raw[0].stem) if output is None else output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
     )  # fmt: skip
     for line in imported.messages:

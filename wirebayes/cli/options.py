@@ -18,7 +18,10 @@ def _seed(value: int) -> int:
 ExperimentFile = Annotated[
     Path, typer.Argument(metavar="FILE.toml", help="Experiments; their CSV files lie in the same folder.")
 ]
-Output = Annotated[Path, typer.Option("--output", metavar="DIR", help="Folder for the results.")]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", metavar="DIR", help="Folder for the results; default: named after file and command."),
+]
 Seed = Annotated[int, typer.Option("--seed", callback=_seed, help="Same seed, same machine: same bytes.")]
 ExperimentName = Annotated[str | None, typer.Option("--experiment", metavar="NAME", help="This experiment only.")]
 TrainHolds = Annotated[
@@ -52,3 +55,16 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler."),
 ]
+
+
+def folder_for(command: str, file: Path | str, output: Path | None) -> Path:
+    """The folder of a command's results: as asked for, or named after what it reads and what it does.
+
+    Parameters
+    ----------
+    command : str
+    file : Path or str
+        The experiment file, or the robot.
+    output : Path or None
+    """
+    return Path(f"{Path(file).stem}-{command}") if output is None else output

@@ -15,6 +15,7 @@ from wirebayes.cli.options import (
     OwnEffects,
     Quiet,
     Seed,
+    folder_for,
 )
 
 Source = Annotated[
@@ -24,7 +25,7 @@ Source = Annotated[
 
 def plan(
     source: Source,
-    output: Output,
+    output: Output = None,
     seed: Seed = 0,
     experiment: ExperimentName = None,
     budget_min: Annotated[
@@ -44,7 +45,7 @@ def plan(
     quiet: Quiet = False,
 ) -> None:
     """Predict what tests would teach before they are done, and rank them: DIR/plan.json."""
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.plan import plan as run
 
@@ -52,8 +53,8 @@ def plan(
         planned = run(
             source, experiment=experiment, budget_min=budget_min, robot=robot,
             aim=None if aim is None else aim.split(","), elastic_law=elastic_law, history=history,
-            own_effects=own_effects, seed=seed, output=output, progress=report,
+            own_effects=own_effects, seed=seed, output=folder_for("plan", source, output), progress=report,
         )  # fmt: skip
     for line in planned.messages:
         print(line, file=sys.stderr)
-    conclude(planned, as_json=as_json, quiet=quiet)
+    conclude(planned, Given(str(source)), as_json=as_json, quiet=quiet)

@@ -1,11 +1,12 @@
 """`wirebayes predict`: the readings a posterior expects of a protocol."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from wirebayes.cli.options import ExperimentName, Seed
+from wirebayes.cli.options import AsJson, ExperimentName, Quiet, Seed
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by fit or discover.")]
 ProtocolFile = Annotated[
@@ -15,7 +16,10 @@ ModelOption = Annotated[
     Literal["plain", "final"] | None,
     typer.Option("--model", help="In a folder of discover: the plain model or the final one (the default)."),
 ]
-Table = Annotated[Path, typer.Option("--output", metavar="FILE.csv", help="The table to write.")]
+Table = Annotated[
+    Path | None,
+    typer.Option("--output", metavar="FILE.csv", help="The table to write; default: named after the protocol."),
+]
 Fresh = Annotated[
     bool, typer.Option("--fresh", help="Predict a fresh sample with no history instead of the tested one.")
 ]
@@ -27,12 +31,14 @@ OwnEffects = Annotated[
 def predict(
     folder: Folder,
     protocol: ProtocolFile,
-    output: Table,
+    output: Table = None,
     experiment: ExperimentName = None,
     model: ModelOption = None,
     fresh: Fresh = False,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
     """Predict the readings of holds not measured yet.
 
@@ -41,12 +47,19 @@ def predict(
     training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
     fit's. A first reading in tension_N conditions its hold and those after it.
     """
+    from wirebayes.io.run_folder import plain
+    from wirebayes.workflows.predict import as_json as json_of
     from wirebayes.workflows.predict import predict as run
 
+    table = protocol.with_name(f"{protocol.stem}-predicted.csv") if output is None else output
     predicted = run(
         folder, protocol, experiment=experiment, model=model, fresh=fresh, own_effects=own_effects, seed=seed,
-        output=output,
+        output=table,
     )  # fmt: skip
     for warning in predicted.attrs.get("warnings", []):
         typer.echo(f"warning: {warning}", err=True)
     typer.echo(f"{protocol}: {predicted.attrs['prediction']}", err=True)
+    if as_json:
+        typer.echo(json.dumps(plain(json_of(predicted)), indent=2, ensure_ascii=False, allow_nan=False))
+    elif not quiet:
+        typer.echo(f"Results: {table}")

@@ -1,11 +1,12 @@
 """``wirebayes reproduce``: the paper, with posteriors."""
 
 import sys
+from pathlib import Path
 
 from wirebayes.cli.options import Output, Seed
 
 
-def reproduce(output: Output, seed: Seed = 0) -> None:
+def reproduce(output: Output = None, seed: Seed = 0) -> None:
     """Reproduce the paper from its own tables, with posteriors: DIR/report.html, its tables and pictures."""
     from wirebayes.workers import load_early
 
@@ -13,8 +14,9 @@ def reproduce(output: Output, seed: Seed = 0) -> None:
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.reproduce_paper import reproduce_paper
 
+    folder = Path("reproduce") if output is None else output
     with progress() as report:
-        paper = reproduce_paper(output, seed=seed, progress=report)
+        paper = reproduce_paper(folder, seed=seed, progress=report)
     for line in paper.messages:
         print(line, file=sys.stderr)
-    print(f"{output / 'report.html'}")
+    print(f"{folder / 'report.html'}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import AsJson, ExperimentName, Output, OwnEffects, Quiet, Seed
+from wirebayes.cli.options import AsJson, ExperimentName, Output, OwnEffects, Quiet, Seed, folder_for
 
 RobotFile = Annotated[str, typer.Argument(metavar="ROBOT.toml", help="A robot's file, or the name of a shipped robot.")]
 Wires = Annotated[
@@ -27,7 +27,7 @@ Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative diffe
 def pose(
     robot: RobotFile,
     wires: Wires,
-    output: Output,
+    output: Output = None,
     position: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Pose in metres; default: the file's.")] = None,
     rotation: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Rotation vector in radians.")] = None,
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")] = "0,10,30,60,120,300,600,1800,3600",
@@ -85,7 +85,7 @@ def pose(
     finds the drift. Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects
     are worth.
     """
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.cli.progress import progress
     from wirebayes.workflows.pose import pose as run
     from wirebayes.workflows.wires import named_lines
@@ -97,18 +97,18 @@ def pose(
             map_rotations=map_rotation, other_fit=other_fit, joints=joints, trajectory=trajectory, payload=payload,
             payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
             calibration=calibration, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed,
-            output=output, progress=report,
+            output=folder_for("pose", robot, output), progress=report,
         )  # fmt: skip
     for line in found.messages:
         typer.echo(line, err=True)
-    conclude(found, as_json=as_json, quiet=quiet)
+    conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
 
 
 def calibrate(
     robot: RobotFile,
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Poses, joints and tensions, in order.")],
     wires: Wires,
-    output: Output,
+    output: Output = None,
     tension_sd: TensionError = 0.02,
     tilt_sd: Annotated[
         float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of the platform's normal.")
@@ -131,24 +131,24 @@ def calibrate(
     quiet: Quiet = False,
 ) -> None:
     """Estimate every wire's current zero-tension length from joint values and tensions, without external sensors."""
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import Given, conclude
     from wirebayes.workflows.calibrate import calibrate as run
     from wirebayes.workflows.wires import named_lines
 
     found = run(
         robot, readings, named_lines(wires), tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
         tension_bias=tension_bias, specimen_spread=spread, draws=draws, experiment=experiment, own_effects=own_effects,
-        seed=seed, output=output,
+        seed=seed, output=folder_for("calibrate", robot, output),
     )  # fmt: skip
     for line in found.messages:
         typer.echo(line, err=True)
-    conclude(found, as_json=as_json, quiet=quiet)
+    conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
 
 
 def export(
     robot: RobotFile,
     wires: Wires,
-    output: Output,
+    output: Output = None,
     tensions: Annotated[str, typer.Option(metavar="N,N,…", help="Tensions of the creep table.")] = "1,2,4,8",
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times of the creep table, s.")] = "60,600,3600,86400",
     draws: Draws = 1000,
@@ -162,7 +162,7 @@ def export(
 
     exported = run(
         robot, named_lines(wires), tensions=tensions, times=times, draws=draws, experiment=experiment,
-        own_effects=own_effects, seed=seed, output=output,
+        own_effects=own_effects, seed=seed, output=folder_for("export", robot, output),
     )  # fmt: skip
     for line in exported.messages:
         typer.echo(line, err=True)

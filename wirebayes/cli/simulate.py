@@ -1,5 +1,6 @@
 """``wirebayes simulate``: synthetic tests with known truth, as files the other commands read."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -8,7 +9,7 @@ from wirebayes.cli.options import ElasticLawOption, HistoryOption, Output, OwnEf
 
 
 def simulate(
-    output: Output,
+    output: Output = None,
     seed: Seed = 0,
     tests: Annotated[
         int, typer.Option("--tests", min=1, help="Number of lines tested, each with its own true parameters.")
@@ -65,5 +66,5 @@ def simulate(
         tests=tests, lengths=lengths, displacements=displacements, unload=unload, times=times,
         unrecorded=unrecorded or (), temperature=temperature, resolution=resolution, parameters=chosen,
         effects=effect or (), own_effects=own_effects, elastic_law=elastic_law, history=history, seed=seed,
-        output=output,
+        output=Path("simulated") if output is None else output,
     )  # fmt: skip

@@ -19,6 +19,7 @@ from wirebayes.model.scales import NATURAL
 from wirebayes.notice import Notice
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import of_posterior
+from wirebayes.results.store import unit_of
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Control
@@ -64,16 +65,19 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     problem = problem.in_units(NATURAL)
     sample = problem.samples[0]
     own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
-    parameters = {name: _range(theta[:, i], before[:, i]) for i, name in enumerate(problem.names)}
+    controls = [sample.protocol.control]
+    parameters = {
+        name: _range(theta[:, i], before[:, i], unit_of(name, (), controls)) for i, name in enumerate(problem.names)
+    }
     return Preview(parameters, _effects(block, kinds, rng), of_posterior(own, prior, sample))
 
 
-def _range(draws: Array, before: Array) -> ParameterRange:
+def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
     """One parameter: its range after and before the test, and what determines it."""
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
     prior_low, prior_high = np.quantile(before, [0.05, 0.95])
     return {
-        "q05": float(low), "q50": float(middle), "q95": float(high), "prior_q05": float(prior_low),
+        "unit": unit, "q05": float(low), "q50": float(middle), "q95": float(high), "prior_q05": float(prior_low),
         "prior_q95": float(prior_high), "determined_by": source(contraction(draws, before)),
     }  # fmt: skip
 

@@ -76,6 +76,12 @@ class Experiment:
     control: Control = "displacement"
     preload_mm: float | None = None
 
+    def __repr__(self) -> str:
+        holds, readings = len(self.recorded_holds), sum(hold.time_s.size for hold in self.recorded_holds)
+        set_ = "" if self.control == "displacement" else ", tensions set"
+        what = f"{self.length_mm:g} mm of {self.material}, {holds} holds, {readings} readings{set_}"
+        return f"Experiment({self.name}: {what})"
+
     @property
     def resolution_N(self) -> float:
         """Step to which tensions were rounded; 0.0 where they were set."""
@@ -106,6 +112,34 @@ class Experiment:
         if self.control == "displacement":
             return self.readings()
         return self.protocol().mask * np.array([hold.setting for hold in self.holds])[:, None]
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw what was read against the time of the whole test.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; new ones when left out.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> kite.plot().get_ylabel()
+        'tension, N'
+        """
+        if axes is None:
+            import matplotlib.pyplot as plt  # only where it is needed
+
+            axes = plt.subplots()[1]
+        for hold in self.recorded_holds:
+            axes.plot(hold.start_s + hold.time_s, hold.readings, "o-", color="#30506d", ms=3, lw=1)
+        axes.set_xlabel("time of the test, s")
+        axes.set_ylabel("tension, N" if self.control == "displacement" else "displacement, mm")
+        axes.set_title(self.name)
+        return axes
 
     def train(self, holds: int) -> "Experiment":
         """The first `holds` recorded holds, and the unrecorded ones before the last of them.

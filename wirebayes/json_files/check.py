@@ -41,6 +41,7 @@ class Understood(TypedDict):
 class ParameterRange(Quantiles):
     """A parameter by a rough fit, its prior's range, and which of both determines it."""
 
+    unit: str
     prior_q05: float
     prior_q95: float
     determined_by: str

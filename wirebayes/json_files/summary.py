@@ -7,12 +7,18 @@ from wirebayes.json_files.values import Numbers, Statistics
 from wirebayes.notice import Warned
 
 
-class Parameter(Statistics):
-    """A parameter's posterior, and how well its draws have mixed."""
+class Mixed(Statistics):
+    """Of draws of several chains, and how well these have mixed."""
 
     ess_bulk: float
     ess_tail: float
     r_hat: float
+
+
+class Parameter(Mixed):
+    """A parameter's posterior with its unit."""
+
+    unit: str
 
 
 class Derived(TypedDict):

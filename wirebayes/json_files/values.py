@@ -11,6 +11,9 @@ from wirebayes.typing import Floats
 Numbers = Floats | list[float]
 Integers = NDArray[np.int64] | list[int]
 
+# of the plain model's parameters; errors of what is set and read have the unit of either
+UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm"}
+
 Quantile = Literal["q05", "q50", "q95"]
 Statistic = Literal["mean", "sd", Quantile]
 INTERVAL: tuple[Quantile, ...] = ("q05", "q50", "q95")  # the ends of a 90 % interval and the median between them

@@ -18,6 +18,9 @@ from matplotlib.figure import Figure
 from wirebayes.io.run_folder import plain, write_bytes
 from wirebayes.json_files.scene import SceneJson
 from wirebayes.notice import Notice, Warned, from_json
+from wirebayes.sentences import number as number
+from wirebayes.sentences import span as span
+from wirebayes.sentences import unit_text as unit_text
 
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
 _SENTENCE = 36  # characters; no number with its interval is longer
@@ -180,6 +183,12 @@ class Page:
     sections: Sequence[Section]
     footer: str = ""
 
+    @property
+    def grave(self) -> Notices | None:
+        """The warnings that stand before the answer: those that the first section begins with."""
+        first = next((block for section in self.sections[:1] for block in section.blocks[:1]), None)
+        return first if isinstance(first, Notices) and first.notices[0].first else None
+
 
 def embedded(path: Path) -> str:
     """A picture file as a data address."""
@@ -286,50 +295,3 @@ def words(name: str) -> str:
     """A file or key name as words."""
     text = name.replace("_", " ").replace("-", " ").strip()
     return text[:1].upper() + text[1:]
-
-
-def unit_text(unit: str) -> str:
-    """A unit as people write it; nothing for a pure number."""
-    return "" if unit in ("1", "-") else unit.replace("^-U", "⁻ᵁ").replace("^-N", "⁻ᴺ")
-
-
-def number(value: Any, digits: int = 3) -> str:
-    """A number for people: significant digits, no exponent where none is needed; a dash for nothing."""
-    if value is None or value != value:
-        return "–"
-    if isinstance(value, bool | str):
-        return str(value)
-    if isinstance(value, int):
-        return f"{value:,}".replace(",", "\u202f").replace("-", "−")
-    if value == 0:
-        return "0"
-    size = abs(value)
-    if size >= 1e6 or size < 1e-4:
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}·10{''.join(_RAISED[c] for c in str(int(exponent)))}"
-    decimals = max(0, digits - 1 - _order(value, digits))
-    return f"{value:,.{decimals}f}".replace(",", "\u202f").replace("-", "−")
-
-
-def _order(value: float, digits: int) -> int:
-    """Power of ten of the rounded value."""
-    return int(f"{abs(value):.{digits - 1}e}".split("e")[1])
-
-
-def span(low: Any, high: Any, digits: int = 3) -> str:
-    """An interval for people.
-
-    Parameters
-    ----------
-    low, high : float
-    digits : int
-        Significant ones.
-
-    Returns
-    -------
-    str
-    """
-    return f"{number(low, digits)} … {number(high, digits)}"
-
-
-_RAISED = dict(zip("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻", strict=True))

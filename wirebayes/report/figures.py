@@ -156,57 +156,6 @@ def logarithmic(axes: Any, which: str = "x") -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def marginals(
-    draws: Mapping[str, Array],
-    prior: Mapping[str, Array] | None = None,
-    effects: tuple[Any, ...] = (),
-    control: Control = "displacement",
-) -> list[tuple[str, Figure]]:
-    """One histogram a parameter, the prior behind it.
-
-    Parameters
-    ----------
-    draws : mapping of name to (n,) array
-        Of the posterior; a parameter that does not vary is left out.
-    prior : mapping of name to (m,) array, optional
-        Draws of the prior.
-    effects : tuple of Effect
-        Those of the model, for the units of their amplitudes.
-
-    Returns
-    -------
-    list of (name, figure)
-    """
-    out = []
-    for name, values in draws.items():
-        if np.ptp(values) == 0:
-            continue  # fixed by the user's prior
-        figure, axes = panel(named(name, effects, control), "density", size=(3.4, 2.4))
-        figure.set_layout_engine(None)  # its labels have the same size always: nothing to measure
-        figure.subplots_adjust(left=0.1, right=0.96, bottom=0.22, top=0.97)
-        low, high = np.quantile(values, [0.0005, 0.9995])
-        positive = values.min() > 0 and np.quantile(values, 0.95) > 4 * np.quantile(values, 0.05)
-        bins = np.geomspace(max(low, 1e-12), high, 60) if positive else np.linspace(low, high, 60)
-        if positive:
-            axes.set_xscale("log")
-        before = prior.get(name) if prior else None
-        for sample, colour, label in ((before, QUIET, "prior"), (values, CHAIN, "posterior")):
-            if sample is not None:
-                heights, edges = np.histogram(sample, bins)
-                width = np.diff(np.log(edges)) if positive else np.diff(edges)
-                axes.stairs(heights / (len(sample) * width), edges, fill=True, color=colour, alpha=0.75, label=label)
-        if positive:
-            logarithmic(axes)
-        else:
-            axes.locator_params(axis="x", nbins=5)
-        axes.set_yticks([])
-        axes.spines["left"].set_visible(False)
-        if prior:
-            legend(axes)
-        out.append((name, figure))
-    return out
-
-
 def corner(
     draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: Control = "displacement"
 ) -> Figure | None:

@@ -20,8 +20,8 @@ from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
 from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.io.run_folder import read_json, stored_results, write_bytes, write_json
-from wirebayes.json_files.summary import Derived, Parameter, SummaryJson
-from wirebayes.json_files.values import Statistics
+from wirebayes.json_files.summary import Derived, Mixed, Parameter, SummaryJson
+from wirebayes.json_files.values import UNITS, Statistics
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
@@ -36,7 +36,6 @@ from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.protocol import Control, Protocol
 from wirebayes.wire.staircase import Model
 
-UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm", LENGTH_EXPONENT: "1"}
 # a hold of the paper, and what a robot on the wire works through
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
@@ -572,7 +571,7 @@ def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Cont
     for control in controls:
         errors = {"sensor_sd": READ_UNIT[control], "setting_sd": SET_UNIT[control]}
         own = {c: e.unit_under(a, control) for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True)}
-        each.append((UNITS | errors | own).get(name, "1"))
+        each.append((UNITS | {LENGTH_EXPONENT: "1"} | errors | own).get(name, "1"))
     return " or ".join(dict.fromkeys(each))
 
 
@@ -598,7 +597,7 @@ def band(values: Array) -> Statistics | None:
     return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
 
 
-def statistics(values: Array) -> Parameter:
+def statistics(values: Array) -> Mixed:
     """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
     q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
     with np.errstate(invalid="ignore"):
@@ -623,13 +622,15 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
 
 def _summary(fit: Fit, sample: Sample | None) -> SummaryJson:
     first = sample or fit.problem.samples[0]
+    controls = [s.protocol.control for s in ([sample] if sample else fit.problem.samples)]
     parameters: dict[str, Parameter] = {}
     for name, values in _variables(fit.problem, fit.theta, sample).items():
+        unit = unit_of(name, first.model.effects, controls)
         if values.ndim == 2:
-            parameters[name] = statistics(values)
+            parameters[name] = {"unit": unit, **statistics(values)}
         else:
             for i, s in enumerate(fit.problem.samples):
-                parameters[f"{name}[{s.name}]"] = statistics(values[..., i])
+                parameters[f"{name}[{s.name}]"] = {"unit": unit, **statistics(values[..., i])}
     tension = round(first.model.tension_ref_N, 3)
     wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
     chains = fit.chains

@@ -9,6 +9,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.arrays import is_table, protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
+from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.notice import to_json
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, unlikely_readings
@@ -112,6 +113,27 @@ def predict(
         attributes["warnings"] = [notice["text"] for notice in notices]
         attributes["warning_kinds"] = [notice["kind"] for notice in notices]
     return dataset(rows, attributes, control)
+
+
+def as_json(predicted: "xr.Dataset") -> PredictionJson:
+    """A prediction as plain values: what was predicted, a row for each reading, and the warnings.
+
+    Parameters
+    ----------
+    predicted : xarray.Dataset
+        What `predict` returned.
+    """
+    about = predicted.attrs
+    columns = {str(name): values.values.tolist() for name, values in predicted.reset_coords().data_vars.items()}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    warned = zip(about.get("warning_kinds", ()), about.get("warnings", ()), strict=True)
+    return {
+        "experiment": about["experiment"],
+        "prediction": about["prediction"],
+        "seed": int(about["seed"]),
+        "readings": rows,
+        "warnings": [{"kind": kind, "text": text} for kind, text in warned],
+    }
 
 
 def stored_posteriors(

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, cast
 
+from wirebayes import answers
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, read_experiments
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
@@ -26,10 +27,12 @@ from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.truth import TruthJson
+from wirebayes.json_files.values import Quantiles
 from wirebayes.notice import Notice, Warned, from_json
 from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.sentences import unit_text
 from wirebayes.typing import Floats
 from wirebayes.workflows.options import PathLike
 
@@ -137,6 +140,13 @@ class Result(Generic[Content]):
             _copy(self.place.path, target)
         return target
 
+    def lines(self) -> list[str]:
+        """The answer, a line or two for each experiment, model or wire, with units."""
+        return [repr(self)]
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(self._short_form())})"
 
@@ -208,6 +218,37 @@ class Posterior(Result[SummaryJson]):
         """All groups of ``posterior.nc`` in memory, as ArviZ takes them."""
         return store.datatree(self.folder)
 
+    def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
+        """Draw the readings, hold after hold, with the curve of the model through them and its 90 % band.
+
+        Parameters
+        ----------
+        experiment : str, optional
+            Needed where several were fitted together.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; new ones when left out.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            It was fitted hold by hold, which has no curve from hold to hold.
+
+        Examples
+        --------
+        >>> posterior.plot().get_ylabel()
+        'tension, N'
+        """
+        from wirebayes.report.pictures.curve import on_axes  # matplotlib only where it is needed
+
+        stored = self.stored(experiment)
+        if stored.likelihood == "hold":
+            raise InputError(f"{self.folder}: found a fit with likelihood hold, expected a chain: it has a curve")
+        return on_axes(stored, axes)
+
     def save(self, folder: PathLike) -> Path:
         """Store the posterior, as ``fit`` would where it is all that was fitted, else its two files alone.
 
@@ -242,6 +283,9 @@ class Posterior(Result[SummaryJson]):
         with stored_results(self.folder / SUMMARY):
             return tuple(notice.of(name) for notice in from_json(self.summary()["warnings"]))
 
+    def lines(self) -> list[str]:
+        return answers.of_fit(self.summary())
+
     def _short_form(self) -> list[str]:
         s = self.summary()
         model = [s["likelihood"], s["elastic_law"], s["history"], *s["effects"]]
@@ -252,10 +296,11 @@ class Posterior(Result[SummaryJson]):
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, _figure(p["mean"]), _figure(p["sd"]), f"{_figure(p['q05'])} to {_figure(p['q95'])}"]
+            [name, unit_text(p["unit"]), _figure(p["mean"]), _figure(p["sd"]), _interval(p)]
             for name, p in self.summary()["parameters"].items()
         ]
-        return html_table(repr(self), ["parameter", "mean", "sd", "90 % interval"], rows, self.messages)
+        header = ["parameter", "unit", "mean", "sd", "90 % interval"]
+        return html_table(repr(self), header, rows, self.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -298,6 +343,9 @@ class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
     def warnings(self) -> tuple[Notice, ...]:
         """Of all of them."""
         return tuple(notice for posterior in self.members.values() for notice in posterior.warnings)
+
+    def lines(self) -> list[str]:
+        return [line for posterior in self.members.values() for line in posterior.lines()]
 
     def _short_form(self) -> list[str]:
         return [repr(posterior) for posterior in self.members.values()]
@@ -345,6 +393,10 @@ class Findings(Result[DiscoveryJson]):
             name: Posterior(self.place, self.own_effects, self.computed, name, f"{name}/{model}", alone=False)
             for name in self.report["experiments"]
         }
+
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [line for name, report in found.items() for line in answers.of_findings(name, report)]
 
     def _short_form(self) -> list[str]:
         return [
@@ -416,6 +468,9 @@ class Batch(Result[BatchJson]):
             if (self.folder / folder / POSTERIOR).is_file()
         }
 
+    def lines(self) -> list[str]:
+        return answers.of_batch(self.summary())
+
     def _short_form(self) -> list[str]:
         failed = sum(row["error"] is not None for row in self.rows)
         converged = sum(bool(row["converged"]) for row in self.rows)
@@ -452,6 +507,9 @@ class Plan(Result[PlanJson]):
         """The first of them."""
         return self.protocols[0]
 
+    def lines(self) -> list[str]:
+        return [line for row in self.protocols for line in answers.of_plan(row)]
+
     def _short_form(self) -> list[str]:
         return [f"{len(self.protocols)} protocols", f"best {self.best['name']}"]
 
@@ -476,6 +534,10 @@ class Comparison(Result[ComparisonJson]):
     """
 
     _content: ClassVar[str] = "comparison.json"
+
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [answers.of_comparison(name, table) for name, table in found.items()]
 
     def _short_form(self) -> list[str]:
         return [
@@ -507,6 +569,9 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
     def messages(self) -> tuple[str, ...]:
         """The estimated spread of specimens, and the warnings."""
         return (*specimens_in_words(self.summary()["wires"]), *super().messages)
+
+    def lines(self) -> list[str]:
+        return answers.of_pose(self.summary())
 
     def _short_form(self) -> list[str]:
         found = self.summary()
@@ -540,6 +605,9 @@ class Calibration(Result[CalibrateJson]):
     """
 
     _content: ClassVar[str] = "calibrate.json"
+
+    def lines(self) -> list[str]:
+        return answers.of_calibration(self.summary())
 
     def _short_form(self) -> list[str]:
         found = self.summary()
@@ -627,6 +695,10 @@ class ImportedTests(Result[ImportJson]):
         """The tests as `read_experiments` reads the files that were written."""
         return [e for name in self.summary()["experiments"] for e in read_experiments(self.folder / f"{name}.toml")]
 
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [line for name, test in found.items() for line in answers.of_import(name, test)]
+
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
         return [f"{name}: {each['holds']} holds, {each['readings']} readings" for name, each in found.items()]
@@ -648,17 +720,21 @@ class Check(Result[CheckJson]):
 
     _content: ClassVar[str] = CHECKED
 
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [line for name, test in found.items() for line in answers.of_check(name, test)]
+
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
         return [f"{name}: {test['recorded_holds']} holds, {test['readings']} readings" for name, test in found.items()]
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, parameter, _figure(p["q50"]), f"{_figure(p['q05'])} to {_figure(p['q95'])}", p["determined_by"]]
+            [name, parameter, unit_text(p["unit"]), _figure(p["q50"]), _interval(p), p["determined_by"]]
             for name, test in self.summary()["experiments"].items()
             for parameter, p in test["parameters"].items()
         ]
-        header = ["experiment", "parameter", "median", "90 % interval", "determined by"]
+        header = ["experiment", "parameter", "unit", "median", "90 % interval", "determined by"]
         return html_table(repr(self), header, rows, self.messages)
 
 
@@ -729,6 +805,10 @@ def html_table(title: str, header: list[str], rows: list[list[str]], notes: tupl
 
 def _figure(value: float | None) -> str:
     return "-" if value is None else f"{value:.{_FIGURES}g}"
+
+
+def _interval(quantity: Quantiles) -> str:
+    return f"{_figure(quantity['q05'])} to {_figure(quantity['q95'])}"
 
 
 def _copy(source: Path, target: Path) -> None:

@@ -4,6 +4,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import batch_in_sentences
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
@@ -37,20 +38,21 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found: BatchJson = read_json(folder / "batch.json")
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
-    first: list[Block] = [Columns([_done(rows), _known(fitted), _reliability(rows, configuration)])]
+    lead, *others = batch_in_sentences(found)
+    first: list[Block] = [Text(sentence) for sentence in others]
+    if fitted:
+        alt = "Parameters of all specimens by material."
+        picture = Picture(drawn(specimens_of_materials(fitted, far)), alt, _PICTURE, wide=True)
+        first.append(Pictures([picture]))
+    first.append(Columns([_reliability(rows)]))
     warned: list[Block] = [*before_the_answer(found), *beside_the_answer(found)]
     sections = [Section("Summary", first)]
     sections += [Section("Warnings", warned, folded=len(found["warnings"]) > _MOST_WARNINGS)] if warned else []
     sections += [Section("Outlying specimens", _outliers(fitted, far))]
-    if fitted:
-        alt = "Parameters of all specimens by material."
-        picture = Picture(drawn(specimens_of_materials(fitted, far)), alt, _PICTURE, wide=True)
-        sections.append(Section("Parameters by material", [Pictures([picture])]))
     sections.append(Section("Experiments", _table(rows), folded=len(rows) > 50))
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     effects = [effect for row in fitted for effect in (*row["effects"], row["best_effect"] or "")]
     sections.append(meaning(("90 % interval", "p", "robust z"), effects))
-    lead = "Each experiment was analysed by itself; the table is summary.csv, each folder holds the results of one fit."
     return Page("Many experiments", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -65,28 +67,7 @@ _FILES = (
 )
 
 
-def _done(rows: list[Row]) -> Points:
-    materials = Counter(row["material"] for row in rows if row["material"])
-    failed = [row for row in rows if row["error"]]
-    points = [f"{len(rows)} experiments on {len(materials)} materials."]
-    points += [f"{len(failed)} failed: {_some([row['name'] for row in failed])}."] if failed else []
-    return Points("What was done", points)
-
-
-def _known(fitted: list[Row]) -> Points:
-    verdicts = Counter(row["verdict"] for row in fitted if row["verdict"])
-    effects = Counter(effect for row in fitted for effect in row["effects"])
-    points = [f"{count} × {verdict.replace('-', ' ')}" for verdict, count in verdicts.most_common()]
-    points += [
-        f"{effect.replace('_', ' ')}: in {count} experiment{'s' * (count > 1)}"
-        for effect, count in effects.most_common()
-    ]
-    checks = Counter(row["check"] for row in fitted if row["check"])
-    points += [f"Model check: {checks['passed']} passed, {checks['failed']} failed."] if checks else []
-    return Points("What is known", points or ["The parameters; missing effects were not searched for."])
-
-
-def _reliability(rows: list[Row], configuration: dict[str, Any]) -> Points:
+def _reliability(rows: list[Row]) -> Points:
     stopped = [row["name"] for row in rows if row["converged"] is False]
     points = [f"Not converged: {_some(stopped)}."] if stopped else []
     checked = sum(row["p_global"] is not None for row in rows)

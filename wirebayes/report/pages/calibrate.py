@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import calibration_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths
 from wirebayes.report.blocks import (
@@ -38,7 +39,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections += [Section("Where the platform is", view)] if (view := robot_view(folder)) else []
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(("90 % interval", "zero-tension length", "specimen spread"), model=False))
-    lead = "Zero-tension lengths of a robot's wires from its own joint values and tensions."
+    lead = calibration_in_a_sentence(found)
     return Page(f"Calibration of {found['robot']}", lead, sections, f"Seed {configuration.get('seed')}.")
 
 

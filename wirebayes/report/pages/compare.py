@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import comparison_in_words
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
 from wirebayes.json_files.read_units import read, unit_read
@@ -33,6 +34,7 @@ _CAPTIONS = {
     "above the region means bands that are too narrow, one below it bands that are too wide.",
     "pit-given-first": "The same, each hold's first reading given.",
 }
+_MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
 _FILES = (
     ("comparison.json", "every number of this page, and every held-out reading with its predicted quantiles"),
     ("configuration.json", "the options of this run, with version and seed"),
@@ -44,7 +46,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     content: ComparisonJson = read_json(folder / "comparison.json")
     found = content["experiments"]
     sections = [_section(folder, name, table) for name, table in found.items()]
-    lead = "Each model predicts every hold from the others, and the last holds from the first; best first."
+    lead = " ".join(comparison_in_words(name, table) for name, table in list(found.items())[:_MOST_SENTENCES])
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     effects = [effect for table in found.values() for row in table["models"] for effect in row["name"].split(" + ")]
     sections.append(meaning(("hold", "held out", "rms", "elpd", "weight"), effects))
@@ -55,7 +57,9 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     rows = table["models"]
     good = [r for r in rows if r.get("failed") is None]
     blocks: list[Block] = before_the_answer(table)
-    blocks += [Text(f"{r['name']}: {r['meaning']}.", strong=True) for r in good[:1] if r.get("meaning")]
+    if good:
+        advised = "" if good[0]["name"] == table["base"] else f" with the options of {good[0]['name']}"
+        blocks.append(Text(f"Next: wirebayes fit{advised}, or wirebayes discover, which names what is missing."))
     blocks += beside_the_answer(table)
     if (folder / name).is_dir() and (pictures := pictures_in(folder / name, _CAPTIONS)):
         blocks.append(Pictures(pictures))

@@ -3,9 +3,11 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import findings_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.summary import SummaryJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -25,10 +27,11 @@ from wirebayes.report.blocks import (
     picture_file,
     pictures_in,
     span,
+    unit_text,
 )
-from wirebayes.report.glossary import meaning, spoken
+from wirebayes.report.glossary import SYMBOLS, meaning, spoken
 from wirebayes.report.pictures.discover import waterfall
-from wirebayes.sentences import likely, listed
+from wirebayes.sentences import listed, p_in_words
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -38,12 +41,15 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     overview = Table(
         ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
         [
-            [name, _spoken(v), listed([spoken(e) for e in v["effects"]]), number(v["p_global"], 2), _gap_closed(v)]
+            [name, _spoken(v), listed([spoken(e) for e in v["effects"]]), _p(v), _gap_closed(v)]
             for name, v in found.items()
         ],
     )
-    sections = [Section("Summary", [overview]), *(_section(folder, name, v) for name, v in found.items())]
-    lead = "Simulation against measurement: where they disagree, which effect is missing, and whether adding it helps."
+    sections = [_section(folder, name, v) for name, v in found.items()]
+    if len(found) > 1:
+        sections.insert(0, Section("Summary", [overview]))
+    sentences = [findings_in_a_sentence(name, v) for name, v in found.items()]
+    lead = " ".join(sentences[:_MOST_SENTENCES])
     named = [e for v in found.values() for e in (*v["effects"], *v["probabilities"], *v["power"], *v.get("group", []))]
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(_TERMS, named))
@@ -56,34 +62,27 @@ _FILES = (
     ("*/*/posterior.nc", "all draws of a model, opens with ArviZ"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
+_MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
+_SPEAKS = 0.05  # p of a pattern that says something
+_LEAST = 0.01  # probability of a candidate that is worth a row
 _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 
 
 def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
-    candidates = likely(v, spoken)
-    beside = f" Beside it most likely: {candidates}; none of these is established." if candidates else ""
-    words = {
-        "nothing-missing": "Nothing is missing: the plain model and its noise explain these readings.",
-        "unknown": f"Something is missing that no effect in the catalogue explains.{beside}",
-        "ambiguous": f"Something is missing; these readings do not tell what: {candidates}{_alike(v)}.",
-        "named": f"What is missing: {listed([spoken(e) for e in v['effects']])}{_alike(v)}.",
-        "partial": f"{listed([spoken(e) for e in v['effects']]).capitalize()} {'are' if v['effects'][1:] else 'is'} "
-        "missing, and something else that no effect in the catalogue explains.",
-    }
-    blocks: list[Block] = [*before_the_answer(v), Text(words.get(v["verdict"], v["verdict"]), strong=True)]
-    blocks += beside_the_answer(v)
-    where = [w["sentence"] for w in v.get("where", []) if w.get("sentence")] or ["No pattern stands out."]
+    blocks: list[Block] = [*before_the_answer(v), *_alone(v), *beside_the_answer(v)]
+    file = picture_file(folder, name)
+    if file is not None:
+        alt = f"Readings of {name} with both models' curves through them, and against the plain and the final model."
+        blocks.append(Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)]))
+    if v.get("next_measurement"):
+        blocks.append(Text(f"Measure next: {v['next_measurement']}"))
+    blocks += _parameters(folder / name, v)
+    where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS] or ["No pattern stands out."]
     known = [_held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
-    if v.get("next_measurement"):
-        unknown.append(f"Measure next: {v['next_measurement']}")
     columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in known if p])]
     blocks.append(Columns([*columns, Points("What is not known", unknown or ["Nothing to report."])]))
-    file = picture_file(folder, name)
-    if file is not None:
-        alt = f"Readings of {name} against the plain and the final model."
-        blocks.append(Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)]))
     if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
         blocks.append(Pictures(others))
     if len(v.get("steps", [])) > 1 and read(v["steps"][0], "rmse") is not None:
@@ -112,6 +111,7 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
                 number(round(inclusion[effect], 4), 2) if effect in inclusion else "–",
             ]
             for effect, p in ranked
+            if max(p, inclusion.get(effect, 0.0)) >= _LEAST
         ]
         rest = v.get("remainder", {}).get("probability")
         caption = (
@@ -131,13 +131,44 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     return Section(name, blocks)
 
 
+def _p(v: ExperimentFindings) -> str:
+    return "–" if v["p_global"] is None else p_in_words(v["p_global"], v["p_simulations"])
+
+
+def _alone(v: ExperimentFindings) -> list[Block]:
+    """That other effects look alike here, if so: a headline that hides them would promise too much."""
+    like = _alike(v) if v["verdict"] in ("named", "ambiguous") else ""
+    return [Text(f"{like[2:3].upper()}{like[3:]}.", strong=True)] if like else []
+
+
+def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
+    """Every parameter before and after what was found joined the model."""
+    files = [folder / model / "summary.json" for model in ("plain", "final")]
+    if not all(file.is_file() for file in files):
+        return []
+    summaries: list[SummaryJson] = [read_json(file) for file in files]
+    plain, final = (summary["parameters"] for summary in summaries)
+    rows = []
+    for name, after in final.items():
+        before = plain.get(name)
+        rows.append([
+            name, unit_text(after["unit"]) or "–",
+            *([number(before["q50"]), span(before["q05"], before["q95"])] if before else ["–", "–"]),
+            number(after["q50"]), span(after["q05"], after["q95"]), SYMBOLS.get(name, "–"),
+        ])  # fmt: skip
+    header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
+    same = v["verdict"] == "nothing-missing"
+    caption = "Nothing was added: both are the same." if same else "Each parameter before and after, both on all holds."
+    return [Table(header, rows, caption)]
+
+
 def _spoken(v: ExperimentFindings) -> str:
     return str(v["verdict"]).replace("-", " ")
 
 
 _BEFORE_AND_AFTER = (
-    "Measured minus predicted readings, hold after hold: above under the plain model, below with what was found. "
-    "Shaded holds were kept apart to test the models; both are fitted to all holds here."
+    "Above: every reading with the curves of both models. Below: measured minus predicted readings, under the plain "
+    "model and with what was found. Shaded holds were kept apart to test the models; both are fitted to all holds here."
 )
 
 

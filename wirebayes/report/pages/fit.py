@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.answers import fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.problem import Sample
@@ -29,12 +30,14 @@ from wirebayes.report.blocks import (
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
+from wirebayes.report.pictures.curve import through_the_readings
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.store import Stored, load_with_priors, unit_of
 from wirebayes.sentences import listed
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
+_MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
 _DRAWS = 1000  # for bands in pictures: a 5 % quantile is then one between 3.6 % and 6.4 %
 _FILES = (
     ("*/summary.json", "intervals, convergence and the model check as JSON"),
@@ -45,17 +48,17 @@ _FILES = (
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section for each experiment of each fit in the folder."""
-    sections, effects = [], dict[str, Effect]()
+    sections, effects, sentences = [], dict[str, Effect](), list[str]()
     for file in sorted(folder.glob("*/summary.json")):
         summary: SummaryJson = read_json(file)
+        sentences.append(fit_in_a_sentence(summary))
         if configuration.get("own_effects"):
             sections.append(_of_summary(summary))
             continue
         for stored, prior in load_with_priors(file.parent):
             effects |= {effect.name: effect for effect in stored.sample.model.effects}
             sections.append(section(stored, prior, summary))
-    titles = listed([s.title for s in sections])
-    lead = f"Posterior of {titles}: what the readings say about each parameter, compared with the prior."
+    lead = " ".join(sentences[:_MOST_SENTENCES])
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(("hold", "90 % interval", "prior", "contraction"), effects, effects))
     return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
@@ -91,6 +94,11 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}
     trusted = summary["converged"] and _passed(summary) is not False
     blocks: list[Block] = _cautions(summary)
+    if stored.likelihood == "chain":
+        alt = f"Readings of {sample.name} with the fitted curve through them, hold after hold."
+        drawn_curve = drawn(through_the_readings(stored, sample.name))
+        blocks.append(Pictures([Picture(drawn_curve, alt, _CURVE, wide=True)]))
+    blocks.append(Text(_next(summary)))
     blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample, trusted)]))
     alt = f"Measured minus predicted readings of {sample.name}, hold after hold, inside the 90 % band."
     measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
@@ -104,9 +112,6 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     pictures.append(Picture(drawn(_residuals(stored)), alt, _LEFT))
     blocks.append(Pictures(pictures))
     blocks.append(_parameters(draws, shrunk, sample))
-    named = figures.marginals(draws, prior, sample.model.effects, sample.protocol.control)
-    marginals = [Picture(drawn(figure), f"Prior and posterior of {name} of {sample.name}.") for name, figure in named]
-    blocks.append(Pictures(marginals, small=True))
     pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects, sample.protocol.control)
     if pairs is not None:
         alt = f"Posterior of {sample.name}, every pair of parameters."
@@ -132,8 +137,22 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     return Section(sample.name, blocks)
 
 
-_READ = "What was read: within each hold the tension falls from the dark point downwards."
-_GREW = "What was read: under each weight the wire grows from the dark point upwards; under a smaller one it recovers."
+def _next(summary: SummaryJson) -> str:
+    """What to do with this fit."""
+    kinds = {notice["kind"] for notice in summary["warnings"]}
+    if "model-check" in kinds:
+        return "Next: wirebayes discover with the same file looks for what the model is missing."
+    if "not-converged" in kinds:
+        return "Next: settle the warnings above, then fit again; these numbers are not to be used."
+    return "Next: wirebayes predict for holds not measured yet, or wirebayes pose for a robot on this wire."
+
+
+_CURVE = (
+    "Above: every reading, and the curve that the model draws through them, with its 90 % band, given all readings. "
+    "Below: what is left between reading and curve; nine in ten should lie in the band of the readings' own error."
+)
+_READ = "What was read at each displacement: dark when the hold begins, light later."
+_GREW = "What was read under each weight: dark when the hold begins, light later."
 _LEFT = (
     "What the model leaves over. Where the readings lie outside the band, or show a pattern within it, the model "
     "misses something."

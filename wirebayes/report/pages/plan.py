@@ -3,8 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import plan_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
+from wirebayes.json_files.values import UNITS
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -22,6 +24,7 @@ from wirebayes.report.blocks import (
     number,
     picture_file,
     span,
+    unit_text,
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
@@ -37,17 +40,18 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
     columns = Columns([_requested(found), _recommended(found), _reliability(rows)])
-    first = [*before_the_answer(found), columns, *beside_the_answer(found), _ranking(found)]
+    first = before_the_answer(found)
     picture = picture_file(folder, "plan")
     if picture is not None:
         alt = "Expected widths and detectable effects of each test."
         first.append(Pictures([Picture(embedded(picture), alt, _PICTURE, wide=True)]))
+    first += [*beside_the_answer(found), columns, _ranking(found)]
     sections = [Section("Summary", first)]
     sections += [Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1) for row in rows]
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     effects = [effect for row in rows for effect in row["effects"]]
     sections.append(meaning(("hold", "90 % interval", "information", "δ"), effects))
-    lead = "Each test was simulated many times before it is done, and fitted: how much would be known afterwards?"
+    lead = plan_in_a_sentence(found)
     return Page("What a test would teach", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -103,7 +107,9 @@ def _ranking(found: PlanJson) -> Table:
         ]
         for row in found["protocols"]
     ]  # fmt: skip
-    header = ["rank", "test", "minutes", "bits", *(f"sd of {n}" for n in names), "sd of creep in 1 h, mm"]
+    header = ["rank", "test", "minutes", "bits"]
+    header += [f"sd of {n}, {unit}" if (unit := unit_text(UNITS[n])) else f"sd of {n}" for n in names]
+    header.append("sd of creep in 1 h, mm")
     header += ["sd of the robot's drift in 1 h, mm"] if robot else []
     return Table(
         [*header, "within budget"], lines, "Standard deviations of the posterior, median over the simulated tests."

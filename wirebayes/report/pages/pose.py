@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import pose_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.pose import PoseJson, TimeWithin, Tolerances
 from wirebayes.json_files.values import INTERVAL
@@ -31,10 +32,11 @@ from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.robot import CONTROLLERS
 from wirebayes.robot.mechanics.draws import specimens_in_words
 
+_FIRST = 2  # pictures that prove the answer: how far it moves, and how far it turns
 _CAPTIONS = {
-    "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
     "drift": "How far the platform moves while the actuators stand still. Line: median, band: 90 % of the draws.",
     "rotation": "How far it turns. A symmetric pose turns only because specimens of one line differ.",
+    "robot": "The robot where it was sent (blue) and, enlarged as the title says, where creep takes it (red).",
     "pose-error": "Distance from the pose, controllers with increasingly complete wire models, identical specimens.",
     "error-budget": "How much each parameter's uncertainty contributes to the variance of the drift.",
     "workspace-drift": "The platform at other positions, new wires: how far it moves within a minute. White with a "
@@ -50,15 +52,17 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     if "history" in content:
         return pose_history.page(folder, configuration, content)
     pose: PoseJson = content
-    columns = Columns([_requested(pose), *_answers(pose)])
-    blocks: list[Block] = [*before_the_answer(pose), columns, *beside_the_answer(pose)]
+    blocks: list[Block] = before_the_answer(pose)
     view = robot_view(folder)
     turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
     captions = _CAPTIONS | dict.fromkeys(turned, _TURNED)
     files = {name: picture_file(folder, name) for name in captions if not (view and name == "robot")}
     pictures = [Picture(embedded(p), captions[n], captions[n]) for n, p in files.items() if p is not None]
+    first, rest = pictures[:_FIRST], pictures[_FIRST:]
+    blocks += [Pictures(first)] if first else []
+    blocks += [*beside_the_answer(pose), Text(_next(pose)), Columns([_requested(pose), *_answers(pose)])]
     sections = [Section("Summary", blocks), Section("The robot", view)]
-    sections += [Section("Pictures", [Pictures(pictures)] if pictures else [])]
+    sections += [Section("More pictures", [Pictures(rest)] if rest else [])]
     sections += [Section("Slices of the workspace", _slices(pose))]
     sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
     sections += [
@@ -69,7 +73,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     effects = pose.get("wires", {}).get("effects", [])
     sections.append(meaning(_TERMS, effects))
-    lead = "A platform on wires that creep: the commanded pose, and how the platform moves away from it."
+    lead = pose_in_a_sentence(pose)
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
 
 
@@ -80,6 +84,13 @@ _FILES = (
     ("configuration.json", "the options of this run, with version and seed"),
 )
 _TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "exit point")
+
+
+def _next(pose: PoseJson) -> str:
+    """What to do with this answer."""
+    if not pose["feasible"]:
+        return "Next: another pose or payload, or other bounds of the tension in the robot's file."
+    return "Next: wirebayes calibrate finds the wires' lengths again, once the drift is more than you allow."
 
 
 def _requested(pose: PoseJson) -> Points:

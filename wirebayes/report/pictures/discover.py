@@ -13,6 +13,7 @@ from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.model import likelihoods
 from wirebayes.report.blocks import save
+from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.store import Stored
 from wirebayes.typing import Array
 from wirebayes.wire.control import READ_UNIT
@@ -32,16 +33,25 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, 
     target : Path
         The picture to write.
     """
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    axes = figure.subplots(2, 1, sharex=True, sharey=True)
+    control = plain.sample.protocol.control
+    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
+    above, *axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.4, 1, 1))
+    axes[1].sharey(axes[0])
+    plain_curve, final_curve = curve(plain), curve(final)
+    draw_curve(above, plain, plain_curve, _WORSE, "plain model")
+    draw_curve(above, final, final_curve, _BAND, "final model, 90 % band")
+    draw_readings(above, plain, plain_curve)
+    above.set_title(f"{target.stem}: readings and curves", loc="left", fontsize=10)
+    above.legend(fontsize=8, frameon=False)
     unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
     added = " + ".join([e.replace("_", " ") for e in verdict["accepted"]] + unknown)
     titles = "plain model", f"with {added}" if added else "nothing had to be added"
     for axis, stored, title in zip(axes, (plain, final), titles, strict=True):
         _residuals(axis, stored, verdict["held_out"]["holds"])
         axis.set_title(f"{target.stem}: {title}", loc="left", fontsize=10)
-        axis.set_ylabel(f"measured − predicted ({READ_UNIT[plain.sample.protocol.control]})")
-    axes[1].set_xlabel("hold number; within each hold, time runs to the right")
+        axis.set_ylabel(f"measured − predicted ({READ_UNIT[control]})")
+    above.set_ylabel(f"{READ[control]} ({READ_UNIT[control]})")
+    name_holds(axes[1], plain)
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     save(figure, target)

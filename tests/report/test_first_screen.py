@@ -1,0 +1,55 @@
+"""What a page says first: grave warnings, then the answer with number, unit and interval."""
+
+from wirebayes import answers
+from wirebayes.notice import Notice
+from wirebayes.report.blocks import Notices, Page, Section, Text
+from wirebayes.report.page import render
+
+SUMMARY = {
+    "experiment": "kite",
+    "converged": True,
+    "parameters": {"k1": {"unit": "N", "q50": 882.4, "q05": 850.0, "q95": 910.0}},
+    "derived": {"tension_N": 4.5, "creep_2min_mm": {"q50": 1.234, "q05": 1.1, "q95": 1.4}},
+}
+
+
+def test_grave_warnings_stand_before_the_answer_and_once() -> None:
+    grave, light = Notices([Notice("slack", "a wire is slack")]), Notices([Notice("sag", "a wire sags")])
+    html = render(Page("T", "The answer.", [Section("A", [grave, Text("Then."), light])]))
+    assert html.count("A wire is slack.") == 1
+    assert html.index("A wire is slack.") < html.index("The answer.") < html.index("A wire sags.")
+    assert Page("T", "The answer.", [Section("A", [light])]).grave is None
+
+
+def test_the_answer_of_a_fit_has_number_unit_and_interval() -> None:
+    said = answers.fit_in_a_sentence(SUMMARY)  # type: ignore[arg-type]
+    assert said == (
+        "kite creeps by 1.23 mm (1.10 … 1.40) within two minutes under 4.5 N, and its stiffness is 882 N "
+        "(850 … 910) per unit of strain; intervals hold 90 %."
+    )
+    failed = SUMMARY | {"model_check": {"passed": False}}
+    assert answers.fit_in_a_sentence(failed).startswith("If the model were right: ")  # type: ignore[arg-type]
+
+
+def test_a_comparison_is_a_ranking_in_words() -> None:
+    rows = [
+        {"name": "toe", "failed": None, "difference": {"elpd": 12.3, "se": 3.2}},
+        {"name": "plain", "failed": None, "difference": {"elpd": 0.0, "se": 0.0}},
+        {"name": "ageing", "failed": "no fit", "difference": None},
+    ]
+    table = {"base": "plain", "models": rows}
+    assert answers.comparison_in_words("a", table) == (  # type: ignore[arg-type]
+        "a: toe predicts left-out holds best, by 12 ± 3.2 in elpd against plain; then comes plain."
+    )
+
+
+def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
+    row = {"error": None, "check": None, "verdict": "nothing-missing", "material": "m", "converged": True}
+    row = row | {"effects": list[str]()}
+    rows = [row | {"name": "a"}, row | {"name": "b", "verdict": "named", "effects": ["toe"]}]
+    found = {"experiments": rows, "outliers": []}
+    assert answers.batch_in_sentences(found) == [  # type: ignore[arg-type]
+        "2 tests of one material: 2 converged.",
+        "Nothing is missing in one test.",
+        "Toe: in one test (b).",
+    ]

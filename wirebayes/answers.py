@@ -1,0 +1,383 @@
+"""The answer of every result in a few lines, with units: on a terminal, and in Python with `print`."""
+
+from collections import Counter
+from textwrap import wrap
+from typing import cast
+
+from wirebayes.json_files.batch import BatchJson
+from wirebayes.json_files.calibrate import CalibrateJson
+from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
+from wirebayes.json_files.comparison import ComparedModels
+from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.imported import ImportedExperiment
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson
+from wirebayes.json_files.pose import Drift, PoseJson
+from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.json_files.values import UNITS, Quantiles
+from wirebayes.sentences import likely, listed, number, p_in_words, quantity, span, unit_text
+
+_NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
+
+
+def of_fit(summary: SummaryJson) -> list[str]:
+    """Of a fit: its state, the parameters and the creep, with units and 90 % intervals."""
+    derived = summary["derived"]
+    state = "converged" if summary["converged"] else "NOT CONVERGED"
+    passed = summary["model_check"]["passed"] if "model_check" in summary else None
+    checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
+    names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
+    parameters = ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
+    creep = f"creep after 2 min at {derived['tension_N']:g} N {_band(derived['creep_2min_mm'])} mm"
+    return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
+
+
+_SHOWN = ("k1", "B", "U", "k2", "N")
+
+
+def _effects(summary: SummaryJson) -> list[str]:
+    return [key.split("@")[0] for key in summary["effects"]]
+
+
+def of_findings(name: str, report: ExperimentFindings) -> list[str]:
+    """Of one experiment that something may be missing in: what, how large, and what it is worth."""
+    verdict, effects = report["verdict"], ", ".join(report["effects"])
+    finding = _NAMED.get(verdict, f"{verdict}: {effects}")
+    if verdict == "ambiguous":
+        finding = f"ambiguous: {likely(report)}"
+    if verdict == "partial":
+        are = "are" if report["effects"][1:] else "is"
+        finding = f"{effects} {are} missing, and something that is not in the catalogue"
+    lines = [f"{name}: {finding} ({p_in_words(report['p_global'], report['p_simulations'])})"]
+    if verdict == "unknown" and likely(report):
+        lines.append(f"  beside it most likely {likely(report)}; none of these is established")
+    for effect, size in report["amplitudes"].items():
+        at = "" if size["hold"] is None else f" at hold {size['hold']}"
+        unit = "" if size["unit"] == "-" else f" {size['unit']}"
+        lines.append(f"  {effect}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
+    like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
+    if like and verdict in ("named", "ambiguous"):
+        lines.append(f"  hard to distinguish on this protocol: {', '.join(like)}")
+    gain = report["held_out"]
+    before, after = (read(gain[model], "rmse") for model in ("plain", "final"))
+    if report["effects"] and None not in (before, after):
+        lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}")
+    return lines
+
+
+def of_import(name: str, test: ImportedExperiment) -> list[str]:
+    """Of a raw file: what was found in it and what was done."""
+    sample = f"{test['length_mm']:g} mm of {test['material']}"
+    return [
+        f"{name}: {test['holds']} holds, {test['readings']} readings, {sample}",
+        *(f"  {note}" for note in test["notes"]),
+    ]
+
+
+def of_batch(found: BatchJson) -> list[str]:
+    """Of many experiments: how many, what was found, and which stand apart."""
+    rows, far = found["experiments"], found["outliers"]
+    failed = sum(row["error"] is not None for row in rows)
+    converged = sum(bool(row["converged"]) for row in rows)
+    lines = [f"{len(rows)} experiments: {converged} converged, {failed} failed"]
+    verdicts = Counter(row["verdict"] for row in rows if row["verdict"])
+    if verdicts:
+        lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
+    lines += [f"  apart: {outlier['sentence']}" for outlier in far[:_MOST_LINES]]
+    return lines + ([f"  and {len(far) - _MOST_LINES} more outliers"] if len(far) > _MOST_LINES else [])
+
+
+def of_plan(row: JudgedProtocol) -> list[str]:
+    """Of a planned test: its rank and length, and what would be known afterwards."""
+    budget = "" if row["within_budget"] else ", longer than the available time"
+    lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
+    known = [
+        f"{name} {row['parameters'][name]['sd']:.2g} {unit_text(UNITS[name])}".rstrip()
+        for name in _SHOWN
+        if name in row["parameters"]
+    ]
+    creep = row["creep"]
+    known.append(f"creep after 1 h at {creep['tension_N']:.3g} N {creep['creep_1h_mm']['sd']:.2g} mm")
+    lines.append(f"  expected sd: {', '.join(known)}")
+    if row["robot"] is not None and row["robot"]["drift_sd_mm"] is not None:
+        lines.append(f"  drift of the robot after 1 h: sd {row['robot']['drift_sd_mm']:.2g} mm")
+    return lines
+
+
+_MOST_LINES = 10  # of outliers, on a terminal
+
+
+def of_check(name: str, test: CheckedExperiment) -> list[str]:
+    """Of a test that is not fitted yet: its holds, and what it can determine."""
+    recorded = f"{test['recorded_holds']} holds, {test['readings']} readings in {test['duration_s'] / 60.0:.3g} min"
+    unit = unit_read(test, "resolution")
+    step = read(test, "resolution")
+    steps = f", written in steps of {step:g} {unit}" if step else ""
+    lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
+    if test["temperature_C"]:
+        lines.append("  temperature from {:.3g} to {:.3g} °C".format(*test["temperature_C"]))
+    weights = test["control"] == "force"
+    lines.append(f"  {'hold':>4} {'weight' if weights else 'displacement':>13} {'begins':>9} {'lasts':>9}  readings")
+    for hold in test["holds"]:
+        course = "none: held, not recorded"
+        if hold["number"] is not None:
+            first, last = read(hold, "first"), read(hold, "last")
+            course = f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
+        place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
+        begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
+        number = "-" if hold["number"] is None else hold["number"]
+        lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
+    for source in ("data", "data and prior", "prior"):
+        ranges = [
+            f"{p} {_with_unit(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == source
+        ]
+        lines += _wrapped(f"parameters from the {source}", ranges)
+    for shows, words in _SHOWS.items():
+        effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
+        lines += _wrapped(words, [_size(e, found) for e, found in effects])
+    count = len(test["warnings"])
+    lines.append(f"  {count} warning{'s' * (count > 1)}, on standard error" if count else "  nothing suspicious")
+    return lines
+
+
+_SHOWS = {
+    "yes": "effects that would be detected, from this size on",
+    "if unusually large": "effects that would be detected if unusually large",
+    "no": "effects that it cannot show",
+}
+
+
+def _size(effect: str, found: EffectSize) -> str:
+    if found["amplitude_80"] is None:
+        return f"{effect} ({found['reason']})"
+    return f"{effect} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
+
+
+def _wrapped(title: str, items: list[str]) -> list[str]:
+    """A list in lines that a terminal shows whole."""
+    if not items:
+        return []
+    whole = [item.replace(" ", "\u00a0") for item in items]  # no item is broken
+    lines = wrap(f"{title}: {', '.join(whole)}", 110, initial_indent="  ", subsequent_indent="    ")
+    return [line.replace("\u00a0", " ") for line in lines]
+
+
+def of_comparison(name: str, table: ComparedModels) -> str:
+    """Of one experiment: which models predict what they have not seen best."""
+    best, *others = [row["name"] for row in table["models"] if row["failed"] is None] or ["none"]
+    return f"{name}: {best} predicts left-out holds best" + (f", then {', '.join(others[:2])}" if others else "")
+
+
+def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
+    """Of a robot: how far its platform moves, for each spread of specimens."""
+    if not found["feasible"]:
+        return [f"{found['robot']}: {found['sentence']}"]
+    lines = []
+    measured = "history" in found and cast(PoseHistoryJson, found)["history"]["kind"] == "measured"
+    moved = "is away from where it is meant to be" if measured else "has drifted"
+    for drift in found["drift"]:
+        far, time = drift["distance_mm"], drift["times_s"][-1]
+        if known_at_the_end(drift):
+            lines.append(
+                f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
+                f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
+            )
+    return lines or [f"{found['robot']}: no draw of the wires could be solved"]
+
+
+def of_calibration(found: CalibrateJson) -> list[str]:
+    """Of a calibration: every wire's length."""
+    known = found["with_creep_model"]
+    if not known["converged"]:
+        return [f"{found['robot']}: not converged, no lengths to use"]
+    length = known["length_m"]
+    rows = zip(length["mean"], length["q05"], length["q95"], strict=True)
+    lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
+    return [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
+
+
+def _with_unit(quantity: Parameter | ParameterRange) -> str:
+    return f"{_band(quantity)} {unit_text(quantity['unit'])}".rstrip()
+
+
+def _band(quantity: Quantiles | ParameterRange | None) -> str:
+    return "-" if quantity is None else f"{quantity['q50']:.4g} [{quantity['q05']:.4g}, {quantity['q95']:.4g}]"
+
+
+def known_at_the_end(drift: Drift) -> bool:
+    """Whether any draw holds the platform at the last time."""
+    middle = drift["distance_mm"]["q50"]
+    return middle is not None and middle[-1] is not None
+
+
+def fit_in_a_sentence(summary: SummaryJson) -> str:
+    """How much the wire creeps and how stiff it is, with intervals.
+
+    Parameters
+    ----------
+    summary : dict
+    """
+    derived, k1 = summary["derived"], summary["parameters"].get("k1")
+    trusted = summary["converged"] and summary.get("model_check", {}).get("passed") is not False
+    doubt = "" if trusted else "If the model were right: "
+    creep = derived["creep_2min_mm"]
+    if creep is None or k1 is None:
+        return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
+    stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
+    stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
+    return (
+        f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {derived['tension_N']:g} N, "
+        f"and its stiffness is {stiff} per unit of strain; intervals hold 90 %."
+    )
+
+
+def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
+    """What is missing, how large it is, and what it takes away of the error on holds that were not used.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    report : dict
+        Its part of ``discovery.json``.
+    """
+    effects = [effect.replace("_", " ") for effect in report["effects"]]
+    are = "are" if effects[1:] else "is"
+    candidates = likely(report, lambda effect: effect.replace("_", " "))
+    what = {
+        "nothing-missing": "nothing is missing: the plain model and its noise explain these readings",
+        "unknown": "something is missing that no effect in the catalogue explains"
+        + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
+        "ambiguous": f"something is missing; these readings do not tell what: {candidates}",
+        "named": f"{listed(effects)} {are} missing",
+        "partial": f"{listed(effects)} {are} missing, and something else that no effect in the catalogue explains",
+    }[report["verdict"]]
+    sizes = [quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for a in report["amplitudes"].values()]
+    size = f", of size {listed(sizes)}" if sizes else ""
+    held = report["held_out"]
+    before, after = (read(held[model], "rmse") for model in ("plain", "final"))
+    gain = ""
+    if report["effects"] and before is not None and after is not None:
+        gain = f"; with {'them' if effects[1:] else 'it'} the error on unused holds goes from {number(before)} to "
+        gain += f"{number(after)} {unit_read(held['plain'])}"
+    sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
+    return f"{name}: {what}{size}{gain}{sure}."
+
+
+def comparison_in_words(name: str, table: ComparedModels) -> str:
+    """The ranking of the models.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    table : dict
+        Its part of ``comparison.json``.
+    """
+    good = [row for row in table["models"] if row["failed"] is None]
+    if not good:
+        return f"{name}: no model could be judged."
+    best, *others = good
+    gain = best["difference"]
+    against = ""
+    if gain is not None and best["name"] != table["base"]:
+        against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in elpd against {table['base']}"
+    come = "come" if others[1:] else "comes"
+    then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
+    rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
+    return f"{name}: {best['name']} predicts left-out holds best{against}{then}{rest}."
+
+
+def batch_in_sentences(found: BatchJson) -> list[str]:
+    """A sentence a finding: how many were fitted, what is missing in which, which stand apart.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    rows = found["experiments"]
+    materials = {row["material"] for row in rows if row["material"]}
+    kinds = f"{len(materials)} materials" if len(materials) > 1 else "one material"
+    failed = [row["name"] for row in rows if row["error"]]
+    out = [f"{_count(len(rows), 'test')} of {kinds}: {sum(bool(row['converged']) for row in rows)} converged."]
+    out += [f"Not fitted: {_some(failed)}."] if failed else []
+    clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
+    out += [f"Nothing is missing in {_count(len(clean), 'test')}."] if clean else []
+    effects = Counter(effect for row in rows for effect in row["effects"])
+    for effect, count in effects.most_common():
+        where = [row["name"] for row in rows if effect in row["effects"]]
+        out.append(f"{effect.replace('_', ' ').capitalize()}: in {_count(count, 'test')} ({_some(where)}).")
+    unknown = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
+    out += [f"Something without a name: in {_some(unknown)}."] if unknown else []
+    refused = [row["name"] for row in rows if row["check"] == "failed" and row["verdict"] is None]
+    out += [f"The model does not describe the readings of {_some(refused)}."] if refused else []
+    out += [outlier["sentence"].rstrip(".") + "." for outlier in found["outliers"][:_MOST_LINES]]
+    return out
+
+
+def _count(number_of: int, what: str) -> str:
+    return f"one {what}" if number_of == 1 else f"{number_of} {what}s"
+
+
+def _some(names: list[str], most: int = 6) -> str:
+    """Names as a sentence lists them, the first of many."""
+    more = [f"{len(names) - most} more"] if len(names) > most else []
+    return listed([*names[:most], *more])
+
+
+def pose_in_a_sentence(found: PoseJson) -> str:
+    """How far the platform moves, with the conditions behind it.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    if not found["feasible"]:
+        return found["sentence"]
+    known = [drift for drift in found["drift"] if known_at_the_end(drift)]
+    if not known:
+        return f"No draw of the wires holds {found['robot']} to the end."
+    drift = known[-1]
+    far, tilt, time = drift["distance_mm"], drift["tilt_deg"], drift["times_s"][-1]
+    moved, turned = (quantity(q["q50"][-1], q["q05"][-1], q["q95"][-1], unit) for q, unit in ((far, "mm"), (tilt, "")))
+    spread = drift["specimen_spread"]
+    alike = f"if wires cut from one line differ by {100 * spread:g} %" if spread else "if all wires are alike"
+    return (
+        f"The platform of {found['robot']} moves by {moved} and tilts by {turned} degrees within {number(time)} s of "
+        f"standing still, {alike}; intervals hold 90 %."
+    )
+
+
+def plan_in_a_sentence(found: PlanJson) -> str:
+    """The test to do, and what would be known after it.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    best = found["protocols"][0]
+    creep = best["creep"]["creep_1h_mm"]
+    what = f" ({best['words']})" if best["words"] else ""
+    return (
+        f"Do {best['name']}{what}: within {number(best['duration_min'])} min it would make known the creep after an "
+        f"hour at {number(best['creep']['tension_N'])} N to ± {number(creep['sd'], 2)} mm (now ± "
+        f"{number(creep['guess_sd'], 2)} mm, standard deviations)."
+    )
+
+
+def calibration_in_a_sentence(found: CalibrateJson) -> str:
+    """How well the lengths are known.
+
+    Parameters
+    ----------
+    found : dict
+    """
+    known = found["with_creep_model"]
+    if not known["converged"]:
+        return "Not converged: there are no lengths to use."
+    sd = [1e3 * value for value in known["length_m"]["sd"]]
+    return (
+        f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {span(min(sd), max(sd), 2)} mm "
+        f"(standard errors), from {found['read']} of {found['holds']} holds."
+    )

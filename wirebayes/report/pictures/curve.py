@@ -1,0 +1,192 @@
+"""The curve that a posterior draws through its readings, hold after hold, and what it leaves over."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wirebayes.prediction.predictive import PredictionRequest, chain_course
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
+from wirebayes.results.store import Stored
+from wirebayes.typing import Floats
+from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.protocol import Protocol
+
+DRAWS = 300  # a 5 % quantile is then one between 3 and 7 %, which no picture shows
+_POINTS = 25  # of the curve within a hold
+_MARGIN = 0.1  # of a hold's place, left free at either side
+_MOST_TICKS = 24  # hold numbers that an axis has room for
+READ = {"displacement": "tension", "force": "displacement"}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Readings as the model has them, given all readings, without sensor error.
+
+    Attributes
+    ----------
+    place : (H, T) array
+        Hold after hold, and within each from its beginning to its end: 0 to 1 in the first, 1 to 2 in the second.
+    quantiles : (3, H, T) array
+        5 %, 50 % and 95 %; N, or mm where the tension is set.
+    at_readings : (H, R) array
+        The median at every reading, 0 where there is none.
+    noise : float
+        Median standard deviation of the error of a reading.
+    """
+
+    place: Floats
+    quantiles: Floats
+    at_readings: Floats
+    noise: float
+
+
+def curve(stored: Stored) -> Curve:
+    """The curve through the readings of a posterior whose holds are one chain.
+
+    Parameters
+    ----------
+    stored : Stored
+    """
+    protocol, sample = stored.sample.protocol, stored.sample
+    rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), DRAWS)).astype(int)
+    own = {name: values[rows] for name, values in stored.draws.items()}
+    courses = []
+    for dense in (_dense(protocol), protocol):
+        holds = len(dense.setting)
+        request = PredictionRequest(dense, holds, np.zeros(holds, bool), np.full(holds, np.nan))
+        courses.append(chain_course(own, sample, request, np.random.default_rng(0)))
+    inside = np.linspace(_MARGIN, 1.0 - _MARGIN, _POINTS)
+    recorded = np.cumsum(protocol.recorded) - 1.0
+    quantiles = np.quantile(courses[0], [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
+    noise = float(np.median(np.hypot(own["sensor_sd"], sample.resolution / np.sqrt(12.0))))
+    return Curve(recorded[:, None] + inside, quantiles, np.median(courses[1], axis=2), noise)
+
+
+def _dense(protocol: Protocol) -> Protocol:
+    """The same holds, read so often that the curve is smooth; all of them recorded."""
+    time = np.linspace(0.0, 1.0, _POINTS) * protocol.duration_s[:, None]
+    warming = None
+    if protocol.warming_K is not None:
+        each = zip(time, protocol.time_s, protocol.warming_K, protocol.mask, strict=True)
+        warming = np.array(
+            [np.interp(t, at[read], kelvin[read]) if read.any() else 0.0 * t for t, at, kelvin, read in each]
+        )
+    return replace(protocol, time_s=time, mask=np.ones(time.shape, bool), warming_K=warming)
+
+
+def through_the_readings(stored: Stored, title: str = "") -> Figure:
+    """The readings with the curve through them above, what the curve leaves over below.
+
+    Parameters
+    ----------
+    stored : Stored
+    title : str
+    """
+    figure = Figure(figsize=(9.0, 5.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    found = curve(stored)
+    draw_curve(above, stored, found, CHAIN, "the model, 90 % band")
+    draw_readings(above, stored, found)
+    _left_over(below, stored, found)
+    name_holds(below, stored)
+    unit = READ_UNIT[stored.sample.protocol.control]
+    above.set_ylabel(f"{READ[stored.sample.protocol.control]}, {unit}")
+    below.set_ylabel(f"measured − model, {unit}")
+    above.set_title(title, loc="left", fontsize=10.5, color=INK)
+    above.legend(frameon=False, fontsize=8.5, loc="best")
+    for axes in (above, below):
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def on_axes(stored: Stored, axes: Any = None) -> Any:
+    """The readings with the curve through them, on axes of the user's.
+
+    Parameters
+    ----------
+    stored : Stored
+    axes : matplotlib.axes.Axes, optional
+        New ones when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    if axes is None:
+        import matplotlib.pyplot as plt  # only for users, who look at it on a screen
+
+        axes = plt.subplots()[1]
+    found, control = curve(stored), stored.sample.protocol.control
+    draw_curve(axes, stored, found, CHAIN, "the model, 90 % band")
+    draw_readings(axes, stored, found)
+    name_holds(axes, stored)
+    axes.set_ylabel(f"{READ[control]}, {READ_UNIT[control]}")
+    axes.set_title(stored.sample.name)
+    axes.legend(frameon=False)
+    return axes
+
+
+def draw_curve(axes: Any, stored: Stored, found: Curve, colour: str, label: str) -> None:
+    """The median and the band of every recorded hold.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    stored : Stored
+    found : Curve
+    colour, label : str
+    """
+    for j in np.flatnonzero(stored.sample.protocol.recorded):
+        low, middle, high = found.quantiles[:, j]
+        axes.fill_between(found.place[j], low, high, color=colour, alpha=0.25, lw=0)
+        axes.plot(found.place[j], middle, color=colour, lw=1.5, label=label)
+        label = "_nolegend_"  # one entry for all holds
+
+
+def draw_readings(axes: Any, stored: Stored, found: Curve) -> None:
+    """A dot for every reading, at its time within its hold.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    stored : Stored
+    found : Curve
+    """
+    x, (j, r) = _places(stored, found)
+    axes.plot(x, stored.sample.readings[j, r, 0], "o", color=INK, ms=3, label="readings")
+
+
+def _left_over(axes: Any, stored: Stored, found: Curve) -> None:
+    x, (j, r) = _places(stored, found)
+    width = 1.645 * found.noise
+    axes.axhspan(-width, width, color=CHAIN, alpha=0.15, lw=0, label="90 % of the readings' own error")
+    axes.axhline(0.0, color=QUIET, lw=0.8)
+    axes.plot(x, stored.sample.readings[j, r, 0] - found.at_readings[j, r], "o", color=HOLD, ms=3)
+    axes.legend(frameon=False, fontsize=8.5, loc="best")
+
+
+def _places(stored: Stored, found: Curve) -> tuple[Floats, tuple[Any, Any]]:
+    """Where each reading stands, and its row and column."""
+    protocol = stored.sample.protocol
+    j, r = np.nonzero(protocol.mask)
+    share = protocol.time_s[j, r] / np.maximum(protocol.duration_s[j], 1e-9)
+    first, last = found.place[j, 0], found.place[j, -1]
+    return first + share * (last - first), (j, r)
+
+
+def name_holds(axes: Any, stored: Stored) -> None:
+    """Numbers of the recorded holds below the axis.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    stored : Stored
+    """
+    protocol = stored.sample.protocol
+    numbers = protocol.number[protocol.recorded]
+    step = -(-len(numbers) // _MOST_TICKS)
+    axes.set_xticks(np.arange(0, len(numbers), step) + 0.5, [str(n) for n in numbers[::step]])
+    axes.set_xlim(0, len(numbers))
+    axes.set_xlabel("hold; within each, time runs from its beginning to its end")
