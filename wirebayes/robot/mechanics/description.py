@@ -166,6 +166,16 @@ class Robot:
         return 6 if self.freedom == "pose" else 3
 
     @property
+    def freedoms(self) -> int:
+        """Degrees of freedom that the platform really has."""
+        return self.degrees
+
+    @property
+    def is_underactuated(self) -> bool:
+        """Whether balance decides the orientation: a platform that may turn, on fewer wires than degrees of freedom."""
+        return self.freedom == "pose" and self.legs < self.freedoms
+
+    @property
     def is_linear(self) -> NDArray[np.bool_]:
         """(w,) True where a linear actuator drives the leg."""
         return np.array([a == "linear" for a in self.actuator])
