@@ -71,6 +71,20 @@ class EquilibriumPose(PoseNow):
     stable: bool
 
 
+class OrientationFound(TypedDict):
+    """Which part of the orientation was commanded, and which balance decided."""
+
+    commanded_degrees: int
+    of_degrees: int
+    position_directions: int
+    rotation_choice: int
+    commanded_components: list[str]
+    free_components: list[str]
+    refused_components: list[str]
+    other_rotation_vectors_rad: Numbers
+    sentence: str
+
+
 class Equilibria(TypedDict):
     """All that were found from many starts."""
 
@@ -280,6 +294,7 @@ class PoseJson(RobotOnWires):
 
     pose: PoseNow
     tension_distribution: TensionDistribution
+    orientation: NotRequired[OrientationFound]
     feasible_draws: NotRequired[float]
     inverse: NotRequired[InverseKinematics]
     forward: NotRequired[ForwardKinematics]

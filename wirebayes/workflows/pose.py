@@ -16,7 +16,9 @@ from wirebayes.robot.mechanics.draws import typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import Answer, answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
+from wirebayes.robot.pose.orientation import orientation
 from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.typing import Floats
 from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     Numbers,
@@ -91,7 +93,8 @@ def pose(
     position : (3,) array, optional
         Of the platform in m; the robot's home pose when left out. With `joints`: about where it starts.
     rotation : (3,) array, optional
-        Rotation vector in rad; of the home pose when left out.
+        Rotation vector in rad, None for a component that balance decides. When left out: of the home pose where the
+        wires can command and hold it, else as the platform hangs in balance.
     times : sequence of float
         Rising times after the command, s.
     tolerance : float
@@ -165,7 +168,7 @@ def pose(
     machine = _loaded(bare, payload, payload_at)
     line = draws_for(machine, wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
-    turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
+    turned = asked_rotation(rotation)
     moments = rising_times(times)
     tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
@@ -179,12 +182,13 @@ def pose(
         errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
         options = {"--experiment": experiment, **carried, **at}
         decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, options)
-        return pose_history(machine, line, joints, trajectory, errors, (where, matrix(turn)), seed, decides,
+        return pose_history(machine, line, joints, trajectory, errors, (where, _start(machine, turned)), seed, decides,
                             Place.at(output), own, progress)  # fmt: skip
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
-    request = PoseRequest(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread,
-                          seed, slices)  # fmt: skip
+    there = orientation(machine, where, turned)
+    request = PoseRequest(where, there.rotation, moments, 1e-3 * tolerance, math.radians(tolerance_tilt),
+                          specimen_spread, seed, slices, there)  # fmt: skip
     options = {
         "--experiment": experiment, **at, "--times": text_of(times), "--tolerance": tolerance,
         "--tolerance-tilt": tolerance_tilt, "--specimen-spread": specimen_spread,
@@ -214,6 +218,29 @@ def _write(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> N
 def _spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
     """Options as the command line spells them; None where they were not given."""
     return {name: None if values is None else text_of(values) for name, values in options.items()}
+
+
+def asked_rotation(rotation: Numbers | None) -> Floats | None:
+    """Components of a rotation vector, NaN where ``free`` (in Python None); None where nothing is asked for."""
+    if rotation is None:
+        return None
+    text = text_of(rotation)
+    words = ["free" if word.strip() in ("free", "None") else word for word in text.split(",")]
+    if "free" not in words:
+        return np.asarray(numbers("--rotation", text, 3))
+    try:
+        found = np.array([np.nan if word == "free" else float(word) for word in words])
+    except ValueError:
+        found = np.array([np.inf])
+    if len(found) != 3 or np.isinf(found).any():
+        raise InputError(f"--rotation: found {text!r}; expected three finite numbers or free, separated by commas")
+    return found if np.isfinite(found).any() else None
+
+
+def _start(robot: Robot, asked_rad: Floats | None) -> Floats:
+    """About how the platform is turned when a history begins."""
+    home = robot.home_rotation_rad
+    return matrix(home if asked_rad is None else np.where(np.isfinite(asked_rad), asked_rad, home))
 
 
 def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:

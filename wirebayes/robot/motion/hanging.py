@@ -173,7 +173,7 @@ def commanded(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Flo
     return _basis(free[:, :3]), len(_basis(free))
 
 
-def nearest_position(robot: Robot, position_m: Floats, reference: Floats) -> tuple[Floats, Floats] | None:
+def nearest_position(robot: Robot, position_m: Floats, reference: Floats) -> Floats | None:
     """The position nearest to another at which the platform hangs in balance.
 
     Parameters
@@ -185,12 +185,10 @@ def nearest_position(robot: Robot, position_m: Floats, reference: Floats) -> tup
 
     Returns
     -------
-    position_m : (3,) array
-    rotation : (3, 3) array
-        None where nothing was found.
+    (3,) array, or None where nothing was found
     """
     found = _balance(robot, position_m[None], reference[None], reference[None], np.full(3, np.nan), movable=True)
-    return (found.position_m[0], found.rotation[0]) if found.balanced[0] else None
+    return found.position_m[0] if found.balanced[0] and _stable(robot, found)[0] else None
 
 
 @dataclass(frozen=True)
@@ -313,9 +311,7 @@ def _side_conditions(
     return rows, values
 
 
-def _newly_bound(
-    tau: Floats, bound: NDArray[np.int64], limits: tuple[float, float], unit: float
-) -> NDArray[np.bool_]:
+def _newly_bound(tau: Floats, bound: NDArray[np.int64], limits: tuple[float, float], unit: float) -> NDArray[np.bool_]:
     """(n, w) Of each row the wire that is farthest beyond its bounds, where there is one."""
     beyond = np.where(bound == 0, np.maximum(limits[0] - tau, tau - limits[1]), -np.inf)
     worst = beyond.argmax(1)
@@ -405,7 +401,7 @@ def _basis(rows: Floats) -> Floats:
 
 
 def _vector_by_turn(vector: Floats) -> Floats:
-    """(n, 3, 3) Change of rotation vectors (n, 3) by a small turn in the world: the inverse of SO(3)'s left Jacobian."""
+    """(n, 3, 3) Change of rotation vectors (n, 3) by small turns in the world: the inverse left Jacobian of SO(3)."""
     angle = np.linalg.norm(vector, axis=-1)[:, None, None]
     half = 0.5 * angle
     safe = np.where(angle > 1e-4, angle, 1.0)

@@ -27,6 +27,7 @@ from wirebayes.robot.motion import claim, control, drift, forward, inverse, one_
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.pose import controllers, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
+from wirebayes.robot.pose.orientation import Orientation
 from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
 from wirebayes.typing import Floats
@@ -69,12 +70,11 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     x, R = request.position_m, request.rotation
     tau = inverse.tensions(robot, x[None], R[None])
     content = _requested(robot, line, x, R, feasible=bool(np.isfinite(tau).all()))
+    turned = request.orientation or Orientation(R)
+    if turned.found is not None:
+        content["orientation"] = turned.found
     if not content["feasible"]:
-        content["sentence"] = "No tensions within the bounds hold the platform at this pose."
-        if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
-            content["sentence"] = (
-                "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
-            )
+        content["sentence"] = _why_not(robot, x, turned)
         content["warnings"] = unheld(content["sentence"])
         return Answer(content, {})
     shared = draws.for_robot(robot, line)
@@ -106,12 +106,21 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         for spread, course in courses.items()
         for warning in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
     ]
-    content["warnings"] = to_json([*_weak(commands), *falls, *_untested(robot, line, request, commands, tau)])
+    refused = [Notice("geometry", turned.refused)] if turned.refused else []
+    untested = _untested(robot, line, request, commands, tau)
+    content["warnings"] = to_json([*_weak(commands), *falls, *refused, *untested])
     spaces = map_slices(robot, line, request.slices)
     held = [one for one in spaces if len(one.drift.position_m)]
     # the first orientation as a whole, then every slice of each
     content["workspace"] = {**claim.summary(held[0].drift), "slices": summaries(spaces)} if held else None
     return Answer(content, courses, spaces)
+
+
+def _why_not(robot: Robot, x: Floats, turned: Orientation) -> str:
+    """Why nothing holds the platform at the requested pose."""
+    if not statics.geometry(robot, x[:, None], turned.rotation[..., None]).clear[0]:
+        return "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
+    return turned.sentence or "No tensions within the bounds hold the platform at this pose."
 
 
 def unheld(sentence: str) -> list[NoticeJson]:
