@@ -297,6 +297,8 @@ def _pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     if not found["feasible"]:
         return [f"{found['robot']}: {found['sentence']}"]
     lines = _turned(cast(PoseJson, found)) if "orientation" in found else []
+    if "plane" in found:
+        lines.append(f"{found['robot']}: {cast(PoseJson, found)['plane']['sentence']}")
     drifts = []
     measured = "history" in found and cast(PoseHistoryJson, found)["history"]["kind"] == "measured"
     moved = "is away from where it is meant to be" if measured else "has drifted"

@@ -85,6 +85,19 @@ class OrientationFound(TypedDict):
     sentence: str
 
 
+class OnPlane(TypedDict):
+    """The plane that carries the platform, and the half widths of the poses at which friction can hold it."""
+
+    normal: Numbers
+    contact: str
+    normal_force_N: float
+    friction_coefficient: float
+    contact_radius_m: float
+    friction_half_width_mm: Band
+    friction_half_width_rad: Band
+    sentence: str
+
+
 class Equilibria(TypedDict):
     """All that were found from many starts."""
 
@@ -295,6 +308,7 @@ class PoseJson(RobotOnWires):
     pose: PoseNow
     tension_distribution: TensionDistribution
     orientation: NotRequired[OrientationFound]
+    plane: NotRequired[OnPlane]
     feasible_draws: NotRequired[float]
     inverse: NotRequired[InverseKinematics]
     forward: NotRequired[ForwardKinematics]

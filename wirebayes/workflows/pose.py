@@ -11,6 +11,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, plain, write_csv, write_json
 from wirebayes.robot.history.history import with_payload
+from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
@@ -48,6 +49,7 @@ from wirebayes.workflows.wires import (
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
 DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed through every row
 
 
@@ -169,6 +171,7 @@ def pose(
     line = draws_for(machine, wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turned = asked_rotation(rotation)
+    _refuse_off_plane(machine, where, _start(machine, turned))
     moments = rising_times(times)
     tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
@@ -187,7 +190,7 @@ def pose(
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
     there = orientation(machine, where, turned)
-    request = PoseRequest(where, there.rotation, moments, 1e-3 * tolerance, math.radians(tolerance_tilt),
+    request = PoseRequest(there.position_m, there.rotation, moments, 1e-3 * tolerance, math.radians(tolerance_tilt),
                           specimen_spread, seed, slices, there)  # fmt: skip
     options = {
         "--experiment": experiment, **at, "--times": text_of(times), "--tolerance": tolerance,
@@ -237,6 +240,16 @@ def asked_rotation(rotation: Numbers | None) -> Floats | None:
     return found if np.isfinite(found).any() else None
 
 
+def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> None:
+    far = float(plane.off(robot, position_m[None], rotation[None])[0])
+    if robot.plane is not None and far > OFF_PLANE * robot.span_m:
+        home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
+        raise InputError(
+            f"--position, --rotation: found a pose {far:.3g} m off the plane; expected one in the plane through the "
+            f"home position ({home}) with the normal ({normal}), turned about it only"
+        )
+
+
 def _start(robot: Robot, asked_rad: Floats | None) -> Floats:
     """About how the platform is turned when a history begins."""
     home = robot.home_rotation_rad
@@ -262,6 +275,8 @@ def _refuse_calibration(alone: bool) -> None:
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
     """The requested slices; refused where the robot has only one height or one orientation."""
+    if heights is not None and robot.plane is not None:
+        raise InputError("--map-heights: found heights for a robot in a plane; expected none")
     if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
         raise InputError("--map-heights: found heights for a workspace in a vertical plane; expected none")
     if rotations is not None and robot.degrees == 3:

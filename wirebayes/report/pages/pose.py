@@ -89,6 +89,8 @@ def _requested(pose: PoseJson) -> Points:
     if "orientation" in pose:
         turned = ", ".join(f"{v:.4g}" for v in pose["pose"]["rotation_vector_rad"])
         points.append(f"Rotation vector ({turned}) rad. {pose['orientation']['sentence']}")
+    if "plane" in pose:
+        points.append(pose["plane"]["sentence"])
     if wires:
         tested = f"{wires['tested_length_mm']:g} mm"
         effects = wires["effects"]

@@ -20,9 +20,10 @@ from wirebayes.typing import Floats
 
 _STEPS = 80  # of linearisation; a dozen are usual, and a family of solutions that bends much takes more
 _LONGEST_RAD = 0.3  # turned in a step: beyond, what was linearised means little
-_BALANCED = 1e-12  # of the largest force: an imbalance of rounding
+_BALANCED = 1e-11  # of the weight: an imbalance of rounding
 _SETTLED = 1e-10  # rad: a step so small changes nothing
 _DEPENDENT = 1e-9  # singular value, of the largest, of equations that depend on each other
+_PLACE = 30.0  # weight of a position, in spans, that may move: it is what shall stay, before angles and tensions
 _LESSER = 1e-3  # weight of what decides only where the first aim, tensions or angles, leaves a choice
 _ALIKE = 1e-6  # rad, and of the robot's span: nearer, two solutions are one
 # Beginnings beside the reference: turned by so much about each axis, both ways; a solution further away than that is
@@ -233,6 +234,9 @@ def _balance(
         )
         length = np.linalg.norm(step[:, 3:6], axis=1)
         step *= np.minimum(1.0, _LONGEST_RAD / np.maximum(length, 1e-300))[:, None]
+        lost = ~np.isfinite(step).all(1)
+        dead[rows[lost]] = True
+        rows, step, imbalance = rows[~lost], step[~lost], imbalance[~lost]
         x[rows] += step[:, :3]
         R[rows] = turning.compose(step[:, 3:6].T, R[rows].transpose(1, 2, 0)).transpose(2, 0, 1)
         tau[rows] += unit * step[:, 6:]
@@ -241,7 +245,6 @@ def _balance(
         newly = _newly_bound(tau[rows], bound[rows], (low, high), unit) & nearly[:, None]
         bound[rows] += np.where(newly, np.where(tau[rows] < low, -1, 1), 0)
         done[rows] = settled & ~newly.any(1)
-        dead[rows] = ~np.isfinite(step).all(1)
     left, size = _imbalance(robot, x, R, tau)
     slack = 1e-9 * np.maximum(np.abs(tau).max(1), unit)
     inside = (tau.min(1) >= low - slack) & (tau.max(1) <= high + slack)
@@ -285,12 +288,14 @@ def _step(
     wish[:, 6:] = (_reference(robot) - tau) / unit
     far = np.abs(value).max(1) > 0.1
     wish[far] = 0.0
-    angle, pull = (_LESSER, 1.0) if robot.is_underactuated else (1.0, _LESSER)
-    weigh = np.concatenate([np.full(3, 1.0 / (_LESSER * robot.span_m)), np.full(3, angle), np.full(legs, pull)])
+    aim = (_LESSER, 1.0) if robot.is_underactuated else (1.0, _LESSER)
+    angle, pull = (_LESSER, _LESSER) if movable else aim
+    weigh = np.concatenate([np.full(3, _PLACE / robot.span_m), np.full(3, angle), np.full(legs, pull)])
     if not movable:
         wish[:, :3] = 0.0
-    B = A / weigh
-    step = wish * weigh
+    bad = ~(np.isfinite(A).all((1, 2)) & np.isfinite(value).all(1))  # a wire without length has no direction
+    B = np.where(bad[:, None, None], 0.0, A / weigh)
+    step = np.where(bad[:, None], np.nan, wish * weigh)
     step = step - (np.linalg.pinv(B, rcond=_DEPENDENT) @ (value + (B @ step[..., None])[..., 0])[..., None])[..., 0]
     return step / weigh, np.abs(value).max(1)
 

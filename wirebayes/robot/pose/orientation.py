@@ -6,11 +6,13 @@ import numpy as np
 
 from wirebayes.json_files.pose import OrientationFound
 from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
 from wirebayes.typing import Floats
 
 COMPONENTS = ("rx", "ry", "rz")
+_ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off
 _SAME = 5e-5  # rad: a component that balance decides and that was asked for to four decimals is as asked for
 
 
@@ -20,6 +22,8 @@ class Orientation:
 
     Attributes
     ----------
+    position_m : (3,) array
+        The one requested; a position that cannot be chosen freely is cleared of rounding.
     rotation : (3, 3) array
         The one asked for, or the reference, where the platform cannot hang.
     found : OrientationFound or None
@@ -30,6 +34,7 @@ class Orientation:
         What was asked for and cannot be had; empty where all was had.
     """
 
+    position_m: Floats
     rotation: Floats
     found: OrientationFound | None = None
     sentence: str = ""
@@ -55,22 +60,38 @@ def orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> O
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
     near = turning.matrix(np.where(np.isfinite(asked), asked, home))
     whole = asked_rad is None or bool(np.isfinite(asked).all())
-    if robot.freedom == "position" or (whole and not robot.is_underactuated and _held(robot, position_m, near, asked)):
-        return Orientation(near)
+    given = robot.freedom == "position" or not _clear(robot, position_m, near)
+    if given or (whole and not robot.is_underactuated and _held(robot, position_m, near, asked)):
+        return Orientation(position_m, near)
+    found = hanging.hang(robot, position_m[None], near, asked)
+    if not found.held[0]:
+        position_m = _cleared(robot, position_m, near)
     x = position_m[None]
-    found = hanging.hang(robot, x, near, asked)
     had = np.isfinite(asked)
     if not found.held[0]:
         found = hanging.hang(robot, x, near)
         if not found.held[0]:
-            return Orientation(near, None, _nowhere(robot, position_m, near))
+            return Orientation(position_m, near, None, _nowhere(robot, position_m, near))
         had = _to_be_had(hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0]), had)
         if had.any():
             part = hanging.hang(robot, x, near, np.where(had, asked, np.nan))
             if not part.held[0]:
-                return Orientation(near, None, _out_of_reach(asked, had, found))
+                return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
             found = part
     return _described(robot, position_m, found, asked, had)
+
+
+def _clear(robot: Robot, x: Floats, R: Floats) -> bool:
+    """Whether every wire runs somewhere: no platform point lies on an exit point or inside a pulley."""
+    return bool(statics.geometry(robot, x[:, None], R[..., None]).clear[0])
+
+
+def _cleared(robot: Robot, x: Floats, reference: Floats) -> Floats:
+    """The position, or one within rounding of it that has a balance: of two wires in a plane that is along no axis."""
+    if robot.legs >= 3:
+        return x
+    near = hanging.nearest_position(robot, x, reference)
+    return x if near is None or np.abs(near - x).max() > _ROUNDING * robot.span_m else near
 
 
 def _held(robot: Robot, x: Floats, R: Floats, asked: Floats) -> bool:
@@ -115,7 +136,7 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
         f"{COMPONENTS[i]} = {asked[i]:g} (it is {vector[i]:.5g})" for i in refused if abs(asked[i] - vector[i]) > _SAME
     ]
     words = f"the rotation asked for cannot be had: balance decides {', '.join(missed)}" if missed else ""
-    return Orientation(R, content, "", words)
+    return Orientation(x, R, content, "", words)
 
 
 def _summary(robot: Robot, degrees: int, places: int, choice: int, free: list[str], others: int) -> str:
@@ -153,6 +174,6 @@ def _nowhere(robot: Robot, x: Floats, reference: Floats) -> str:
     if np.ptp(robot.platform_m, axis=0).max() == 0:
         return f'{said}: all wires meet in one point, about which the platform turns freely (freedom = "position").'
     near = hanging.nearest_position(robot, x, reference)
-    if near is None or np.abs(near - x).max() < 1e-6 * robot.span_m:
+    if near is None or np.abs(near - x).max() < _ROUNDING * robot.span_m:
         return f"{said}."
     return f"{said}; the nearest position that was found to have one is ({', '.join(f'{v:.5g}' for v in near)}) m."
