@@ -170,20 +170,29 @@ def of_comparison(name: str, table: ComparedModels) -> str:
 
 
 def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
-    """Of a robot: how far its platform moves, for each spread of specimens."""
+    """Of a robot: how it hangs, and how far its platform moves, for each spread of specimens."""
     if not found["feasible"]:
         return [f"{found['robot']}: {found['sentence']}"]
-    lines = []
+    lines = _turned(cast(PoseJson, found)) if "orientation" in found else []
+    if "plane" in found:
+        lines.append(f"{found['robot']}: {cast(PoseJson, found)['plane']['sentence']}")
+    drifts = []
     measured = "history" in found and cast(PoseHistoryJson, found)["history"]["kind"] == "measured"
     moved = "is away from where it is meant to be" if measured else "has drifted"
     for drift in found["drift"]:
         far, time = drift["distance_mm"], drift["times_s"][-1]
         if known_at_the_end(drift):
-            lines.append(
+            drifts.append(
                 f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
                 f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
             )
-    return lines or [f"{found['robot']}: no draw of the wires could be solved"]
+    return lines + (drifts or [f"{found['robot']}: no draw of the wires could be solved"])
+
+
+def _turned(found: PoseJson) -> list[str]:
+    """The orientation that balance decided."""
+    vector = ", ".join(f"{v:.4g}" for v in found["pose"]["rotation_vector_rad"])
+    return [f"{found['robot']}: rotation vector ({vector}) rad; {found['orientation']['sentence']}"]
 
 
 def of_calibration(found: CalibrateJson) -> list[str]:

@@ -8,6 +8,9 @@ from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 
+# shipped robots that hang on their wires alone: what no plane carries
+HANGING = [name for name in schema.shipped() if schema.read(name).plane is None]
+
 
 @dataclass
 class Cases:

@@ -3,13 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.robot.cases import HANGING
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 
 from . import cases
 
-ROBOTS = schema.shipped()
+ROBOTS = HANGING
 
 
 def _distance(robot, found, position_m, turn):

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.robot import cases
+from tests.robot.cases import HANGING
 from tests.robot.test_statics import check_derivatives
 from wirebayes.robot.mechanics import draws, pulleys, rotation, schema, statics
 from wirebayes.robot.mechanics.description import Pulleys
@@ -19,7 +20,7 @@ from wirebayes.robot.proof.ball_arithmetic import Balance
 from wirebayes.robot.proof.certificate import certify
 from wirebayes.robot.proof.reach import apart, reach
 
-ROBOTS = schema.shipped()
+ROBOTS = HANGING
 
 
 def _robot(name, seed=1):

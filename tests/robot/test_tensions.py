@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from tests.robot.cases import HANGING
 from wirebayes.robot.mechanics import schema, statics, tensions
 from wirebayes.robot.motion import inverse
 
-ROBOTS = schema.shipped()
+ROBOTS = HANGING
 
 
 def _problem(name, seed=0):

@@ -29,7 +29,10 @@ def pose(
     wires: Wires,
     output: Output = None,
     position: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Pose in metres; default: the file's.")] = None,
-    rotation: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Rotation vector in radians.")] = None,
+    rotation: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Rotation vector in radians; free for what balance decides: free,free,0.2."),
+    ] = None,
     times: Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")] = "0,10,30,60,120,300,600,1800,3600",
     tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Allowed pose error.")] = 0.3,
     tolerance_tilt: Annotated[float, typer.Option("--tolerance-tilt", metavar="DEG", help="Allowed rotation.")] = 0.055,

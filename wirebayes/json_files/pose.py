@@ -71,6 +71,33 @@ class EquilibriumPose(PoseNow):
     stable: bool
 
 
+class OrientationFound(TypedDict):
+    """Which part of the orientation was commanded, and which balance decided."""
+
+    commanded_degrees: int
+    of_degrees: int
+    position_directions: int
+    rotation_choice: int
+    commanded_components: list[str]
+    free_components: list[str]
+    refused_components: list[str]
+    other_rotation_vectors_rad: Numbers
+    sentence: str
+
+
+class OnPlane(TypedDict):
+    """The plane that carries the platform, and the half widths of the poses at which friction can hold it."""
+
+    normal: Numbers
+    contact: str
+    normal_force_N: float
+    friction_coefficient: float
+    contact_radius_m: float
+    friction_half_width_mm: Band
+    friction_half_width_rad: Band
+    sentence: str
+
+
 class Equilibria(TypedDict):
     """All that were found from many starts."""
 
@@ -280,6 +307,8 @@ class PoseJson(RobotOnWires):
 
     pose: PoseNow
     tension_distribution: TensionDistribution
+    orientation: NotRequired[OrientationFound]
+    plane: NotRequired[OnPlane]
     feasible_draws: NotRequired[float]
     inverse: NotRequired[InverseKinematics]
     forward: NotRequired[ForwardKinematics]

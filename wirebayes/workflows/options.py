@@ -15,7 +15,9 @@ from wirebayes.units import nearest
 PathLike = str | os.PathLike[str]
 Source = PathLike | Experiment | Sequence[Experiment]
 Progress = Callable[[str, float, float], None]
-Numbers = str | float | Sequence[float]  # text is what the command line was given: it stands in the configuration
+Numbers = (
+    str | float | Sequence[float] | Sequence[float | None]
+)  # text is what the command line was given: it stands in the configuration
 
 
 def silent(name: str, done: float, total: float) -> None:

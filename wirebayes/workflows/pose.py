@@ -11,12 +11,15 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, plain, write_csv, write_json
 from wirebayes.robot.history.history import with_payload
+from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.pose.answer import Answer, answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
+from wirebayes.robot.pose.orientation import orientation
 from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.typing import Floats
 from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     Numbers,
@@ -46,6 +49,7 @@ from wirebayes.workflows.wires import (
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
 DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed through every row
 
 
@@ -91,7 +95,8 @@ def pose(
     position : (3,) array, optional
         Of the platform in m; the robot's home pose when left out. With `joints`: about where it starts.
     rotation : (3,) array, optional
-        Rotation vector in rad; of the home pose when left out.
+        Rotation vector in rad, None for a component that balance decides. When left out: of the home pose where the
+        wires can command and hold it, else as the platform hangs in balance.
     times : sequence of float
         Rising times after the command, s.
     tolerance : float
@@ -165,7 +170,8 @@ def pose(
     machine = _loaded(bare, payload, payload_at)
     line = draws_for(machine, wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
-    turn = machine.home_rotation_rad if rotation is None else numbers("--rotation", rotation, 3)
+    turned = asked_rotation(rotation)
+    _refuse_off_plane(machine, where, _start(machine, turned))
     moments = rising_times(times)
     tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
@@ -179,12 +185,13 @@ def pose(
         errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
         options = {"--experiment": experiment, **carried, **at}
         decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, options)
-        return pose_history(machine, line, joints, trajectory, errors, (where, matrix(turn)), seed, decides,
+        return pose_history(machine, line, joints, trajectory, errors, (where, _start(machine, turned)), seed, decides,
                             Place.at(output), own, progress)  # fmt: skip
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
-    request = PoseRequest(where, matrix(turn), moments, 1e-3 * tolerance, math.radians(tolerance_tilt), specimen_spread,
-                          seed, slices)  # fmt: skip
+    there = orientation(machine, where, turned)
+    request = PoseRequest(there.position_m, there.rotation, moments, 1e-3 * tolerance, math.radians(tolerance_tilt),
+                          specimen_spread, seed, slices, there)  # fmt: skip
     options = {
         "--experiment": experiment, **at, "--times": text_of(times), "--tolerance": tolerance,
         "--tolerance-tilt": tolerance_tilt, "--specimen-spread": specimen_spread,
@@ -216,6 +223,39 @@ def _spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
     return {name: None if values is None else text_of(values) for name, values in options.items()}
 
 
+def asked_rotation(rotation: Numbers | None) -> Floats | None:
+    """Components of a rotation vector, NaN where ``free`` (in Python None); None where nothing is asked for."""
+    if rotation is None:
+        return None
+    text = text_of(rotation)
+    words = ["free" if word.strip() in ("free", "None") else word for word in text.split(",")]
+    if "free" not in words:
+        return np.asarray(numbers("--rotation", text, 3))
+    try:
+        found = np.array([np.nan if word == "free" else float(word) for word in words])
+    except ValueError:
+        found = np.array([np.inf])
+    if len(found) != 3 or np.isinf(found).any():
+        raise InputError(f"--rotation: found {text!r}; expected three finite numbers or free, separated by commas")
+    return found if np.isfinite(found).any() else None
+
+
+def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> None:
+    far = float(plane.off(robot, position_m[None], rotation[None])[0])
+    if robot.plane is not None and far > OFF_PLANE * robot.span_m:
+        home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
+        raise InputError(
+            f"--position, --rotation: found a pose {far:.3g} m off the plane; expected one in the plane through the "
+            f"home position ({home}) with the normal ({normal}), turned about it only"
+        )
+
+
+def _start(robot: Robot, asked_rad: Floats | None) -> Floats:
+    """About how the platform is turned when a history begins."""
+    home = robot.home_rotation_rad
+    return matrix(home if asked_rad is None else np.where(np.isfinite(asked_rad), asked_rad, home))
+
+
 def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
     """The robot with a payload, at its own centre of mass where no other place is given."""
     if not 0 <= payload_kg < math.inf:
@@ -235,6 +275,8 @@ def _refuse_calibration(alone: bool) -> None:
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
     """The requested slices; refused where the robot has only one height or one orientation."""
+    if heights is not None and robot.plane is not None:
+        raise InputError("--map-heights: found heights for a robot in a plane; expected none")
     if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
         raise InputError("--map-heights: found heights for a workspace in a vertical plane; expected none")
     if rotations is not None and robot.degrees == 3:

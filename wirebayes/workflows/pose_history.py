@@ -11,7 +11,9 @@ from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.robot.history import table
 from wirebayes.robot.history.answer import answer
+from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain
+from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration.calibrated import to_dict
@@ -22,6 +24,8 @@ from wirebayes.workflows.options import PathLike, Progress, above_zero
 from wirebayes.workflows.results import Calibration, Place, Pose
 from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import Wires, content, hash_of
+
+_OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
 
 
 def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:
@@ -147,6 +151,7 @@ def pose_history(
         text = as_csv(option[2:], given)
         history = table.parse(option[2:], text, robot, columns, row_place)
         read = hash_of({option: text})
+    _refuse_off_plane(robot, option, history)
     lasting = {  # in a fixed order, as in `wires.configuration`
         "of": option[2:],
         "content": read,
@@ -170,3 +175,13 @@ def pose_history(
         pictures.save(run.directory, robot, history, found)
         run.finish()
     return Pose(place, own_effects)
+
+
+def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
+    """Refuse commanded poses that a plane does not allow."""
+    if robot.plane is None or history.position_m is None or history.rotation is None:
+        return
+    far = plane.off(robot, history.position_m, history.rotation)
+    if far.max() > _OFF_PLANE * robot.span_m:
+        when = history.times_s[int(far.argmax())]
+        raise InputError(f"{option}: found a pose {far.max():.3g} m off the robot's plane at {when:g} s; expected none")

@@ -20,6 +20,7 @@ from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, lines_of, material
+from wirebayes.robot.motion.hanging import at_home
 from wirebayes.workflows.options import PathLike
 from wirebayes.workflows.predict import one_of
 from wirebayes.workflows.results import POSTERIOR, Findings, Posterior, Posteriors
@@ -57,8 +58,8 @@ def read_robot(name_or_file: PathLike) -> Robot:
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """The robot given, or the one read."""
-    return robot if isinstance(robot, Robot) else read_robot(robot)
+    """The robot given, or the one read; its home orientation in balance where fewer wires than freedoms decide it."""
+    return at_home(robot if isinstance(robot, Robot) else read_robot(robot))
 
 
 def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:

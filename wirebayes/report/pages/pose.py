@@ -97,6 +97,11 @@ def _requested(pose: PoseJson) -> Points:
     place = ", ".join(number(float(x)) if x else "0" for x in pose["pose"]["position_m"])
     wires = pose.get("wires", {})
     points = [f"Platform of {pose['mass_kg']:g} kg at ({place}) m."]
+    if "orientation" in pose:
+        turned = ", ".join(f"{v:.4g}" for v in pose["pose"]["rotation_vector_rad"])
+        points.append(f"Rotation vector ({turned}) rad. {pose['orientation']['sentence']}")
+    if "plane" in pose:
+        points.append(pose["plane"]["sentence"])
     if wires:
         tested = f"{wires['tested_length_mm']:g} mm"
         effects = wires["effects"]

@@ -51,11 +51,7 @@ def mjcf(
     stiffness = k1_N * robot.lines**2 / zero_m
     rest = np.maximum((zero_m - offset_m) / robot.lines, 0.0)
     turn = matrix(robot.home_rotation_rad)
-    slides = "".join(  # axes are written in the body's frame: the rows of its rotation are the world's
-        f'<joint type="slide" axis="{_row(axis)}" ref="{float(at)!r}" damping="{damping_N_s_m!r}"/>'
-        for axis, at in zip(turn, robot.home_m, strict=True)
-    )
-    ball = f'<joint type="ball" damping="{damping_N_s_m * arm2!r}"/>' if robot.degrees == 6 else ""
+    joints = _joints(robot, turn, damping_N_s_m)
     if towards_m is None:
         towards_m = robot.home_m + robot.platform_m @ turn.T
     radius, axis = wheels(robot)
@@ -75,10 +71,27 @@ def mjcf(
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}'
-        f'<body pos="{_row(robot.home_m)}" quat="{_row(_quaternion(robot.home_rotation_rad))}">{slides}{ball}'
+        f'<body pos="{_row(robot.home_m)}" quat="{_row(_quaternion(robot.home_rotation_rad))}">{joints}'
         f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
+
+
+def _joints(robot: Robot, turn: Floats, damping_N_s_m: float) -> str:
+    """Joints of all motions that the platform has; axes are written in the body's frame, of orientation `turn`."""
+    axes, about = np.eye(3), f'<joint type="ball" damping="{damping_N_s_m * robot.size_m**2!r}"/>'
+    if robot.plane is not None:
+        normal = robot.plane.normal
+        axes = np.linalg.svd(np.eye(3) - np.outer(normal, normal))[2][:2]
+        if np.abs(normal).max() == 1.0:  # along an axis: the others are the plane's
+            axes = np.eye(3)[normal == 0]
+        about = f'<joint type="hinge" axis="{_row(normal @ turn)}" damping="{damping_N_s_m * robot.size_m**2!r}"/>'
+    slides = "".join(
+        f'<joint type="slide" axis="{_row(axis @ turn)}" ref="{float(axis @ robot.home_m)!r}" '
+        f'damping="{damping_N_s_m!r}"/>'
+        for axis in axes
+    )
+    return slides + (about if robot.degrees == 6 else "")
 
 
 def wheels(robot: Robot) -> tuple[Floats, Floats]:

@@ -12,6 +12,7 @@ from wirebayes.json_files.pose_history import Clock, DriftOverTime, PoseHistoryJ
 from wirebayes.json_files.values import Band, Statistic
 from wirebayes.notice import Notice, to_json
 from wirebayes.robot.history import commanded, corrections
+from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate, Progress, estimate
 from wirebayes.robot.history.follow import RESTART, Track, follow
@@ -85,6 +86,7 @@ def answer(
     progress : function of name, done and total
     """
     rng = np.random.default_rng(seed)
+    history = balanced(robot, history)
     rows = np.unique(np.linspace(0, len(history.times_s) - 1, _SHOWN).round().astype(int))
     content = _requested(robot, line, history, errors)
     if history.position_m is not None and history.rotation is not None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.estimate import Estimate, Progress
 from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
 from wirebayes.robot.history.history import History, divided
@@ -56,6 +57,7 @@ def drift(
         No tensions within the bounds hold the platform at some row.
     """
     fine, kept = refined(robot, history)
+    fine = balanced(robot, fine)
     known = unknowns(robot, line, replace(errors, reference_m=0.0), rng)
     wires, error = known.columns(known.draws)
     if errors.calibrated is None:

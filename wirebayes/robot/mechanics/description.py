@@ -11,6 +11,7 @@ from wirebayes.typing import Floats
 
 Actuator = Literal["drum", "linear"]
 Freedom = Literal["pose", "position"]
+Contact = Literal["table", "rail"]
 GRAVITY = 9.80665  # m/s^2, standard
 
 
@@ -83,6 +84,28 @@ class Drums:
 
 
 @dataclass(frozen=True)
+class Plane:
+    """A table, a wall or a rail that carries the platform, which moves in this plane only.
+
+    Attributes
+    ----------
+    normal : (3,) array
+        Unit vector from the plane to the platform's side; the plane goes through the home position.
+    contact : {"table", "rail"}
+        A table pushes the platform away from it only; a rail holds it both ways.
+    friction : float
+        Coulomb's coefficient between platform and plane.
+    contact_radius_m : float
+        Of the ring on which the platform slides; 0: of one point, whose friction resists no turn.
+    """
+
+    normal: Floats
+    contact: Contact = "table"
+    friction: float = 0.0
+    contact_radius_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class Robot:
     """A robot of ``w`` legs; all lengths in metres, masses in kilograms.
 
@@ -122,6 +145,8 @@ class Robot:
         Mass of each leg's wire by length; 0 where it is not given. It is not in the statics; `sag` says what it does.
     tension_bias_N : float
         Standard deviation of a tension sensor's bias, for calibration; 0: no bias.
+    plane : Plane or None
+        What carries the platform; None where it hangs on its wires alone.
 
     Examples
     --------
@@ -154,6 +179,7 @@ class Robot:
     drums: Drums | None = None
     tension_bias_N: float = 0.0
     mass_kg_m: Floats | None = None
+    plane: Plane | None = None
 
     @property
     def legs(self) -> int:
@@ -164,6 +190,29 @@ class Robot:
     def degrees(self) -> int:
         """Degrees of freedom of the platform: 6, or 3 when parallel lines keep its orientation."""
         return 6 if self.freedom == "pose" else 3
+
+    @property
+    def freedoms(self) -> int:
+        """Degrees of freedom that the platform really has: all, or those that a plane leaves."""
+        if self.plane is None:
+            return self.degrees
+        return 3 if self.freedom == "pose" else 2
+
+    @cached_property
+    def motions(self) -> Floats | None:
+        """(d, d) Projection of small motions on those that a plane leaves, along it and about its normal; or None."""
+        if self.plane is None:
+            return None
+        across = np.outer(self.plane.normal, self.plane.normal)
+        out = np.zeros((self.degrees, self.degrees))
+        out[:3, :3] = np.eye(3) - across
+        out[3:, 3:] = across[: self.degrees - 3, : self.degrees - 3]
+        return out
+
+    @property
+    def is_underactuated(self) -> bool:
+        """Whether balance decides the orientation: a platform that may turn, on fewer wires than degrees of freedom."""
+        return self.freedom == "pose" and self.legs < self.freedoms
 
     @property
     def is_linear(self) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.robot.mechanics.description import Drums, GivenWire, Pulleys, Robot, TensionRule
+from wirebayes.robot.mechanics.description import Drums, GivenWire, Plane, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.tensions import CHOICES
 from wirebayes.typing import Floats
 from wirebayes.user_files import read_text
@@ -201,6 +201,7 @@ def _robot(t: _Table) -> Robot:
         raise space.fail("upper_m", f"found {upper.tolist()}", f"at least lower_m ({lower.tolist()}) on every axis")
     sensors = t.table("sensors", {})
     bias = sensors.number("tension_bias_N", 0.0, least=0)
+    plane = _plane(t)
     given, declared, masses = _wires(t)
     legs = _legs(t, declared)
     mass_kg_m = np.array([masses.get(leg["wire"], 0.0) for leg in legs])
@@ -212,8 +213,25 @@ def _robot(t: _Table) -> Robot:
         stack("exit"), stack("platform"), stack("lines"), stack("beyond"), tuple(leg["actuator"] for leg in legs),
         stack("ratio"), stack("wire_m"), tuple(leg["wire"] for leg in legs), given, tension,
         position, turn, lower, upper, _pulleys(stack("pulley"), stack("axis")),
-        _drums(*(stack(key) for key in _DRUM)), bias, mass_kg_m if mass_kg_m.any() else None,
+        _drums(*(stack(key) for key in _DRUM)), bias, mass_kg_m if mass_kg_m.any() else None, plane,
     )  # fmt: skip
+
+
+def _plane(t: _Table) -> Plane | None:
+    """The plane that carries the platform, where the file has one."""
+    if "plane" not in t.content:
+        t.known.add("plane")
+        return None
+    plane = t.table("plane")
+    contact = plane.text("contact", "table", ("table", "rail"))
+    out = Plane(
+        plane.unit("normal"),
+        "rail" if contact == "rail" else "table",
+        plane.number("friction_coefficient", 0.0, least=0),
+        plane.number("contact_radius_m", 0.0, least=0),
+    )
+    plane.finish()
+    return out
 
 
 def _pulleys(radius_m: Floats, axis: Floats) -> Pulleys | None:

@@ -80,7 +80,8 @@ def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
 
 def jacobian(robot: Robot, shape: Geometry) -> Floats:
     """Change of the distances with a small motion, ``(6 or 3, w, n)``: rows ``u`` and ``r × u``."""
-    return _with_moments(robot, shape.direction, shape.arm_m)
+    J = _with_moments(robot, shape.direction, shape.arm_m)
+    return J if robot.motions is None else np.einsum("ij,jwn->iwn", robot.motions, J)
 
 
 def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
@@ -94,7 +95,7 @@ def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
 
 
 def weight(robot: Robot, rotation: Floats) -> Floats:
-    """Wrench of gravity about the reference point, ``(6 or 3, n)``: N and N m."""
+    """Wrench of gravity about the reference point, ``(6 or 3, n)``: N and N m, as far as no plane takes it."""
     n = rotation.shape[-1]
     force = robot.mass_kg * GRAVITY
     out = np.zeros((robot.degrees, n))
@@ -102,11 +103,11 @@ def weight(robot: Robot, rotation: Floats) -> Floats:
     if robot.degrees == 6:
         arm = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
         out[3], out[4] = -arm[1] * force, arm[0] * force
-    return out
+    return out if robot.motions is None else robot.motions @ out
 
 
 def wrench(robot: Robot, shape: Geometry, tension_N: Floats) -> Floats:
-    """Wrench of the wires on the platform about the reference point.
+    """Wrench of the wires on the platform about the reference point, as far as no plane takes it.
 
     Parameters
     ----------
@@ -190,7 +191,19 @@ def unbalance_and_stiffness(
         _add_rotation(shape, moment, pull, beta, H)
     for i in range(degrees):
         H[i + 1 :, i] = H[i, i + 1 :]
-    return gradient, H
+    return (gradient, H) if robot.motions is None else _in_the_plane(robot, gradient, H)
+
+
+def _in_the_plane(robot: Robot, gradient: Floats, H: Floats) -> tuple[Floats, Floats]:
+    """What a plane leaves of forces and stiffness; across it, it is as stiff as the wires are at most along it."""
+    P = robot.motions
+    assert P is not None
+    gradient = P @ gradient
+    H = np.einsum("ij,jkn,kl->iln", P, H, P)
+    stiffest = np.abs(np.einsum("iin->in", H[:3, :3])).max(0)
+    size = np.ones(robot.degrees)
+    size[3:] = robot.size_m**2
+    return gradient, H + ((np.eye(robot.degrees) - P) * size)[..., None] * stiffest
 
 
 def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H: Floats) -> None:

@@ -10,7 +10,7 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import drift, inverse
+from wirebayes.robot.motion import drift, hanging, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.typing import Floats
 
@@ -98,14 +98,15 @@ def over_workspace(
     loaded_s : float
         How long the wires carried the same tensions before they were commanded, exactly, to the pose; 0: new wires.
     rotation : (3, 3) array, optional
-        Orientation of the platform; default: level.
+        Orientation of the platform; default: level. Where balance decides it, the one in balance.
 
     Returns
     -------
     WorkspaceDrift
     """
-    turn = np.eye(3) if rotation is None else rotation
-    tau = inverse.tensions(robot, position_m, np.broadcast_to(turn, (len(position_m), 3, 3)))
+    level = np.eye(3) if rotation is None else rotation
+    turn = hanging.orientations(robot, position_m, level)
+    tau = inverse.tensions(robot, position_m, turn)
     good = np.isfinite(tau).all(1)
     if not good.any():
         empty = np.empty((0, 1))
@@ -115,7 +116,7 @@ def over_workspace(
     # Draws vary fastest; every (position, draw) is one row of the batch.
     many = replace(wires, theta={k: np.tile(np.broadcast_to(v, (len(v), n)), p) for k, v in wires.theta.items()})
     where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
-    R = np.broadcast_to(turn, (n * p, 3, 3))
+    R = np.repeat(turn[good], n, 0)
     state = fresh(robot.legs, n * p)
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
@@ -125,7 +126,7 @@ def over_workspace(
         robot, many, np.where(held[:, None], commands.joint_m, np.nan), np.array([time_s]), where, R, state
     )
     shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
-    tilt = turning.tilt(course.rotation[:, 0], rotation)
+    tilt = turning.tilt(course.rotation[:, 0], R)
     return WorkspaceDrift(
         x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
     )

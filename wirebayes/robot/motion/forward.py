@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import cholesky, statics
+from wirebayes.robot.mechanics import cholesky, plane, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
@@ -419,6 +419,7 @@ def equilibria(
     turn = np.broadcast_to(turn, (starts, 3, 3))
     if known is not None:
         begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
+    begin, turn = plane.onto(robot, begin, turn)
     tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
     found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
     good = np.flatnonzero(found.found)

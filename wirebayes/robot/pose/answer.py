@@ -18,18 +18,21 @@ from wirebayes.json_files.pose import (
 )
 from wirebayes.json_files.values import Band
 from wirebayes.notice import Notice, NoticeJson, to_json
-from wirebayes.robot.mechanics import draws, drums, sag, statics
+from wirebayes.robot.mechanics import draws, drums, plane, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, control, drift, forward, inverse, one_sided
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
-from wirebayes.robot.pose import controllers, stability, variance_shares
+from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
+from wirebayes.robot.pose.orientation import Orientation
 from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
 from wirebayes.typing import Floats
+
+_LEVEL = 1e-6  # sine of a wire's angle to the horizontal: so little is rounding in the robot's file
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,14 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     """
     x, R = request.position_m, request.rotation
     tau = inverse.tensions(robot, x[None], R[None])
-    content = _requested(robot, line, x, R, feasible=bool(np.isfinite(tau).all()))
+    balanced = bool(np.isfinite(tau).all())
+    lifted = on_plane.lifted(robot, x, R, tau[0]) if balanced else ""
+    content = _requested(robot, line, x, R, feasible=balanced and not lifted)
+    turned = request.orientation or Orientation(x, R)
+    if turned.found is not None:
+        content["orientation"] = turned.found
     if not content["feasible"]:
-        content["sentence"] = "No tensions within the bounds hold the platform at this pose."
-        if not statics.geometry(robot, x[:, None], R[..., None]).clear[0]:
-            content["sentence"] = (
-                "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
-            )
+        content["sentence"] = lifted or _why_not(robot, x, turned)
         content["warnings"] = unheld(content["sentence"])
         return Answer(content, {})
     shared = draws.for_robot(robot, line)
@@ -87,6 +91,8 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         return Answer(content, {})
     rng = np.random.default_rng(request.seed)
     content["inverse"] = _inverse(robot, commands, tau[0])
+    if robot.plane is not None:
+        content["plane"] = on_plane.on_plane(robot, shared, commands, x, R, tau[0])
     content["forward"] = _round_trip(robot, shared, commands, x, R)
     content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
     proved = proofs.alone(robot, shared, x, R)
@@ -106,12 +112,32 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         for spread, course in courses.items()
         for warning in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
     ]
-    content["warnings"] = to_json([*_weak(commands), *falls, *_untested(robot, line, request, commands, tau)])
+    refused = [Notice("geometry", turned.refused)] if turned.refused else []
+    untested = _untested(robot, line, request, commands, tau)
+    content["warnings"] = to_json([*_weak(commands), *falls, *refused, *untested])
     spaces = map_slices(robot, line, request.slices)
     held = [one for one in spaces if len(one.drift.position_m)]
     # the first orientation as a whole, then every slice of each
     content["workspace"] = {**claim.summary(held[0].drift), "slices": summaries(spaces)} if held else None
     return Answer(content, courses, spaces)
+
+
+def _why_not(robot: Robot, x: Floats, turned: Orientation) -> str:
+    """Why nothing holds the platform at the requested pose."""
+    if not statics.geometry(robot, x[:, None], turned.rotation[..., None]).clear[0]:
+        return "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
+    if robot.plane is None and not _pulled_up(robot, x, turned.rotation):
+        return (
+            "No wire pulls upwards, so the wires cannot carry the weight here. If a table or a rail carries the "
+            "platform, say so in the robot's file: [plane] with normal = [0.0, 0.0, 1.0]."
+        )
+    return turned.sentence or "No tensions within the bounds hold the platform at this pose."
+
+
+def _pulled_up(robot: Robot, x: Floats, R: Floats) -> bool:
+    """Whether some wire pulls the platform upwards, by more than rounding."""
+    direction = statics.geometry(robot, x[:, None], R[..., None]).direction[..., 0]
+    return bool((-direction[2]).max() > _LEVEL)
 
 
 def unheld(sentence: str) -> list[NoticeJson]:
@@ -189,7 +215,8 @@ def _by_leg(values: Floats) -> Band:
 
 def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> ForwardKinematics:
     """Forward kinematics of the commands, from a start beside the pose, must return to it."""
-    back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, x + 0.01 * robot.size_m, R)
+    beside = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
+    back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, beside[0][0], beside[1][0])
     n = len(commands.zero_m)
     pose = np.repeat(x[None], n, 0), np.repeat(R[None], n, 0)
     stiff = one_sided.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]

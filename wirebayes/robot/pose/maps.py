@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.json_files.pose import SliceOfWorkspace
-from wirebayes.robot.mechanics import draws
+from wirebayes.robot.mechanics import draws, plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix
@@ -82,6 +82,7 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
     if slices.heights_m is not None:
         level = where[where[:, 2] == where[0, 2]]
         where = np.concatenate([np.column_stack([level[:, :2], np.full(len(level), z)]) for z in slices.heights_m])
+    where = plane.onto(robot, where, np.broadcast_to(np.eye(3), (len(where), 3, 3)))[0]
     return tuple(
         Map(turn, where, claim.over_workspace(robot, wires, where, rotation=matrix(turn)))
         for turn in slices.rotations_rad

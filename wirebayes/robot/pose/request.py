@@ -7,6 +7,7 @@ import numpy as np
 from wirebayes.json_files.values import Band
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
 from wirebayes.robot.pose.maps import LEVEL, Slices
+from wirebayes.robot.pose.orientation import Orientation
 from wirebayes.typing import Floats
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}  # the median and the 90 % interval, as everywhere
@@ -29,6 +30,8 @@ class PoseRequest:
     seed : int
     slices : Slices
         Of the workspace, to be mapped.
+    orientation : Orientation or None
+        How `rotation` was found, where it was not simply commanded.
     """
 
     position_m: Floats
@@ -39,6 +42,7 @@ class PoseRequest:
     specimen_spread: float = 0.05
     seed: int = 0
     slices: Slices = LEVEL
+    orientation: Orientation | None = None
 
     @property
     def spreads(self) -> tuple[float, float]:

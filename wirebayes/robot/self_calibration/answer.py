@@ -10,7 +10,7 @@ from wirebayes.notice import Notice, to_json
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
-from wirebayes.robot.motion import control, inverse
+from wirebayes.robot.motion import control, hanging, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
@@ -166,7 +166,7 @@ def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Gener
     )[1]
     seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m, prior.bias_sd_N, session.bias_sign)
     x = rng.uniform(robot.lower_m, robot.upper_m, (CANDIDATES, 3))
-    R = np.broadcast_to(rotation.matrix(robot.home_rotation_rad), (CANDIDATES, 3, 3))
+    R = hanging.orientations(robot, x, rotation.matrix(robot.home_rotation_rad))
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1)
     commands = inverse.commands(robot, wires, x[good], R[good], tau[good])

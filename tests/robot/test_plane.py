@@ -1,0 +1,112 @@
+"""Platforms that a plane carries: no weight on the wires, motion in the plane alone, friction as a set of poses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from wirebayes.errors import InputError
+from wirebayes.robot.mechanics import plane, rotation, schema, statics
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.pose import on_plane
+from wirebayes.robot.pose.answer import _why_not
+from wirebayes.robot.pose.orientation import Orientation
+from wirebayes.workflows.pose import _refuse_off_plane
+
+G = 9.80665
+
+
+@pytest.fixture(scope="module")
+def sled():
+    return schema.read("sled-4")
+
+
+def _held(robot, x, R, k1=5000.0):
+    tau = inverse.tensions(robot, x[None], R[None])
+    wires = Wires("hooke", "saturating", {"k1": np.array([[k1]])}, np.full((robot.legs, 1), 1000.0))
+    return tau[0], wires, inverse.commands(robot, wires, x[None], R[None], tau)
+
+
+def test_the_wires_pull_at_each_other_and_the_plane_has_the_weight(sled):
+    tau, _, _ = _held(sled, sled.home_m, np.eye(3))
+    assert tau.min() >= sled.rule.lowest_N - 1e-9
+    assert plane.normal_force(sled, sled.home_m, np.eye(3), tau) == pytest.approx(sled.mass_kg * G)
+
+
+def test_without_the_plane_the_sentence_says_how_to_state_it(sled):
+    hanging = replace(sled, plane=None)
+    assert np.isnan(inverse.tensions(hanging, sled.home_m[None], np.eye(3)[None])).all()
+    assert "[plane]" in _why_not(hanging, sled.home_m, Orientation(sled.home_m, np.eye(3)))
+    above = replace(hanging, exit_m=sled.exit_m + [0.0, 0.0, 1.0], rule=replace(sled.rule, highest_N=4.1))
+    assert "[plane]" not in _why_not(above, sled.home_m, Orientation(sled.home_m, np.eye(3)))
+
+
+def test_the_equilibrium_in_the_plane_is_that_of_an_energy_in_three_coordinates(sled):
+    """Lengths disturbed; a minimiser that knows x, y and the angle alone."""
+    rng = np.random.default_rng(3)
+    _, wires, commands = _held(sled, sled.home_m, np.eye(3))
+    zero = commands.zero_m[0] - 2e-3 * rng.random(sled.legs)
+    found = forward.solve(sled, wires, zero[None], commands.offset_m, sled.home_m, np.eye(3))
+
+    def energy(q):
+        x, c, s = sled.home_m + [q[0], q[1], 0.0], np.cos(q[2]), np.sin(q[2])
+        points = sled.platform_m @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        stretch = np.maximum(np.linalg.norm(x + points - sled.exit_m, axis=1) - zero, 0.0)
+        return float((0.5 * 5000.0 * stretch**2 / zero).sum())
+
+    best = minimize(
+        energy, np.zeros(3), method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-16, "maxiter": 4000}
+    )
+    assert found.found[0]
+    np.testing.assert_allclose(found.position_m[0], sled.home_m + [best.x[0], best.x[1], 0.0], atol=1e-7)
+    np.testing.assert_allclose(rotation.vector(found.rotation)[0], [0.0, 0.0, best.x[2]], atol=1e-6)
+
+
+def test_a_leaning_plane_leaves_the_weight_along_it(sled):
+    lean = rotation.matrix(np.array([0.4, 0.0, 0.0]))
+    leaning = replace(
+        sled, exit_m=sled.exit_m @ lean.T, home_m=lean @ sled.home_m, home_rotation_rad=np.array([0.4, 0.0, 0.0]),
+        plane=replace(sled.plane, normal=lean @ sled.plane.normal),
+    )  # fmt: skip
+    tau, _, _ = _held(leaning, leaning.home_m, lean)
+    pulls = tau[:, None] * statics.geometry(leaning, leaning.home_m[:, None], lean[..., None]).direction[..., 0].T
+    upwards = lean @ np.array([0.0, 1.0, 0.0])
+    assert -(pulls.sum(0) @ upwards) == pytest.approx(sled.mass_kg * G * np.sin(0.4))
+    assert plane.normal_force(leaning, leaning.home_m, lean, tau) == pytest.approx(sled.mass_kg * G * np.cos(0.4))
+
+
+def test_friction_holds_as_far_as_its_largest_force_moves_the_platform(sled):
+    """Forces of friction in all directions, as small loads on the balance: the farthest displacement is the width."""
+    tau, wires, commands = _held(sled, sled.home_m, np.eye(3))
+    K = statics.stiffness(
+        sled, wires, sled.home_m[:, None], np.eye(3)[..., None], commands.zero_m.T, commands.offset_m.T
+    )
+    width, turn = plane.friction_half_width(sled, K, plane.normal_force(sled, sled.home_m, np.eye(3), tau))
+    most, radius = sled.plane.friction * sled.mass_kg * G, sled.plane.contact_radius_m
+    u = np.random.default_rng(0).standard_normal((20000, 3))
+    u /= np.linalg.norm(u, axis=1)[:, None]
+    loads = np.column_stack([most * u[:, :2], np.zeros((len(u), 3)), most * radius * u[:, 2]])
+    moved = np.linalg.solve(K[0], loads.T).T
+    np.testing.assert_allclose(np.abs(moved[:, :2]).max(0), width[0, :2], rtol=2e-3)
+    np.testing.assert_allclose(np.abs(moved[:, 5]).max(), turn[0], rtol=2e-3)
+    assert width[0, 2] == 0.0
+
+
+def test_wires_that_lift_the_platform_are_refused_on_a_table_and_not_on_a_rail(sled):
+    high = replace(sled, exit_m=sled.exit_m + [0.0, 0.0, 1.0], mass_kg=0.1)
+    tau, _, _ = _held(high, high.home_m, np.eye(3))
+    assert "lift" in on_plane.lifted(high, high.home_m, np.eye(3), tau)
+    rail = replace(high, plane=replace(high.plane, contact="rail"))
+    assert not on_plane.lifted(rail, rail.home_m, np.eye(3), tau)
+    heavy = replace(high, mass_kg=100.0)
+    assert not on_plane.lifted(heavy, heavy.home_m, np.eye(3), tau)
+
+
+def test_a_pose_off_the_plane_is_refused(sled):
+    with pytest.raises(InputError, match="off the plane"):
+        _refuse_off_plane(sled, sled.home_m + [0.0, 0.0, 0.01], np.eye(3))
+    with pytest.raises(InputError, match="off the plane"):
+        _refuse_off_plane(sled, sled.home_m, rotation.matrix(np.array([0.1, 0.0, 0.0])))
+    _refuse_off_plane(sled, sled.home_m, rotation.matrix(np.array([0.0, 0.0, 0.1])))

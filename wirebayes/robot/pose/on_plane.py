@@ -1,0 +1,70 @@
+"""What `pose` says about a platform that a plane carries: the plane's force, and how far friction can hold it."""
+
+import numpy as np
+
+from wirebayes.json_files.pose import OnPlane
+from wirebayes.robot.mechanics import plane, statics
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.pose.request import band
+from wirebayes.typing import Floats
+
+
+def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> str:
+    """Why the plane cannot carry the platform at a pose; empty where it can, or where there is none.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (3,) array
+    rotation : (3, 3) array
+    tension_N : (w,) array
+    """
+    if robot.plane is None or robot.plane.contact == "rail":
+        return ""
+    force = plane.normal_force(robot, position_m, rotation, tension_N)
+    if force >= 0:
+        return ""
+    return f"The wires lift the platform off its plane: the plane would have to pull with {-force:.3g} N."
+
+
+def on_plane(
+    robot: Robot, wires: Wires, commands: inverse.Commands, position_m: Floats, rotation: Floats, tension_N: Floats
+) -> OnPlane:
+    """The plane's force and the poses at which friction can hold the platform, over the draws.
+
+    Parameters
+    ----------
+    robot : Robot
+        On a plane.
+    wires : Wires
+    commands : Commands
+        Of the pose.
+    position_m : (3,) array
+    rotation : (3, 3) array
+    tension_N : (w,) array
+    """
+    known = robot.plane
+    assert known is not None
+    force = plane.normal_force(robot, position_m, rotation, tension_N)
+    good = np.flatnonzero(commands.feasible)
+    x, R = np.repeat(position_m[:, None], good.size, 1), np.repeat(rotation[..., None], good.size, 2)
+    K = statics.stiffness(robot, wires.part(good), x, R, commands.zero_m[good].T, commands.offset_m[good].T)
+    width, turn = plane.friction_half_width(robot, K, force)
+    middle = 1e3 * np.median(width, axis=0)
+    about = f" and turned by ±{np.degrees(np.median(turn)):.2g}°" if turn.any() else ""
+    said = f"The plane carries the platform with {force:.4g} N"
+    if known.friction:
+        along = ", ".join(f"±{v:.2g} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
+        said += f"; its friction, {known.friction * abs(force):.3g} N at most, can hold the platform {along}{about}"
+    return {
+        "normal": known.normal,
+        "contact": known.contact,
+        "normal_force_N": force,
+        "friction_coefficient": known.friction,
+        "contact_radius_m": known.contact_radius_m,
+        "friction_half_width_mm": band(1e3 * width),
+        "friction_half_width_rad": band(turn),
+        "sentence": f"{said}.",
+    }

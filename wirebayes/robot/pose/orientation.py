@@ -1,0 +1,179 @@
+"""The orientation of a requested pose: what can be asked for, what balance decides, and both in words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wirebayes.json_files.pose import OrientationFound
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion import hanging, inverse
+from wirebayes.typing import Floats
+
+COMPONENTS = ("rx", "ry", "rz")
+_ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off
+_SAME = 5e-5  # rad: a component that balance decides and that was asked for to four decimals is as asked for
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """The orientation at a position.
+
+    Attributes
+    ----------
+    position_m : (3,) array
+        The one requested; a position that cannot be chosen freely is cleared of rounding.
+    rotation : (3, 3) array
+        The one asked for, or the reference, where the platform cannot hang.
+    found : OrientationFound or None
+        None where it was commanded as a whole.
+    sentence : str
+        Why the platform cannot hang; empty where it can.
+    refused : str
+        What was asked for and cannot be had; empty where all was had.
+    """
+
+    position_m: Floats
+    rotation: Floats
+    found: OrientationFound | None = None
+    sentence: str = ""
+    refused: str = ""
+
+
+def orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> Orientation:
+    """The orientation that is asked for as far as it can be had, the rest by balance.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (3,) array
+    asked_rad : (3,) array or None
+        Components of the rotation vector, NaN where free; None: nothing is asked for, and the home orientation is
+        taken where it can be commanded and held.
+
+    Returns
+    -------
+    Orientation
+    """
+    home = robot.home_rotation_rad
+    asked = np.full(3, np.nan) if asked_rad is None else asked_rad
+    near = turning.matrix(np.where(np.isfinite(asked), asked, home))
+    whole = asked_rad is None or bool(np.isfinite(asked).all())
+    given = robot.freedom == "position" or not _clear(robot, position_m, near)
+    if given or (whole and not robot.is_underactuated and _held(robot, position_m, near, asked)):
+        return Orientation(position_m, near)
+    found = hanging.hang(robot, position_m[None], near, asked)
+    if not found.held[0]:
+        position_m = _cleared(robot, position_m, near)
+    x = position_m[None]
+    had = np.isfinite(asked)
+    if not found.held[0]:
+        found = hanging.hang(robot, x, near)
+        if not found.held[0]:
+            return Orientation(position_m, near, None, _nowhere(robot, position_m, near))
+        had = _to_be_had(hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0]), had)
+        if had.any():
+            part = hanging.hang(robot, x, near, np.where(had, asked, np.nan))
+            if not part.held[0]:
+                return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
+            found = part
+    return _described(robot, position_m, found, asked, had)
+
+
+def _clear(robot: Robot, x: Floats, R: Floats) -> bool:
+    """Whether every wire runs somewhere: no platform point lies on an exit point or inside a pulley."""
+    return bool(statics.geometry(robot, x[:, None], R[..., None]).clear[0])
+
+
+def _cleared(robot: Robot, x: Floats, reference: Floats) -> Floats:
+    """The position, or one within rounding of it that has a balance: of two wires in a plane that is along no axis."""
+    if robot.legs >= 3:
+        return x
+    near = hanging.nearest_position(robot, x, reference)
+    return x if near is None or np.abs(near - x).max() > _ROUNDING * robot.span_m else near
+
+
+def _held(robot: Robot, x: Floats, R: Floats, asked: Floats) -> bool:
+    """Whether a commanded orientation is to be taken as it is: it was asked for as a whole, or tensions hold it."""
+    return bool(np.isfinite(asked).all() or np.isfinite(inverse.tensions(robot, x[None], R[None])).all())
+
+
+def _to_be_had(ways: Floats, asked: Floats) -> Floats:
+    """Of the components asked for, those that a platform can be given, which turns in so many ways (k, 3)."""
+    out = np.zeros(3, bool)
+    left = ways * asked
+    for _ in range(len(ways)):
+        size = np.linalg.norm(left, axis=0)
+        best = int(size.argmax())
+        if size[best] < 1e-3:  # it hardly changes: nobody could set it by that
+            break
+        out[best] = True
+        direction = left[:, best] / size[best]
+        left = left - np.outer(direction, direction @ left)
+    return out
+
+
+def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, had: Floats) -> Orientation:
+    """The orientation that was found, with what was commanded."""
+    R, tau = found.rotation[0], found.tension_N[0]
+    vector = turning.vector(R[None])[0]
+    places, degrees = hanging.commanded(robot, x, R, tau)
+    free = [name for name, given in zip(COMPONENTS, had, strict=True) if not given]
+    refused = [i for i in range(3) if np.isfinite(asked[i]) and not had[i]]
+    content: OrientationFound = {
+        "commanded_degrees": degrees,
+        "of_degrees": robot.freedoms,
+        "position_directions": len(places),
+        "rotation_choice": int(found.choice[0]),
+        "commanded_components": [name for name in COMPONENTS if name not in free],
+        "free_components": free,
+        "refused_components": [COMPONENTS[i] for i in refused],
+        "other_rotation_vectors_rad": found.others[0],
+        "sentence": _summary(robot, degrees, len(places), int(found.choice[0]), free, len(found.others[0])),
+    }
+    missed = [
+        f"{COMPONENTS[i]} = {asked[i]:g} (it is {vector[i]:.5g})" for i in refused if abs(asked[i] - vector[i]) > _SAME
+    ]
+    words = f"the rotation asked for cannot be had: balance decides {', '.join(missed)}" if missed else ""
+    return Orientation(x, R, content, "", words)
+
+
+def _summary(robot: Robot, degrees: int, places: int, choice: int, free: list[str], others: int) -> str:
+    """What is commanded, what is not, and which of several solutions this is."""
+    said = f"{robot.legs} wires command {degrees} of {robot.freedoms} degrees of freedom"
+    by_balance = f"balance decides {_listed(free)}" if free else "the orientation is as asked for"
+    said += f"; {by_balance}"
+    if choice:
+        count = "one component" if choice == 1 else f"{choice} components"
+        said += f", {count} of the rotation can be asked for"
+    if places < 3:
+        said += f", the position can be chosen in {places} directions only"
+    if others:
+        said += f"; of {others + 1} stable orientations it is the one nearest to the home orientation"
+    return said + "."
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _out_of_reach(asked: Floats, had: Floats, found: hanging.Hanging) -> str:
+    """That components cannot have the values asked for, and what hangs in balance instead."""
+    wanted = ", ".join(f"{COMPONENTS[i]} = {asked[i]:g}" for i in np.flatnonzero(had))
+    vector = ", ".join(f"{v:.5g}" for v in turning.vector(found.rotation)[0])
+    return (
+        f"No tensions within the bounds hold the platform here with {wanted}; without that it hangs with the rotation "
+        f"vector ({vector}) rad."
+    )
+
+
+def _nowhere(robot: Robot, x: Floats, reference: Floats) -> str:
+    """That no orientation is in balance, and where the nearest position with one is."""
+    said = "No orientation hangs in stable balance at this position with tensions within the bounds"
+    if np.ptp(robot.platform_m, axis=0).max() == 0:
+        return f'{said}: all wires meet in one point, about which the platform turns freely (freedom = "position").'
+    near = hanging.nearest_position(robot, x, reference)
+    if near is None or np.abs(near - x).max() < _ROUNDING * robot.span_m:
+        return f"{said}."
+    return f"{said}; the nearest position that was found to have one is ({', '.join(f'{v:.5g}' for v in near)}) m."
