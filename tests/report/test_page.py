@@ -182,7 +182,7 @@ def fitted(tmp_path_factory) -> Path:
 def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     page = read(write(fitted))
     assert "8 holds and 1 not recorded, 40 readings." in page.words
-    assert "Tensions from 1.21 to 15.92 N." in page.words
+    assert "Tensions from 1.21 to 15.9 N." in page.words
     assert len(page.images) == 2 * (3 + 1) + 1  # readings, residuals, creep; all pairs; the curve of the chain
     assert "k1 (N)" in page.words and "stiffness: the tension per unit of strain" in page.words
     assert "chain/posterior.nc" in page.anchors
@@ -302,7 +302,8 @@ def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(chang
 
 
 CHECKED = {
-    "material": "line", "length_mm": 1000.0, "recorded_holds": 2, "unrecorded_holds": 1, "readings": 6,
+    "material": "line", "control": "displacement", "length_mm": 1000.0, "recorded_holds": 2, "unrecorded_holds": 1,
+    "readings": 6,
     "duration_s": 360.0, "warnings": [{"kind": "data", "text": "hold 2 repeats hold 1"}],
     "holds": [{"number": None, "displacement_mm": 5.0, "start_s": 0.0, "duration_s": 120.0, "readings": 0,
                "first_s": None, "first_N": None, "last_N": None}],
@@ -392,7 +393,7 @@ def test_the_page_of_a_simulation_tells_the_truth(tmp_path):
     assert main(["simulate", "--effect", "toe.w=2", "--parameter", "k1=712", "--output", str(out)]) == 0
     page = read(write(out))
     assert "Beyond the plain model: toe." in page.words
-    assert "712" in page.words and "0.00200" in page.words
+    assert "712" in page.words and "2.00" in page.words
     assert "truth.json" in page.anchors
 
 
