@@ -122,6 +122,9 @@ def test_the_firmware_files_describe_the_drums():
     smooth = np.sqrt(robot.drums.radius_m**2 + growth * (robot.drums.wire_m - out))
     assert np.abs(1e-3 * radius - smooth).max() < 6e-4  # steps of one layer against a smooth growth
     assert "; M666 L and H, teeth of motor and spool: their ratio is 3, 3, 3, 3" in text
-    turn = re.search(r"rotation_distance: (\S+)", files.klipper(robot, line))[1]
-    assert float(turn) == pytest.approx(2 * np.pi * radius[0], rel=1e-4)
+    klipper = files.klipper(robot, line)
+    turns = [float(turn) for turn in re.findall(r"rotation_distance: (\S+)", klipper)]
+    # Klipper counts straight millimetres: of all the wire of a turn what one line gets
+    assert turns == pytest.approx(2 * np.pi * radius / robot.lines, rel=1e-4)
+    assert f"winch_buildup_factor: {1e3 * growth:.5f}  # mm" in klipper
     assert "M666 R" not in files.reprapfirmware(schema.read("hangprinter-4"), line)

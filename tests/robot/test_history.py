@@ -484,11 +484,11 @@ def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
     zeros = np.zeros(4)
     robot = replace(robot, drums=Drums(zeros + 0.05, zeros, zeros + np.inf, zeros, zeros, zeros - 1.0))
     head = ",".join(["time_s", *(f"motor_{i}_rad" for i in range(1, 5))])
-    good = f"{head}\n0,-20,-20,-20,-40\n9,-20,-20,-20,-40\n"
-    assert table.parse("log.csv", good, robot, table.measured).joint_m[0, 3] == pytest.approx(2.0)
+    good = f"{head}\n0,-125,-136,-124,-160\n9,-125,-136,-124,-160\n"
+    assert table.parse("log.csv", good, robot, table.measured).joint_m[0, 3] == pytest.approx(8.0)
     with pytest.raises(InputError) as caught:
-        table.parse("log.csv", good.replace("9,-20", "9,20"), robot, table.measured)
-    wrong = "line 3, column motor_1_rad: found '20', which pays out -1 m; expected a length above 0"
+        table.parse("log.csv", good.replace("9,-125", "9,125"), robot, table.measured)
+    wrong = "line 3, column motor_1_rad: found '125', which pays out -6.25 m; expected a length above 0"
     assert str(caught.value) == f"log.csv: {wrong}"
 
 
