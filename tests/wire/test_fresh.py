@@ -96,7 +96,7 @@ def toe(s, stretched, law):
 
 
 def _catalogue():
-    bench = protocol([1.0, 2.0, 1.0], [[0.0, 60.0]] * 3, warming=np.array([[0.0, 1.0]] * 3))
+    bench = protocol([1.0, 2.0, 3.0, 4.0, 3.0], [[0.0, 60.0]] * 5, warming=np.array([[0.0, 1.0]] * 5))
     longer = protocol([1.0, 2.0], [[0.0, 60.0]] * 2, length=1700.0)
     for kind in CATALOGUE.values():
         found = kind.variants([bench]) or kind.variants([bench, longer])
