@@ -392,7 +392,7 @@ def test_the_page_of_a_simulation_tells_the_truth(tmp_path):
     assert main(["simulate", "--effect", "toe.w=2", "--parameter", "k1=712", "--output", str(out)]) == 0
     page = read(write(out))
     assert "Beyond the plain model: toe." in page.words
-    assert "712" in page.words and "0.00200" in page.words
+    assert "712" in page.words and "2.00" in page.words
     assert "truth.json" in page.anchors
 
 
