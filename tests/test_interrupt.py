@@ -104,7 +104,7 @@ def test_during_an_import(module: str, number: int, tmp_path: Path) -> None:
 
 
 def fit(out: Path) -> tuple[list[str], Callable[[int], bool]]:
-    arguments = ["fit", PAPER, "--experiment", "kite-1.5m", "--effect", "memory", "--output", str(out)]
+    arguments = ["fit", PAPER, "--experiment", "kite-1.5m", "--effect", "superposition", "--output", str(out)]
     return arguments, exists(out / "kite-1.5m" / ".checkpoint")
 
 

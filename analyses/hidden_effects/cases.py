@@ -91,7 +91,7 @@ def able(name: str, protocol: str) -> bool:
     needs = effect(name).needs
     if needs == "unloading":
         return protocol in ("unloading", "slack")
-    return not needs or protocol == {"temperature": "temperature", "lengths": "two_lengths"}[needs]
+    return needs in ("", "steps") or protocol == {"temperature": "temperature", "lengths": "two_lengths"}[needs]
 
 
 def specs(

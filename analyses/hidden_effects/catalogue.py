@@ -37,7 +37,7 @@ class Effect:
     largest : largest sensible amplitude on a bench.
     shapes : shape constants as (lowest, highest), drawn log-uniform; the library takes three values of each.
     choices : shape constants that take listed values.
-    needs : `""`, `unloading`, `temperature` or `lengths`.
+    needs : `""`, `unloading`, `temperature`, `lengths` or `steps` (many enough for a period).
     """
 
     name: str
@@ -59,7 +59,8 @@ EFFECTS = {
         Effect("toe", "material", UP, lambda s: s.stretch_mm, "mm"),
         Effect("power_strain", "material", BOTH, lambda s: 0.8, "-", shapes={"typical": (0.001, 0.01)}),
         Effect("permanent_creep", "material", UP, lambda s: 1.0, "-"),
-        Effect("memory", "material", UP, lambda s: 1.5, "-"),
+        Effect("superposition", "material", UP, lambda s: 1.0, "-"),
+        Effect("prior_creep", "event", UP, lambda s: 7200.0, "s"),
         Effect(
             "second_relaxation",
             "material",
@@ -80,6 +81,16 @@ EFFECTS = {
         Effect("ageing", "material", UP, lambda s: 1.5, "-"),
         Effect("creep_threshold", "material", UP, lambda s: 0.8 * s.tension_N, "N"),
         Effect("reading_delay", "instrument", UP, lambda s: min(0.9 * s.gap_s, 25.0), "s"),
+        Effect("late_clock", "instrument", UP, lambda s: 0.2 * s.clock_s / s.holds, "s"),
+        Effect(
+            "screw_error",
+            "instrument",
+            UP,
+            lambda s: 0.1 * s.stretch_mm,
+            "mm",
+            shapes={"phase": (0.1, 6.2), "period": (0.0, 0.0)},  # the period is of a rig: see `periods`
+            needs="steps",
+        ),
         Effect("grip_slip", "event", UP, lambda s: 0.5 * s.stretch_mm, "mm"),
         Effect("unrecorded_hold", "event", UP, lambda s: 7200.0, "s"),
         Effect("sensor_drift", "instrument", BOTH, lambda s: 0.3 * s.tension_N / s.clock_s, "N/s"),
@@ -112,7 +123,7 @@ FOREIGN = {
     e.name: e
     for e in (
         Effect(
-            "screw_thread", "instrument", UP, lambda s: 0.4, "mm", shapes={"pitch": (2.3, 6.0), "phase": (0.1, 6.2)}
+            "worn_thread", "instrument", UP, lambda s: 0.4, "mm", shapes={"width": (0.5, 1.2), "centre": (1.0, 1.0)}
         ),
         Effect("yield", "material", UP, lambda s: 0.7, "-", shapes={"strain": (1.0, 1.0)}),
         Effect("hold_softening", "material", UP, lambda s: 0.5 / s.holds, "-"),
@@ -171,7 +182,18 @@ def fits(e: Effect, rig: Rig) -> bool:
         return any(bench.warming is not None for bench in rig.benches)
     if e.needs == "lengths":
         return len(rig.materials) < len(rig.benches)
+    if e.needs == "steps":
+        shortest, longest = periods(rig)
+        return longest > 1.5 * shortest
     return True
+
+
+def periods(rig: Rig) -> tuple[float, float]:
+    """Shortest and longest period (mm) that a screw can show: two usual steps, half the way."""
+    ways = [np.append(0.0, bench.displacements_mm) for bench in rig.benches]
+    steps = [np.abs(np.diff(way[1:])) for way in ways]
+    shortest = 2 * min(float(np.median(step[step > 0])) for step in steps)
+    return shortest, 0.5 * max(float(np.ptp(way)) for way in ways)
 
 
 def scale(rig: Rig, bench: Bench, y: Array) -> Scale:
@@ -206,14 +228,27 @@ def event_holds(bench: Bench) -> list[int]:
     return recorded[1:]
 
 
+def has_hold(e: Effect) -> bool:
+    """Whether the effect belongs to one hold; creep before the test is an event of none."""
+    return e.scope == "event" and e.name != "prior_creep"
+
+
+def shape_ranges(e: Effect, rig: Rig) -> dict[str, tuple[float, float]]:
+    """Shape constants of an effect on a rig as (lowest, highest)."""
+    return e.shapes | ({"period": periods(rig)} if "period" in e.shapes else {})
+
+
 def draw(e: Effect, rig: Rig, rng: np.random.Generator) -> Candidate:
     """A random candidate of an effect on a rig."""
     sets = bench_sets(e, rig)
     benches = sets[int(rng.integers(len(sets)))]
-    shapes = {k: float(np.exp(rng.uniform(np.log(lo), np.log(hi)))) for k, (lo, hi) in e.shapes.items()}
+    ranges = shape_ranges(e, rig)
+    shapes = {k: float(np.exp(rng.uniform(np.log(lo), np.log(hi)))) for k, (lo, hi) in ranges.items()}
     shapes |= {k: float(rng.choice(values)) for k, values in e.choices.items()}
-    if e.scope == "event":
+    if has_hold(e):
         shapes["hold"] = float(rng.choice(event_holds(rig.benches[benches[0]])[1:-1]))
+    if e.name == "worn_thread":  # in the middle of the way
+        shapes["centre"] = float(rng.uniform(0.3, 0.7) * rig.benches[benches[0]].displacements_mm.max())
     if e.name == "yield":  # somewhere in the middle of the strains visited
         bench = rig.benches[benches[0]]
         stretch = bench.displacements_mm.max() + bench.preload_mm
@@ -228,11 +263,15 @@ def library(rig: Rig, names: Iterable[str] = tuple(EFFECTS), values: int = 3) ->
         if not fits(e, rig):
             continue
         middles = (np.arange(values) + 0.5) / values
-        axes = {k: tuple(lo * (hi / lo) ** middles) for k, (lo, hi) in e.shapes.items()}
+        axes = {k: tuple(lo * (hi / lo) ** middles) for k, (lo, hi) in shape_ranges(e, rig).items()}
+        if "period" in e.shapes:  # no two so near that one fits in the other's place
+            shortest, longest = periods(rig)
+            count = min(2 + int(2 * longest * (1 / shortest - 1 / longest)), 12)
+            axes["period"] = tuple(1 / np.linspace(1 / longest, 1 / shortest, count))
         axes = axes | e.choices
         for benches in bench_sets(e, rig):
             places = tuple(float(j) for j in event_holds(rig.benches[benches[0]]))
-            holds = {"hold": places} if e.scope == "event" else {}
+            holds = {"hold": places} if has_hold(e) else {}
             keys = list(axes) + list(holds)
             for point in itertools.product(*axes.values(), *holds.values()):
                 for sign in e.signs:

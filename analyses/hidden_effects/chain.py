@@ -13,22 +13,28 @@ from .state import Effects
 
 @dataclass
 class Carried:
-    """Creep carried from hold to hold, each (n,): `main` (mm), the second mode, viscous flow; clocks still running."""
+    """Creep carried from hold to hold, each (n,), mm: `main`, the second mode, viscous flow; clocks still running.
+
+    `apart` is by how much superposed creep differs from `main`, `goal` what the last hold was heading for.
+    """
 
     main: Array
     second: Array
     viscous: Array
+    apart: Array
+    goal: Array
     clocks: list[tuple[Array, Array]] = field(default_factory=list)  # (what is left to add, age of the clock)
 
     @property
     def total(self) -> Array:
         """Elongation by creep (mm), shape (n,)."""
-        return self.main + self.second + self.viscous
+        return self.main + self.second + self.viscous + self.apart
 
     def rows(self, index: Index) -> Carried:
         """The chosen rows."""
         clocks = [(left[index], age[index]) for left, age in self.clocks]
-        return Carried(self.main[index], self.second[index], self.viscous[index], clocks)
+        main, second, viscous = self.main[index], self.second[index], self.viscous[index]
+        return Carried(main, second, viscous, self.apart[index], self.goal[index], clocks)
 
 
 @dataclass(frozen=True)
@@ -79,13 +85,6 @@ def grow(m: Material, before: Carried, fx: Effects, order: int, tau0: Array, gri
         onset = fx.shape("log_creep.onset_s")[:, None]
         done = done + fx["log_creep"][:, None] * (np.log1p(time / onset) / np.log1p(300.0 / onset) - done)
     main = before.main[:, None] + gap[:, None] * done
-    clocks = []
-    if fx.on("memory"):
-        for owed, age in before.clocks:
-            still = owed[:, None] * remaining(grid, m.k2, m.N, age)
-            main = main + fx["memory"][:, None] * (owed[:, None] - still)
-            clocks.append((still[:, -1], age + time[:, -1]))
-        clocks.append((gap * left[:, -1], np.broadcast_to(time[:, -1], gap.shape)))
     viscous = before.viscous[:, None]
     if fx.on("steady_creep"):
         flow = (fx["steady_creep"] * tau0)[:, None] * time
@@ -98,6 +97,16 @@ def grow(m: Material, before: Carried, fx: Effects, order: int, tau0: Array, gri
         steps = radau(np.diff(time, axis=1) / fx.shape("second_relaxation.time_s")[:, None])
         fade = np.concatenate([np.ones((len(steps), 1)), np.cumprod(steps, axis=1)], axis=1)
         second = aim + (second - aim) * fade
-    total = main + second + viscous
-    end_main, end_second, end_viscous = (np.broadcast_to(p, total.shape)[:, -1].copy() for p in (main, second, viscous))
-    return total, Carried(end_main, end_second, end_viscous, clocks)
+    goal, clocks, apart = before.main + gap, [], np.zeros((len(gap), 1))
+    if fx.on("superposition"):  # every change of the goal is approached by a clock of its own
+        change = goal - before.goal
+        missing = change[:, None] * left
+        for owed, age in before.clocks:
+            still = owed[:, None] * remaining(grid, m.k2, m.N, age)
+            missing = missing + still
+            clocks.append((still[:, -1], age + time[:, -1]))
+        clocks.append((change * left[:, -1], np.broadcast_to(time[:, -1], change.shape)))
+        apart = fx["superposition"][:, None] * (goal[:, None] - missing - main)
+    total = main + second + viscous + apart
+    ends = [np.broadcast_to(part, total.shape)[:, -1].copy() for part in (main, second, viscous, apart)]
+    return total, Carried(ends[0], ends[1], ends[2], ends[3], goal, clocks)

@@ -14,10 +14,13 @@ def positions(bench: Bench, fx: Effects) -> Array:
     Lost motion is a play: going up the carriage follows at once, going down it stays until the play `w` is used up.
     """
     x = np.tile(bench.displacements_mm, (fx.n, 1))
-    if fx.on("screw_thread"):
-        pitch, phase = fx.shape("screw_thread.pitch"), fx.shape("screw_thread.phase")
-        wave = np.sin(2 * np.pi * bench.displacements_mm / pitch[:, None] + phase[:, None])
-        x = x + fx["screw_thread"][:, None] * wave
+    at = bench.displacements_mm
+    if fx.on("screw_error"):
+        turns = at / fx.shape("screw_error.period")[:, None]
+        x = x + fx["screw_error"][:, None] * np.sin(2 * np.pi * turns + fx.shape("screw_error.phase")[:, None])
+    if fx.on("worn_thread"):
+        centre, width = fx.shape("worn_thread.centre")[:, None], fx.shape("worn_thread.width")[:, None]
+        x = x + fx["worn_thread"][:, None] * np.exp(-0.5 * ((at - centre) / width) ** 2)
     if fx.on("lost_motion"):
         w = fx["lost_motion"]
         carriage = x[:, 0].copy()

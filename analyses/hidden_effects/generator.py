@@ -14,7 +14,7 @@ from .instrument import lagging, readings, sticking
 from .rig import MATERIAL_PARAMETERS, Array, Bench, Index, Rig
 from .state import Effects
 
-SLOW = ("memory", "sensor_lag", "sensor_hysteresis", "second_relaxation")  # rows with these are simulated apart
+SLOW = ("superposition", "sensor_lag", "sensor_hysteresis", "second_relaxation")  # rows with these are simulated apart
 PER_LENGTH = ("second_relaxation", "steady_creep")  # elongations: they scale with the sample's length
 
 
@@ -111,21 +111,26 @@ def _material(rig: Rig, bench: Bench, theta: Array, fx: Effects, scale: float) -
 def _bench(bench: Bench, m: Material, preload: Array, fx: Effects, eta: Array) -> Array:
     stretched = bench.length_mm + preload[:, None] + positions(bench, fx) + eta
     zero = np.zeros(fx.n)
-    carried = Carried(zero, zero, zero)
+    carried = Carried(zero, zero, zero, zero, zero)
+    if fx.on("prior_creep"):
+        unmoved = bench.length_mm + preload[:, None]
+        carried = _wait(bench, m, carried, fx, 0, unmoved, fx["prior_creep"])
     shown = zero
     typical = float(np.median(m.k2)), float(np.median(m.N))
     columns = []
     for j, hold in enumerate(bench.holds):
         here = stretched[:, j : j + 1]
         if fx.on("unrecorded_hold"):
-            carried = _wait(bench, m, carried, fx, j, here)
+            seconds = np.where(fx.shape("unrecorded_hold.hold") == j, fx["unrecorded_hold"], 0.0)
+            carried = _wait(bench, m, carried, fx, j, here, seconds)
         start = _tension_now(bench, m, carried, fx, j, here)
         times = np.array(hold.times_s if hold.times_s else [hold.duration_s])
         if hold.duration_s > times[-1]:
             times = np.append(times, hold.duration_s)
         grid, nodes = time_grid(times, *typical, fewest=8 if fx.on("second_relaxation") else 3)
         before = carried
-        creep, carried = grow(m, before, fx, j, start, grid)
+        creep, carried = grow(m, before, fx, j, start, _by_a_late_clock(fx, grid, typical[1]))
+        creep = creep[:, -len(grid) :]
         whole = fx.on("sensor_lag") or fx.on("sensor_hysteresis")
         keep = np.arange(len(grid)) if whole else nodes
         warmth = _warmth(bench, bench.starts_s[j] + grid[keep])
@@ -156,23 +161,34 @@ def _warmth(bench: Bench, elapsed_s: Array) -> Array | float:
     return bench.warming.at(elapsed_s) - bench.warming.at(first)
 
 
-def _wait(bench: Bench, m: Material, carried: Carried, fx: Effects, j: int, here: Array) -> Carried:
-    """State after the unrecorded time at this hold's position, in the rows that have one before hold j."""
-    rows = np.flatnonzero((fx.shape("unrecorded_hold.hold") == j) & (fx["unrecorded_hold"] > 0))
+def _wait(bench: Bench, m: Material, carried: Carried, fx: Effects, j: int, here: Array, seconds: Array) -> Carried:
+    """State after some time (n,) at a position, in the rows that have any before hold j."""
+    rows = np.flatnonzero(seconds > 0)
     if not len(rows):
         return carried
     part, sub, before = m.rows(rows), fx.rows(rows), carried.rows(rows)
-    grid = np.linspace(0, 1, 81) ** (1 / min(float(np.median(part.N)), 1.0)) * sub["unrecorded_hold"][:, None]
+    grid = np.linspace(0, 1, 81) ** (1 / min(float(np.median(part.N)), 1.0)) * seconds[rows, None]
     start = _tension_now(bench, part, before, sub, j, here[rows])
     _, after = grow(part, before, sub, j, start, grid)
-    result = Carried(carried.main.copy(), carried.second.copy(), carried.viscous.copy())
-    result.main[rows], result.second[rows], result.viscous[rows] = after.main, after.second, after.viscous
+    names = ("main", "second", "viscous", "apart", "goal")
+    result = Carried(*(getattr(carried, name).copy() for name in names))
+    for name in names:
+        getattr(result, name)[rows] = getattr(after, name)
     nothing = (np.zeros(fx.n), np.ones(fx.n))
     for i, clock in enumerate(after.clocks):  # the last one is the waiting's own, new to the other rows
         owed, age = (part.copy() for part in (carried.clocks[i] if i < len(carried.clocks) else nothing))
         owed[rows], age[rows] = clock
         result.clocks.append((owed, age))
     return result if after.clocks else dataclasses.replace(result, clocks=carried.clocks)
+
+
+def _by_a_late_clock(fx: Effects, grid: Array, exponent: float) -> Array:
+    """True times of a hold's nodes where its clock was started late: some nodes before the first reading, then all."""
+    if not fx.on("late_clock"):
+        return grid
+    late = fx["late_clock"][:, None]
+    earlier = np.linspace(0, 1, 25)[:-1] ** (1 / min(exponent, 1.0)) * late
+    return np.concatenate([earlier, late + grid], axis=1)
 
 
 def _late_first(

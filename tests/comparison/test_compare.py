@@ -135,7 +135,7 @@ def test_every_candidate_differs_from_the_base_in_its_one_thing() -> None:
     names = [c.name for c in everything]
     assert len(set(names)) == len(names)
     assert {"exponential", "logarithmic", "modified_hooke", "additive", "hold_by_hold", "independent_errors",
-            "unrecorded_skipped", "memory", "grip_slip"} <= set(names)  # fmt: skip
+            "unrecorded_skipped", "superposition", "grip_slip"} <= set(names)  # fmt: skip
     assert "unrecorded_skipped" not in [c.name for c in candidates(experiments()[1], PLAIN, CATALOGUE)]
     assert "lost_motion" not in names  # nothing turns back on this protocol
     for c in everything[1:]:
@@ -143,7 +143,7 @@ def test_every_candidate_differs_from_the_base_in_its_one_thing() -> None:
         assert again != PLAIN, c.name
     with_law = candidates(experiments()[0], replace(PLAIN, law="modified", history="additive"), CATALOGUE)
     assert {c.law for c in with_law} == {"hooke", "modified"}
-    assert next(c for c in with_law if c.name == "memory").history == "additive"
+    assert next(c for c in with_law if c.name == "superposition").history == "additive"
 
 
 def test_an_event_is_put_where_the_readings_say() -> None:

@@ -147,7 +147,10 @@ def test_the_last_third_is_predicted_from_a_posterior_of_the_others(
     assert found["convergence"] == ("weights" if settled else "fit")
     assert found["converged"] is False  # one of three samplings was not
     assert found["effects"] == [] and found["parameters"] == 8
-    for candidate, listed in (("memory", ["memory"]), ("logarithmic", [])):  # a rival law is no effect of the catalogue
+    for candidate, listed in (
+        ("superposition", ["superposition"]),
+        ("logarithmic", []),
+    ):  # a rival law is no effect of the catalogue
         other = replace(PLAIN, effects=(candidate,))
         assert compare._scores(Task(experiments()[1], other, train_holds), 0, Policy())["effects"] == listed
 
@@ -221,13 +224,13 @@ def test_of_another_base_the_laws_of_the_plain_model_are_candidates() -> None:
 
 def test_effects_that_the_test_could_show_are_candidates_and_only_those_asked_for() -> None:
     """An event once, whatever hold; the base always."""
-    known = {name: CATALOGUE[name] for name in ("memory", "grip_slip", "lost_motion")}
+    known = {name: CATALOGUE[name] for name in ("superposition", "grip_slip", "lost_motion")}
     names = [c.name for c in module.candidates(experiments()[0], PLAIN, known)]
-    assert names[12:] == ["memory", "grip_slip"]  # nothing turns back, so no motion is lost
+    assert names[12:] == ["superposition", "grip_slip"]  # nothing turns back, so no motion is lost
     some = module.candidates(experiments()[0], PLAIN, known, ["grip_slip", "additive"])
     assert [c.name for c in some] == [BASE, "additive", "grip_slip"]
     assert some[2].effects == ("grip_slip",) and some[2].sentence == CATALOGUE["grip_slip"].sentence
-    placed = replace(PLAIN, effects=("grip_slip@7", "memory", "two_modes"))
+    placed = replace(PLAIN, effects=("grip_slip@7", "superposition", "two_modes"))
     assert [e.key for e in module.effects_of(placed, experiments()[0], CATALOGUE, 0)] == list(placed.effects)
 
 
@@ -281,9 +284,9 @@ def scored(elpd: list[float]) -> Scores:
 
 
 def test_held_out_holds_as_plain_values() -> None:
-    fit = SimpleNamespace(problem=build([experiments()[1]], [named("memory")]))
+    fit = SimpleNamespace(problem=build([experiments()[1]], [named("superposition")]))
     found = compare._held_out(HeldOut("wire", 8, scored([1.0, 2.5]), scored([4.0])), fit)  # type: ignore[arg-type]
-    assert found["trained_on"] == 8 and found["holds"].tolist() == [2, 3] and found["effects"] == ["memory"]
+    assert found["trained_on"] == 8 and found["holds"].tolist() == [2, 3] and found["effects"] == ["superposition"]
     free, given = found["free"], found["given_first"]
     assert (free["elpd"], given["elpd"]) == (3.5, 4.0) and free["per_hold"].tolist() == [1.0, 2.5]
     assert free["rmse_N"] == 1.0 and free["elpd_together"] == 7.0 and free["pit_p"] == 0.25
@@ -300,7 +303,7 @@ def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
 ) -> None:
     """Named for its experiment and itself; a hold in the name is set off by a hyphen."""
     experiment = experiments()[1]
-    tasks = [Task(experiment, replace(PLAIN, name=name)) for name in (BASE, "grip_slip@3", "memory")]
+    tasks = [Task(experiment, replace(PLAIN, name=name)) for name in (BASE, "grip_slip@3", "superposition")]
     assert tasks[1].file == Path("roc-line-1.71m/models/grip_slip-3.json")
     done = tmp_path / tasks[0].file
     done.parent.mkdir(parents=True)
@@ -320,9 +323,11 @@ def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
     monkeypatch.setattr(compare, "workers", alone)
     told: list[tuple[str, float, float]] = []
     compare.run(tasks, tmp_path, 5, report=lambda *about: told.append(about))
-    assert judged == [("grip_slip@3", 5, compare.POLICY), ("memory", 5, compare.POLICY)]
+    assert judged == [("grip_slip@3", 5, compare.POLICY), ("superposition", 5, compare.POLICY)]
     assert told == [("models", 1, 2), ("models", 2, 2)]
-    assert done.read_text() == "known" and json.loads((tmp_path / tasks[2].file).read_text()) == {"name": "memory"}
+    assert done.read_text() == "known" and json.loads((tmp_path / tasks[2].file).read_text()) == {
+        "name": "superposition"
+    }
     # half the draws of a fit, from half the walkers
     assert (compare.POLICY.ess, compare.POLICY.walkers, compare.POLICY.round_draws) == (
         Policy().ess / 2, Policy().walkers / 2, Policy().round_draws / 2

@@ -20,13 +20,13 @@ def fit(folder: Path) -> None:
 
 
 def discover(folder: Path) -> None:
-    keep = {"toe", "memory"}
+    keep = {"toe", "superposition"}
     without = [effect.name for effect in wb.list_effects() if effect.name not in keep]
     wb.discover(PAIR[0], without=without, policy=POLICY, simulations=49, output=folder)
 
 
 def compare(folder: Path) -> None:
-    wb.compare(PAIR[0], only=("memory", "modified_hooke"), policy=POLICY, output=folder)
+    wb.compare(PAIR[0], only=("superposition", "modified_hooke"), policy=POLICY, output=folder)
 
 
 def batch(folder: Path) -> None:

@@ -141,7 +141,7 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
 ) -> None:
     """On the first holds of each experiment, with the laws of the block and five hundred draws."""
     pair = simulated_tests([Bench("a"), Bench("b", displacements_mm=(1, 2, 3, 4))], Truth(WIRE), seed=2)
-    effects = (named("memory"),)
+    effects = (named("superposition"),)
     problem = build([e.train(k) for e, k in zip(pair, (7, 3), strict=True)], effects, law="modified")
     given: list[tuple[object, ...]] = []
 
@@ -152,7 +152,7 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
 
     def draws(trained: str, rng: object, n: int) -> tuple[object, np.ndarray]:
         assert trained == "trained" and n == 500
-        values = WIRE | {"memory.omega": 0.5}
+        values = WIRE | {"superposition.omega": 0.5}
         return problem, np.tile([values[name.split("[")[0]] for name in problem.names], (5, 1))
 
     monkeypatch.setattr(held_out, "fitted", fitted)

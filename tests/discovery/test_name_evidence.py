@@ -74,7 +74,7 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
         def __init__(self, block: Any, effect: Any) -> None:
             pass
 
-        def starts(self) -> np.ndarray:
+        def starts(self, shapes: Any) -> np.ndarray:
             return np.zeros((1, 1))
 
         def climb(self, start: np.ndarray, amplitude: np.ndarray) -> SimpleNamespace:
@@ -96,7 +96,9 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     trials = [p for hold in range(1, 13) for p in probes(named(f"grip_slip@{hold}"))[:1]]
     candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
 
-    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float) -> refit.Refit:
+    def refitted(
+        blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float, shapes: Any
+    ) -> refit.Refit:
         return refit.Refit(effect, tuple(which), 9.0 if effect.hold == 7 else -30.0, 8.0, 1.0, ())
 
     monkeypatch.setattr(name_evidence, "refit", refitted)
@@ -118,7 +120,9 @@ def test_an_absurd_value_of_the_scan_takes_no_other_name_off_the_list(monkeypatc
     own = {"sensor_drift": -3.0, "toe": 7.0, "strain_stiffening": -1.0}
     asked: list[str] = []
 
-    def refitted(blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float) -> refit.Refit:
+    def refitted(
+        blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float, shapes: Any
+    ) -> refit.Refit:
         asked.append(effect.name)
         return refit.Refit(effect, tuple(which), own[effect.name], 8.0, 1.0, ())
 

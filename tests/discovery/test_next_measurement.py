@@ -82,11 +82,11 @@ def test_a_measurement_is_proposed_where_it_tells_more(
     ratio: float, pair: bool, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "_best_plan", lambda block, value: ("load it twice", ratio))
-    one, other = probe("toe"), probe("memory")
+    one, other = probe("toe"), probe("superposition")
     found = module.next_measurement(None, (one, other) if pair else None, None if pair else one)  # type: ignore[arg-type]
     assert message in found
     assert ("load it twice" in found) == (ratio >= 1.1)
-    assert ("toe from memory" in found) == pair
+    assert ("toe from superposition" in found) == pair
     remainder = module.next_for_remainder(None)  # type: ignore[arg-type]
     assert ("load it twice" in remainder) == (ratio >= 1.1)
 

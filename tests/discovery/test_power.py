@@ -100,7 +100,7 @@ def test_probes_of_the_bench_do_what_they_say() -> None:
         assert getattr(power, name)().apply(value, own, hold) == pytest.approx(wanted)
     # a wire of 500 N / 1000 mm and a fixture of 1e-3 mm/N in series: half a thousandth of the strain is the bench's
     assert power._Compliance().apply(value, own, hold) == pytest.approx(4.0 / (1.0 + 0.5e-3))
-    assert isinstance(Probe(named("memory"), {}, 1.0, False), Probe)
+    assert isinstance(Probe(named("superposition"), {}, 1.0, False), Probe)
 
 
 def test_a_group_takes_no_one_who_is_exactly_at_its_bound() -> None:
@@ -139,8 +139,8 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
     monkeypatch.setattr(power, "expand", expand)
     monkeypatch.setattr(power, "projected", lambda x, ratio: x.left[:, : x.signatures[0].shape[1]] + ratio)
     block: Any = SimpleNamespace(target="target", modes=SimpleNamespace(z=np.array([[1.0], [2.0]])))
-    kinds: Any = [SimpleNamespace(name=n, shows=f"shows {n}") for n in ("memory", "toe")]
-    found = power.not_identifiable(block, kinds, ["memory"])
+    kinds: Any = [SimpleNamespace(name=n, shows=f"shows {n}") for n in ("superposition", "toe")]
+    found = power.not_identifiable(block, kinds, ["superposition"])
     assert found == [
         "constant force offset: 90.4 % of it is absorbed by the model's own parameters",
         "scale of the displacement: 95.0 % of it is absorbed by the model's own parameters",
@@ -153,7 +153,7 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
         ("_DisplacementScale", "scale of the displacement.a"), ("_Compliance", "compliance of the fixture.c"),
     ]  # fmt: skip
     assert trials == [(kind, {column: 1e-3}, 1e-3, False) for kind, column in names]
-    power.not_identifiable(block, kinds, ["fixture_compliance", "memory"])
+    power.not_identifiable(block, kinds, ["fixture_compliance", "superposition"])
     assert [t[0] for t in asked[1][2]] == ["_SensorGain", "_ForceOffset", "_DisplacementScale"]
     for kind in power._ABSORBABLE:
         assert kind.amplitudes[0].neutral == 0.0

@@ -36,7 +36,7 @@ def refitted(monkeypatch: pytest.MonkeyPatch, tops: list[float], effect: Any = T
             main = effect.amplitudes[0]
             self.prior = Flat(0.04 if main.prior.support()[0] >= main.neutral else 0.08)
 
-        def starts(self) -> np.ndarray:
+        def starts(self, shapes: Any) -> np.ndarray:
             return np.zeros((2, 1))
 
         def climb(self, start: np.ndarray, amplitude: np.ndarray) -> SimpleNamespace:

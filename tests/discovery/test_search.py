@@ -125,7 +125,7 @@ def test_findings_do_not_depend_on_how_many_processes_there_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [named("toe")])
-    kinds = {name: CATALOGUE[name] for name in ("toe", "memory", "steady_creep")}
+    kinds = {name: CATALOGUE[name] for name in ("toe", "superposition", "steady_creep")}
     reports = []
     for cores in (1, 2):
         monkeypatch.setattr(workers, "cores", lambda cores=cores: cores)

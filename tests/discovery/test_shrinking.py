@@ -90,7 +90,7 @@ def test_a_report_compares_the_final_model_with_the_plain_one() -> None:
 def test_an_event_of_another_test_and_a_comparison_of_lengths_do_not_act_on_one_alone() -> None:
     one = experiments()[0]
     slip = replace(named("grip_slip@4"), test=one.name)  # type: ignore[type-var]
-    elsewhere, anywhere = replace(slip, test="another"), named("memory")
+    elsewhere, anywhere = replace(slip, test="another"), named("superposition")
     lengths = SimpleNamespace(compares_lengths=True)
     assert shrinking.alone([slip, elsewhere, anywhere, lengths], one) == (slip, anywhere)  # type: ignore[list-item]
 
@@ -223,7 +223,7 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
     monkeypatch.setattr(shrinking, "fitted", fitted)
     slip = replace(named("grip_slip@4"), test="another")  # type: ignore[type-var]
     whole: Any = SimpleNamespace(
-        effects=(slip, named("memory")), law="hooke", history="additive", names=(one.name, other.name),
+        effects=(slip, named("superposition")), law="hooke", history="additive", names=(one.name, other.name),
         experiments=(one, other), scales="scales",
     )  # fmt: skip
     memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]

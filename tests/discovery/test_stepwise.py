@@ -26,7 +26,7 @@ def plain_fit(bench: Bench, truth: dict[str, float], names: tuple[str, ...]) -> 
 @pytest.mark.parametrize(
     ("truth", "bench"),
     [
-        ({"strain_stiffening.c": 6.0, "memory.omega": 0.5}, Bench(displacements_mm=UP_AND_DOWN)),
+        ({"strain_stiffening.c": 6.0, "superposition.omega": 0.5}, Bench(displacements_mm=UP_AND_DOWN)),
         ({"toe.w": 1.0, "sensor_nonlinearity.a": 0.004}, Bench()),
     ],
 )

@@ -7,7 +7,6 @@ from tests.wire.protocols import PLAIN, columns, protocol
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Amplitude, Effect
-from wirebayes.wire.laws import creep_fraction
 from wirebayes.wire.staircase import Model, linearise, simulate
 
 TIMES = np.array([0.0, 30.0, 60.0, 120.0])
@@ -54,7 +53,9 @@ def test_all_effects_together_at_their_neutral_values_are_the_plain_model_to_the
 STRENGTH = {
     "strain_stiffening": {"c": 30.0}, "toe": {"w": 1.5}, "power_strain": {"p": 0.4}, "fixture_compliance": {"c": 0.1},
     "thermal_expansion": {"alpha": 1e-4}, "length_dependence": {"p": 0.5}, "permanent_creep": {"psi": 0.6},
-    "memory": {"omega": 0.7}, "second_relaxation": {"A": 0.05, "T2": 40.0}, "steady_creep": {"a": 5e-4},
+    "superposition": {"omega": 0.7}, "prior_creep": {"T_0": 500.0}, "late_clock": {"t_d": 8.0},
+    "screw_error": {"a": 0.1, "P": 2.5, "phi": 0.4}, "second_relaxation": {"A": 0.05, "T2": 40.0},
+    "steady_creep": {"a": 5e-4},
     "tension_dependent_rate": {"m": 0.8}, "ageing": {"a": 0.5}, "creep_threshold": {"tau_c": 1.0},
     "grip_slip": {"w": 0.4}, "unrecorded_hold": {"T": 200.0}, "reading_delay": {"t_d": 8.0},
     "sensor_drift": {"a": 1e-3},
@@ -119,6 +120,9 @@ FORMULAS = {
     "sensor_drift": lambda: chain(read=lambda y, j, t: y + 1e-3 * (120.0 * j + t)),
     "sensor_nonlinearity": lambda: chain(read=lambda y, j, t: y + 0.02 * y * y),
     "clamp_transient": lambda: chain(read=lambda y, j, t: y * (1 + 0.05 * np.exp(-t / 20.0))),
+    "late_clock": lambda: readings({}, p=protocol(PATH, [[0.0, *(TIMES + 8.0)]] * 5))[:, 1:],
+    "prior_creep": lambda: superposing(0.0, before_s=500.0),
+    "screw_error": lambda: chain(offset=lambda j: 0.1 * np.cos(2 * np.pi * PATH[j] / 2.5 + 0.4)),
     "lost_motion": lambda: chain(offset=lambda j: 0.2 if DIRECTION[j] < 0 else 0.0),
     "guide_friction": lambda: chain(read=lambda y, j, t: y * (1 + 0.05 * DIRECTION[j])),
 }
@@ -132,13 +136,69 @@ def test_an_effect_does_what_its_formula_says(key):
     assert np.abs(found - plain()).max() > 1e-3  # and that is not nothing
 
 
-def test_memory_adds_what_earlier_clocks_would_still_give():
-    found, base = readings(strong("memory"), "memory"), plain()
-    assert found[0] == pytest.approx(base[0], rel=1e-14)
-    goal = PLAIN["B"] * base[0, 0] ** PLAIN["U"]
-    grown = [creep_fraction(120.0 + t, k2, N) - creep_fraction(120.0, k2, N) for t in TIMES]
-    zero_then = 1003.4 / (base[1] / PLAIN["k1"] + 1.0) + 0.7 * goal * np.array(grown)
-    assert found[1] == pytest.approx(PLAIN["k1"] * (1003.4 / zero_then - 1.0), rel=1e-12)
+def superposing(omega, before_s=0.0, late_s=0.0, path=PATH, times=TIMES):
+    """Creep by the explicit sum over all changes of its goal, mixed with the chain; (H, R) tensions."""
+    t = PLAIN
+
+    def tension(x, creep):
+        return max(t["k1"] * ((1000.0 + t["preload"] + x) / (1000.0 + creep) - 1.0), 0.0)
+
+    def share(seconds):
+        return 1.0 - np.exp(-t["k2"] * seconds ** t["N"])
+
+    changes, now, chained, out = [], -before_s, 0.0, []  # (when, by how much) the goal changed
+
+    def summed(when):
+        return sum(by * share(when - start) for start, by in changes)
+
+    for x, lasts, read in [(0.0, before_s, []), *((x, times[-1] + late_s, times + late_s) for x in path)]:
+        mixed = (1.0 - omega) * chained + omega * summed(now)
+        goal = t["B"] * tension(x, mixed) ** t["U"] if lasts else 0.0
+        changes.append((now, goal - sum(by for _, by in changes)))
+        if len(read):
+            course = [(1 - omega) * (chained + (goal - chained) * share(s)) + omega * summed(now + s) for s in read]
+            out.append([tension(x, creep) for creep in course])
+        chained, now = chained + (goal - chained) * share(lasts), now + lasts
+    return np.array(out)
+
+
+def test_superposition_is_the_sum_over_all_changes_of_the_load():
+    for omega in (0.0, 0.3, 1.0):
+        found = readings({"superposition.omega": omega}, "superposition")
+        assert found == pytest.approx(superposing(omega), rel=1e-12)
+    assert np.abs(superposing(1.0) - plain()).max() > 1e-2
+    # B τ^U of the largest tension is never passed
+    whole = PLAIN["B"] * found.max() ** PLAIN["U"]
+    up = readings({"superposition.omega": 1.0}, "superposition", p=protocol([5.0] * 9, [TIMES] * 9))
+    creep = 1005.4 / (up / PLAIN["k1"] + 1.0) - 1000.0
+    assert creep.max() < whole
+
+
+def test_effects_of_time_go_with_superposition():
+    """The clocks of all changes, of the time before the first hold and of a late start, are those of one time."""
+    amplitudes = {"superposition.omega": 0.6, "prior_creep.T_0": 500.0, "late_clock.t_d": 8.0}
+    keys = ("superposition", "prior_creep", "late_clock")
+    expected = superposing(0.6, 500.0, 8.0)
+    assert readings(amplitudes, *keys) == pytest.approx(expected, rel=1e-12)
+    for left_out, value in (("prior_creep", superposing(0.6, 0.0, 8.0)), ("late_clock", superposing(0.6, 500.0))):
+        own = {name: v for name, v in amplitudes.items() if not name.startswith(left_out)}
+        assert readings(own, *(k for k in keys if k != left_out)) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize("key", ["superposition", "second_relaxation", "steady_creep"])
+def test_time_before_the_first_hold_is_an_entry_in_the_protocol(key):
+    stated = protocol([0.0, *PATH], [[0.0, 500.0], *[TIMES] * 5], unrecorded={0})
+    expected = readings(strong(key), key, p=stated)[1:]
+    found = readings(strong(key) | strong("prior_creep"), key, "prior_creep")
+    assert found == pytest.approx(expected, rel=1e-12)
+    assert np.abs(found[0] - readings(strong(key), key)[0]).max() > 1e-3
+
+
+def test_a_late_clock_is_a_later_reading():
+    late = protocol(PATH, [[0.0, *(TIMES + 8.0)]] * 5)
+    for key in ("second_relaxation", "steady_creep", "superposition", "clamp_transient"):
+        expected = readings(strong(key), key, p=late)[:, 1:]
+        assert readings(strong(key) | strong("late_clock"), key, "late_clock") == pytest.approx(expected, rel=1e-12)
 
 
 def test_second_relaxation_and_steady_creep_run_beside_the_creep():
@@ -155,11 +215,14 @@ def test_second_relaxation_and_steady_creep_run_beside_the_creep():
         assert found[1, 0] == pytest.approx(PLAIN["k1"] * (1003.4 / (1000.0 + left) - 1.0), rel=1e-12)
 
 
-def test_an_unrecorded_hold_is_the_same_as_an_entry_in_the_protocol():
+@pytest.mark.parametrize("beside", ["", "superposition", "second_relaxation", "steady_creep"])
+def test_an_unrecorded_hold_is_the_same_as_an_entry_in_the_protocol(beside):
     """T seconds before hold 3 at its displacement, its own clock running."""
     stated = protocol([1.0, 3.0, 5.0, 5.0, 2.0, 4.0], [TIMES, TIMES, [0.0, 200.0], TIMES, TIMES, TIMES], unrecorded={2})
-    expected = readings({}, p=stated)[[0, 1, 3, 4, 5]]
-    assert readings(strong("unrecorded_hold@3"), "unrecorded_hold@3") == pytest.approx(expected, rel=1e-12)
+    keys, own = ((beside,), strong(beside)) if beside else ((), {})
+    expected = readings(own, *keys, p=stated)[[0, 1, 3, 4, 5]]
+    found = readings(own | strong("unrecorded_hold@3"), *keys, "unrecorded_hold@3")
+    assert found == pytest.approx(expected, rel=1e-12)
 
 
 def test_permanent_creep_at_one_is_the_additive_chain():

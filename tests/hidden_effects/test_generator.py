@@ -85,18 +85,40 @@ def test_late_first_reading_is_the_later_tension():
     assert y == pytest.approx(expected[:, 1:], abs=1e-5)
 
 
-def test_memory_lets_earlier_clocks_run_on():
-    """With N = 1 the second hold gains what the first one's clock still adds: a1 (e^-kT - e^-2kT)."""
+def test_superposed_creep_is_the_sum_of_two_clocks():
+    """With N = 1: E1 (1 - e^-kt) of the first load and (E2 - E1) (1 - e^-k(t - 100)) of what the second adds."""
     wire = dataclasses.replace(ROC, N=1.0, k2=0.01)
     rig = one_wire(path=(2, 2.5), times=(0.0, 50.0, 100.0), wire=wire)
-    candidate = draw(EFFECTS["memory"], rig, np.random.default_rng(0))
+    candidate = draw(EFFECTS["superposition"], rig, np.random.default_rng(0))
     y = simulate(rig, members=members(rig, [[(candidate, 1.0)]]))[0]
-    plain = simulate(rig)[0]
-    assert y[:3] == pytest.approx(plain[:3], abs=1e-9)
-    amount = wire.B * plain[0] ** wire.U
-    more = amount * (np.exp(-1.0) - np.exp(-0.01 * np.array([100.0, 150.0, 200.0])))
-    creep = (1002.8 / (plain[3:] / wire.k1 + 1)) - 1000.0
-    assert y[3:] == pytest.approx(wire.k1 * (1002.8 / (1000.0 + creep + more) - 1), abs=1e-6)
+    assert y[:3] == pytest.approx(simulate(rig)[0][:3], abs=1e-9)
+    t, first, second = np.array([0.0, 50.0, 100.0]), wire.B * y[0] ** wire.U, wire.B * y[3] ** wire.U
+    creep = first * -np.expm1(-0.01 * (t + 100.0)) + (second - first) * -np.expm1(-0.01 * t)
+    assert y[3:] == pytest.approx(wire.k1 * (1002.8 / (1000.0 + creep) - 1), abs=1e-6)
+
+
+def test_creep_before_the_test_is_a_hold_at_zero_and_a_late_clock_a_later_reading():
+    rig = one_wire(path=(1, 2, 3))
+    bench = rig.benches[0]
+    before = dataclasses.replace(bench, holds=(Hold(0, 0.0, (), 400.0), *bench.holds))
+    rng = np.random.default_rng(0)
+    prior, late = (draw(EFFECTS[name], rig, rng) for name in ("prior_creep", "late_clock"))
+    y = simulate(rig, members=members(rig, [[(prior, 400.0)], [(late, 7.0)], []]))
+    assert y[0] == pytest.approx(simulate(dataclasses.replace(rig, benches=(before,)))[0], abs=1e-5)
+    times = (0.0, 30.0, 60.0, 90.0, 120.0)
+    later = one_wire(path=(1, 2, 3), times=(0.0, *(7.0 + t for t in times)))
+    assert y[1] == pytest.approx(simulate(later)[0].reshape(3, 6)[:, 1:].ravel(), abs=1e-5)
+    assert np.abs(y[:2] - y[2]).max(axis=1).min() > 0.01
+
+
+def test_a_period_of_two_steps_alternates():
+    rig = one_wire(path=(1, 2, 3, 4, 5, 6))
+    period = dataclasses.replace(
+        draw(EFFECTS["screw_error"], rig, np.random.default_rng(0)), shapes=(("phase", np.pi / 2), ("period", 2.0))
+    )
+    off = one_wire(path=tuple(x + 0.05 * (-1) ** x for x in (1, 2, 3, 4, 5, 6)))
+    y = simulate(rig, members=members(rig, [[(period, 0.05)]]))[0]
+    assert y == pytest.approx(simulate(off)[0], abs=1e-12)
 
 
 def test_a_toe_is_as_long_on_a_long_sample():
@@ -144,7 +166,9 @@ def test_lost_motion_delays_only_the_way_back():
 
 @pytest.mark.parametrize("name", [*EFFECTS, *FOREIGN])
 def test_neutral_is_plain_and_large_is_not(name):
-    protocol = {"temperature": "temperature", "lengths": "two_lengths"}.get(effect(name).needs, "unloading")
+    protocol = {"temperature": "temperature", "lengths": "two_lengths", "steps": "paper"}.get(
+        effect(name).needs, "unloading"
+    )
     rng = np.random.default_rng(2)
     rig = draw_rig(rng, protocol)
     assert fits(effect(name), rig)
@@ -190,14 +214,14 @@ def test_a_wire_goes_slack_in_the_slack_protocol():
         assert y.min() == 0.0 < y.max()
 
 
-def test_memory_runs_on_through_an_unrecorded_time():
+def test_superposition_runs_on_through_an_unrecorded_time():
     """Two effects at once: the waiting at hold 2's position is a hold, and hold 1's clock runs through it."""
     rig = one_wire(path=(1, 2, 3, 4))
-    memory = draw(EFFECTS["memory"], rig, np.random.default_rng(0))
+    superposed = draw(EFFECTS["superposition"], rig, np.random.default_rng(0))
     wait = dataclasses.replace(draw(EFFECTS["unrecorded_hold"], rig, np.random.default_rng(0)), shapes=(("hold", 1.0),))
-    y = simulate(rig, members=members(rig, [[(memory, 0.7), (wait, 60.0)], [(memory, 0.7)]]))
+    y = simulate(rig, members=members(rig, [[(superposed, 0.7), (wait, 60.0)], [(superposed, 0.7)]]))
     bench = rig.benches[0]
     longer = dataclasses.replace(bench, holds=(bench.holds[0], Hold(9, 2.0, (), 60.0), *bench.holds[1:]))
     as_hold = dataclasses.replace(rig, benches=(longer,))
-    assert y[0] == pytest.approx(simulate(as_hold, members=members(as_hold, [[(memory, 0.7)]]))[0], abs=1e-4)
-    assert y[1] == pytest.approx(simulate(rig, members=members(rig, [[(memory, 0.7)]]))[0], abs=1e-12)
+    assert y[0] == pytest.approx(simulate(as_hold, members=members(as_hold, [[(superposed, 0.7)]]))[0], abs=1e-4)
+    assert y[1] == pytest.approx(simulate(rig, members=members(rig, [[(superposed, 0.7)]]))[0], abs=1e-12)

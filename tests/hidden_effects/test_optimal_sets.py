@@ -63,22 +63,22 @@ def test_what_the_best_effects_leave_and_how_well_it_would_be_seen():
 
 
 def test_more_names_leave_no_more():
-    found = judge(build(Spec("foreign", "paper", ("screw_thread",), 10.0, 0)), draws=4)["left_over"]
+    found = judge(build(Spec("foreign", "paper", ("worn_thread",), 10.0, 0)), draws=4)["left_over"]
     assert 10.0 >= found["1"]["delta"] >= found["2"]["delta"] > 0.0
 
 
-def test_a_step_of_the_zero_is_a_slip_to_the_judge_and_a_screw_thread_is_not():
-    known, step, screw = "memory", "zero_step", "screw_thread"
+def test_a_step_of_the_zero_is_a_slip_to_the_judge_and_a_worn_thread_is_not():
+    known, step, thread = "superposition", "zero_step", "worn_thread"
     mimicked = judge(build(Spec("mixed", "unloading", (known, step), 10.0, 0)), draws=40)
-    strange = judge(build(Spec("mixed", "unloading", (known, screw), 10.0, 0)), draws=40)
+    strange = judge(build(Spec("mixed", "unloading", (known, thread), 10.0, 0)), draws=40)
     assert mimicked["left_over"]["2"]["delta"] < 3.3 < strange["left_over"]["2"]["delta"]
     assert strange["optimal_mixed"]["remains"] > mimicked["optimal_mixed"]["remains"]
     assert mimicked["optimal_mixed"]["known"] > 0.6
 
 
 def test_an_effect_taken_from_the_catalogue_does_not_explain_itself():
-    removed = judge(build(Spec("without", "dense", ("memory",), 10.0, 0)), draws=4)["left_over"]
-    assert "memory" not in removed["1"]["names"]
+    removed = judge(build(Spec("without", "dense", ("superposition",), 10.0, 0)), draws=4)["left_over"]
+    assert "superposition" not in removed["1"]["names"]
     assert removed["1"]["delta"] > 3.3
 
 

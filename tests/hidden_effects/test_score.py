@@ -76,8 +76,8 @@ def test_bounds_are_clopper_pearson():
 def test_rates_of_named_missed_and_wrong():
     truths = {k: truth(k) for k in "abcd"}
     answers = {
-        "a": answer("toe", ["toe", "memory"]),
-        "b": answer("memory", ["memory"]),
+        "a": answer("toe", ["toe", "superposition"]),
+        "b": answer("superposition", ["superposition"]),
         "c": answer(None),
         "d": answer("ageing", ["ageing", "toe"]),
     }
@@ -88,7 +88,7 @@ def test_rates_of_named_missed_and_wrong():
     assert found(result, "top-ranked effect correct, separable")["found"]["value"] == pytest.approx(1 / 3)
     assert found(result, "top-ranked effect correct, relative to Bayes")["found"]["value"] == pytest.approx(1 / 2.4)
     assert found(result, "size of the 90 % set")["found"]["value"] == pytest.approx(5 / 3 - 1.5)
-    assert result["confusion"]["toe"] == {"toe": 1, "memory": 1, "nothing-missing": 1, "ageing": 1}
+    assert result["confusion"]["toe"] == {"toe": 1, "superposition": 1, "nothing-missing": 1, "ageing": 1}
     assert not found(result, "detected at delta 10")["passed"]
 
 
@@ -128,9 +128,9 @@ def test_gap_is_pooled_in_noise_floors():
 
 
 def test_unknown_counts_where_the_form_is_in_no_catalogue():
-    truths = {k: truth(k, "foreign", "screw_thread") for k in "abc"}
-    answers = {"a": answer("unknown"), "b": answer("memory", ["memory"]), "c": answer("toe", ["toe"])}
-    result = score(truths, dict.fromkeys("abc", judged(("screw_thread", "toe"))), answers)
+    truths = {k: truth(k, "foreign", "worn_thread") for k in "abc"}
+    answers = {"a": answer("unknown"), "b": answer("superposition", ["superposition"]), "c": answer("toe", ["toe"])}
+    result = score(truths, dict.fromkeys("abc", judged(("worn_thread", "toe"))), answers)
     assert found(result, "effect in no catalogue")["found"]["value"] == pytest.approx(2 / 3)
 
 
@@ -177,7 +177,7 @@ def several(kind, accepted, ideal, remains=False, groups=(("toe",), ("yield",)))
 
 
 def test_several_effects_are_measured_against_the_ideal_judge():
-    rows = [several("two", ["toe", "yield"], 0.9), several("two", ["memory"], 0.7)]
+    rows = [several("two", ["toe", "yield"], 0.9), several("two", ["superposition"], 0.7)]
     rows += [several("mixed", ["toe"], 0.9, remains=True), several("mixed", ["ageing", "toe"], 0.7)]
     found = {row["target"]: row for row in targets(rows)}
     assert found["two effects: both accepted, relative to optimal"]["found"]["value"] == pytest.approx(0.5 / 0.8)
@@ -244,7 +244,7 @@ def test_wires_of_a_file_are_counted_one_by_one():
     sealed["protocol"] = "several_wires"
     spoken = answer("toe")["answer"]["experiments"]["sample-1"]
     others = {
-        "sample-2": spoken | {"accepted": ["memory"]},
+        "sample-2": spoken | {"accepted": ["superposition"]},
         "sample-3": answer("toe")["answer"]["experiments"]["sample-1"],
     }
     record = {"answer": {"experiments": {"sample-1": spoken, **others}}, "error": None, "seconds": 1.0}
@@ -262,14 +262,15 @@ def test_wires_of_a_file_are_counted_one_by_one():
 def test_tables_for_the_docs_have_a_column_for_each_protocol(tmp_path, capsys, monkeypatch):
     truths = {k: truth(k, "two") for k in "ab"} | {"c": truth("c", "foreign", "yield") | {"protocol": "dense"}}
     for k in "ab":
-        truths[k]["effects"] = [{"name": n, "hold": None, "experiments": ["sample-1"]} for n in ("toe", "memory")]
+        both = ("toe", "superposition")
+        truths[k]["effects"] = [{"name": n, "hold": None, "experiments": ["sample-1"]} for n in both]
         truths[k]["effects"] = [e | {"conditional_delta": 10.0} for e in truths[k]["effects"]]
     answers = {"a": answer("toe", ["toe"]), "b": answer("toe", ["toe"]), "c": answer("ageing", ["ageing"])}
     spoken = [answers[k]["answer"]["experiments"]["sample-1"] for k in "abc"]
-    spoken[0]["accepted"] = ["toe", "memory"]
+    spoken[0]["accepted"] = ["toe", "superposition"]
     for one, probability in zip(spoken, (0.1, 0.3, 0.9), strict=True):
         one["remainder"] = {"probability": probability}
-    two = judged() | {"groups": [["toe"], ["memory"]], "optimal_two": {"group": 1.0}}
+    two = judged() | {"groups": [["toe"], ["superposition"]], "optimal_two": {"group": 1.0}}
     foreign = judged(("yield",)) | {"left_over": {"1": {"delta": 2.0, "power": 0.1}}}
     result = score(truths, {"a": two, "b": two, "c": foreign}, answers)
     (tmp_path / "scores.json").write_text(json.dumps({"api": result}), encoding="utf-8")

@@ -26,7 +26,7 @@ U = { fixed = 0.1 }
 """
 PLAN = """material = "line"
 budget_min = 60.0
-aim = ["memory", "toe"]
+aim = ["superposition", "toe"]
 
 [guess]
 k1 = 1500.0
@@ -127,7 +127,7 @@ READERS = {
     "experiment": Reader("e.toml", (TOML + PRIOR).encode(), {"a.csv": CSV.encode()}, experiments),
     "readings": Reader("a.csv", CSV.encode(), {"e.toml": TOML.encode()}, beside),
     "warm readings": Reader("a.csv", WARM.encode(), {"e.toml": TOML.encode()}, beside),
-    "plan": Reader("plan.toml", PLAN.encode(), {}, lambda path: plan_file.read_plan(path, ("memory", "toe"))),
+    "plan": Reader("plan.toml", PLAN.encode(), {}, lambda path: plan_file.read_plan(path, ("superposition", "toe"))),
     "protocol": Reader("protocol.csv", PROTOCOL.encode(), {}, protocol),
     "robot": Reader("robot.toml", (ROOT / "data/robots/linear-7.toml").read_bytes(), {}, schema.read),
     "drums": Reader("robot.toml", (ROOT / "data/robots/hangprinter-4.toml").read_bytes(), {}, schema.read),

@@ -149,7 +149,7 @@ def test_the_curvature_at_the_end_is_that_of_the_density_whatever_the_residuals_
     assert rough == pytest.approx(np.eye(2) / 1.5, abs=1e-5)
 
 
-@pytest.mark.parametrize("effects", [(), ("toe", "thermal_expansion", "memory", "clamp_transient")])
+@pytest.mark.parametrize("effects", [(), ("toe", "thermal_expansion", "superposition", "clamp_transient")])
 def test_the_residuals_of_the_prior_have_its_curvature(effects):
     """At the middle of the prior, where no residual is left to bend."""
     built = build([Bench().experiment()], [named(e) for e in effects])

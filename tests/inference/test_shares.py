@@ -34,7 +34,7 @@ def test_scores_are_normal_for_even_shares_and_keep_their_digits_at_both_ends() 
     ("keys", "expected"),
     [
         ((), []),
-        (("toe", "memory", "grip_slip@5"), []),
+        (("toe", "superposition", "grip_slip@5"), []),
         (("fixture_compliance",), ["fixture_compliance.c"]),
         (("second_relaxation", "steady_creep"), ["second_relaxation.A", "steady_creep.a"]),
         (("steady_creep@carried", "fixture_compliance"), ["fixture_compliance.c", "steady_creep.a"]),

@@ -7,7 +7,7 @@ from wirebayes.io.plan_file import is_plan, read_plan
 
 PLAN = """material = "line"
 budget_min = 30.0
-aim = ["toe", "memory"]
+aim = ["toe", "superposition"]
 
 [guess]
 k1 = 1500.0
@@ -28,7 +28,7 @@ displacements_mm = [1, 2, 4]
 times_s = [0, 10, 30]
 temperatures_C = [20, 25]
 """
-EFFECTS = ("toe", "memory")
+EFFECTS = ("toe", "superposition")
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_what_a_plan_says_is_read(plan_file):
     assert (other.name, other.length_mm, other.times_s, other.temperatures_C) == (
         "protocol-2", 500.0, (0.0, 10.0, 30.0), (20.0, 25.0)
     )  # fmt: skip
-    assert read.aim == ("toe", "memory")
+    assert read.aim == ("toe", "superposition")
     assert read.guess_lines == {"k1": 6, "U": 7}
     assert (read.budget_min, read.posterior, read.robot) == (30.0, None, None)
 
@@ -86,9 +86,13 @@ def test_an_experiment_file_is_no_plan(experiment_file):
         ("length_mm = 500.0", 'name = "steps"\nlength_mm = 500.0', "key name: found 'steps' a second time"),
         ("k1 = 1500.0", "prelod = 1", "line 6, key guess.prelod: found an unknown parameter (did you mean preload?)"),
         ("k1 = 1500.0", "k1 = true", "line 6, key guess.k1: found True, expected a number, or a table"),
-        ('["toe", "memory"]', '"fame"', 'line 3, key aim: found \'fame\', expected "parameters", "creep"'),
-        ('["toe", "memory"]', '["toe", "toe"]', "line 3, key aim: found ['toe', 'toe'], expected"),
-        ('["toe", "memory"]', '["toe", "memori"]', "line 3, key aim: found 'memori' (did you mean memory?)"),
+        ('["toe", "superposition"]', '"fame"', 'line 3, key aim: found \'fame\', expected "parameters", "creep"'),
+        ('["toe", "superposition"]', '["toe", "toe"]', "line 3, key aim: found ['toe', 'toe'], expected"),
+        (
+            '["toe", "superposition"]',
+            '["toe", "superpositio"]',
+            "line 3, key aim: found 'superpositio' (did you mean superposition?)",
+        ),
         ("budget_min = 30.0", "budget_min = 0", "line 2, key budget_min: found 0, expected a time budget above 0"),
         ('material = "line"', 'posterior = "nowhere"', "line 1, key posterior: found 'nowhere', which is no folder"),
         ('material = "line"', 'posterior = "."', "line 1, key posterior: found a posterior beside a [guess]"),

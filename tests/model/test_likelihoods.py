@@ -66,7 +66,7 @@ STRONG = {
     "ageing.a": 0.3, "creep_threshold.tau_c": 0.7, "grip_slip.w": 0.2, "unrecorded_hold.T": 90.0,
     "reading_delay.t_d": 4.0, "sensor_drift.a": 1e-4, "sensor_nonlinearity.a": 0.01, "clamp_transient.a": 0.03,
     "clamp_transient.T": 10.0, "lost_motion.w": 0.1, "guide_friction.mu": 0.03, "thermal_expansion.alpha": 1e-5,
-    "memory.omega": 0.7, "second_relaxation.A": 0.05, "second_relaxation.T2": 40.0, "steady_creep.a": 5e-4,
+    "superposition.omega": 0.7, "second_relaxation.A": 0.05, "second_relaxation.T2": 40.0, "steady_creep.a": 5e-4,
 }  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def test_the_chain_with_an_effect_is_the_dense_normal(key):
     assert found == pytest.approx(log_density(r, covariance), rel=1e-9)
 
 
-@pytest.mark.parametrize("key", ["memory", "second_relaxation", "steady_creep"])
+@pytest.mark.parametrize("key", ["superposition", "second_relaxation", "steady_creep"])
 def test_effects_that_carry_a_state_of_their_own_are_close_to_the_dense_normal(key):
     """Their state is held at its nominal value in the derivatives; how much that costs, over data sets of the model."""
     model, theta = Model(effects=(named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
@@ -202,7 +202,7 @@ def test_hold_by_hold_is_the_limit_of_a_wide_setting_error_given_the_first_readi
     assert found == pytest.approx(expected[1], rel=1e-5)
 
 
-@pytest.mark.parametrize("key", ["memory", "second_relaxation", "steady_creep", "toe"])
+@pytest.mark.parametrize("key", ["superposition", "second_relaxation", "steady_creep", "toe"])
 def test_with_an_effect_too_every_hold_is_a_test_of_its_own_through_its_first_reading(key):
     model = Model(effects=(named(key),))
     theta = columns(PLAIN | STRONG)

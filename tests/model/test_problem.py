@@ -97,12 +97,12 @@ def test_a_parameter_is_that_of_the_sample_or_of_the_material_or_of_all() -> Non
 def test_parameters_are_named_by_what_shares_them(likelihood: Likelihood) -> None:
     """Of one test plainly; of several by sample and by material, where there are several; amplitudes by their scope."""
     own = ["preload", "sensor_sd", "setting_sd"] if likelihood == "chain" else ["sensor_sd"]
-    wire, effects = ["k1", "B", "U", "k2", "N"], (named("memory"), named("sensor_drift"))
+    wire, effects = ["k1", "B", "U", "k2", "N"], (named("superposition"), named("sensor_drift"))
     assert build([short()], likelihood=likelihood).names == (*wire, *own)
     two = build([short("a"), short("b")], effects, likelihood=likelihood)
-    assert two.names == (*wire, "memory.omega", "sensor_drift.a", *(f"{n}[{s}]" for s in "ab" for n in own))
+    assert two.names == (*wire, "superposition.omega", "sensor_drift.a", *(f"{n}[{s}]" for s in "ab" for n in own))
     lots = build([short("a"), short("b", "other"), short("c", length_mm=500.0)], effects, likelihood=likelihood)
-    shared = [f"{n}[{m}]" for m in ("line", "other") for n in (*wire, "memory.omega")]
+    shared = [f"{n}[{m}]" for m in ("line", "other") for n in (*wire, "superposition.omega")]
     assert set(lots.names) == {*shared, "sensor_drift.a", *(f"{n}[{s}]" for s in "abc" for n in own)}
     assert lots.prior.fixed == {"creep_length_exponent[line]": 1.0}  # the two of one material differ in length
     assert [s.name for s in lots.samples] == ["a", "c", "b"]
@@ -174,9 +174,9 @@ def test_samples_of_one_material_refer_to_one_length_and_one_tension() -> None:
 
 def test_an_event_acts_in_its_own_test_alone() -> None:
     here, anywhere = GripSlip(hold=3, test="b"), GripSlip(hold=3)
-    problem = build([short("a"), short("b")], [here, anywhere, named("memory")])
+    problem = build([short("a"), short("b")], [here, anywhere, named("superposition")])
     keys = [[e.key for e in s.model.effects] for s in problem.samples]
-    assert keys == [["grip_slip@3", "memory"], ["grip_slip@b:3", "grip_slip@3", "memory"]]
+    assert keys == [["grip_slip@3", "superposition"], ["grip_slip@b:3", "grip_slip@3", "superposition"]]
 
 
 def test_a_typical_hold_lasts_the_median_of_the_recorded_ones() -> None:

@@ -130,7 +130,7 @@ def test_a_later_given_reading_leaves_earlier_holds_alone() -> None:
     assert not np.allclose(free[row + 3], given[row + 3])
 
 
-@pytest.mark.parametrize("key", ["second_relaxation", "memory", "permanent_creep", "sensor_drift", "ageing"])
+@pytest.mark.parametrize("key", ["second_relaxation", "superposition", "permanent_creep", "sensor_drift", "ageing"])
 def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
     experiment, train = wire("nylon-1.5m"), 5
     effect = named(key)
@@ -204,7 +204,7 @@ def test_setting_errors_of_the_past_follow_their_normal_given_the_readings() -> 
     assert root @ root.T == pytest.approx(left, rel=1e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize("key", [None, "memory"])
+@pytest.mark.parametrize("key", [None, "superposition"])
 def test_a_replicate_has_an_error_of_its_own_and_the_past_goes_on_as_the_readings_say(
     key: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -218,7 +218,7 @@ def test_a_replicate_has_an_error_of_its_own_and_the_past_goes_on_as_the_reading
     holds, rng = len(protocol.number), np.random.default_rng(0)
     trained = len(sample.protocol.number)
     past, chance = 0.1 * rng.normal(size=(trained, 2)), rng.normal(size=(holds, 2))
-    own = {name: np.full(2, value) for name, value in (TRUTH | {"memory.omega": 0.6}).items()}
+    own = {name: np.full(2, value) for name, value in (TRUTH | {"superposition.omega": 0.6}).items()}
     monkeypatch.setattr(predictive, "settings_given_readings", lambda own, sample, rng: past)
     request = PredictionRequest(protocol, trained, requested, np.full(holds, np.nan))
     found = predictive.chain_course(own, sample, request, Given(chance))  # type: ignore[arg-type]

@@ -284,11 +284,11 @@ DISCOVERY = {
             "explains; beside it most likely strain stiffening (80 %), none of them established",
         ),
         ({"verdict": "partial"}, "strain stiffening is missing, and something else that no effect"),
-        ({"verdict": "partial", "effects": ["toe", "memory"]}, "toe and memory are missing, and something else"),
+        ({"verdict": "partial", "effects": ["toe", "ageing"]}, "toe and ageing are missing, and something else"),
         ({}, "remains beside them with probability 0.020"),
         (
-            {"verdict": "ambiguous", "set": ["toe", "memory"], "probabilities": {"toe": 0.7, "memory": 0.25}},
-            "these readings do not tell what: toe (70 %) or memory (25 %)",
+            {"verdict": "ambiguous", "set": ["toe", "ageing"], "probabilities": {"toe": 0.7, "ageing": 0.25}},
+            "these readings do not tell what: toe (70 %) or ageing (25 %)",
         ),
     ],
 )

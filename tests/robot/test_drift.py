@@ -57,7 +57,7 @@ def _bench_with_the_robots_wire(line, displacement_mm, duration_s, follow):
         ("steady_creep", {"steady_creep.a": 1e-4}),
         ("tension_dependent_rate", {"tension_dependent_rate.m": 0.4}),
         ("creep_threshold", None),
-        ("memory", {"memory.omega": 0.5}),
+        ("superposition", {"superposition.omega": 0.5}),
         ("ageing", {"ageing.a": 0.6}),
         ("steady_creep@carried", {"steady_creep.a": 1e-4}),
         (Logarithmic(), {"logarithmic.t0": 7.0}),

@@ -115,7 +115,7 @@ def test_wrong_options_are_said_and_nothing_is_written(options, message, tmp_pat
 def test_effect_options_name_hold_and_amplitude():
     effect, chosen = effect_option("grip_slip@7.w=.2")
     assert (effect.key, chosen) == ("grip_slip@7", {"grip_slip.w": 0.2})
-    assert effect_option("memory")[1] == {}
+    assert effect_option("superposition")[1] == {}
 
 
 def test_an_effect_of_ones_own_is_written_into_the_readings(tmp_path):

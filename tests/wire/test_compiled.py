@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import CATALOGUE
-from wirebayes.effects.creep import Memory, SteadyCreepCarried
+from wirebayes.effects.creep import SteadyCreepCarried, Superposition
 from wirebayes.effects.elastic import LengthDependence, StrainStiffening, ToeOfStrain
 from wirebayes.effects.instrument import ReadingDelay
 from wirebayes.effects.rivals import RIVALS
@@ -161,7 +161,7 @@ def test_each_effect_moves_the_compiled_readings(effect):
 
 
 @pytest.mark.parametrize("law", LAWS_OF_CREEP, ids=lambda e: e.name)
-@pytest.mark.parametrize("beside", [(), (Memory(),), (ReadingDelay(),)], ids=["alone", "memory", "delay"])
+@pytest.mark.parametrize("beside", [(), (Superposition(),), (ReadingDelay(),)], ids=["alone", "superposition", "delay"])
 def test_each_law_of_creep_moves_the_compiled_readings(law, beside):
     p = protocol([*ONE_WAY, 3.0, 1.0], [TIMES] * 8)
     model = Model(effects=(law, *beside), tension_ref_N=3.0)

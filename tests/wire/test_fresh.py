@@ -96,7 +96,8 @@ def toe(s, stretched, law):
 
 
 def _catalogue():
-    bench = protocol([1.0, 2.0, 1.0], [[0.0, 60.0]] * 3, warming=np.array([[0.0, 1.0]] * 3))
+    path = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 5.0]
+    bench = protocol(path, [[0.0, 60.0]] * 7, warming=np.array([[0.0, 1.0]] * 7))
     longer = protocol([1.0, 2.0], [[0.0, 60.0]] * 2, length=1700.0)
     for kind in CATALOGUE.values():
         found = kind.variants([bench]) or kind.variants([bench, longer])

@@ -186,7 +186,7 @@ def test_setting_errors_move_their_hold_and_the_creep_after_it():
     )
 
 
-@pytest.mark.parametrize("effect", ["", "memory", "steady_creep", "second_relaxation"])
+@pytest.mark.parametrize("effect", ["", "superposition", "steady_creep", "second_relaxation"])
 @pytest.mark.parametrize("compiled_kernel", [True, False])
 def test_a_hold_goes_on_creeping_after_its_last_reading(monkeypatch, effect, compiled_kernel):
     """As if a reading had been taken at its end."""

@@ -101,6 +101,8 @@ def candidates(
         out.append(other("unrecorded_skipped", ABSENT, "No time passed where readings are missing.", unrecorded=False))
     protocol = experiment.protocol()
     for name, kind in known.items():
+        if kind.needs_saturation and base.history == "additive":
+            continue
         for variant in [kind()] if issubclass(kind, EventEffect) else kind.variants([protocol]):
             key = name if issubclass(kind, EventEffect) else variant.key
             out.append(other(key, EFFECT, kind.sentence, effects=(key,)))

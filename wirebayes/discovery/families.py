@@ -33,7 +33,7 @@ _OF = {
     "sensor_nonlinearity": "elastic curve",
     "second_relaxation": "course of a hold", "steady_creep": "course of a hold", "reading_delay": "course of a hold",
     "late_clock": "course of a hold", "clamp_transient": "course of a hold",
-    "tension_dependent_rate": "creep from hold to hold", "memory": "creep from hold to hold",
+    "tension_dependent_rate": "creep from hold to hold",
     "superposition": "creep from hold to hold", "ageing": "creep from hold to hold",
     "creep_threshold": "creep from hold to hold", "prior_creep": "creep from hold to hold",
     "permanent_creep": "creep from hold to hold",

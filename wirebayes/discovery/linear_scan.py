@@ -54,17 +54,17 @@ class Probe:
 
 def probes(effect: Effect) -> list[Probe]:
     """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it is one-sided."""
-    main, *shapes = zip(effect.columns(), effect.amplitudes, strict=True)
-    column, amplitude = main
+    column, amplitude = effect.columns()[0], effect.amplitudes[0]
     low, high = amplitude.prior.support()
     scale = float(amplitude.prior.std())
     one_sided = bool(low >= amplitude.neutral)
     steps = [0.1 * scale] if not one_sided else [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
     steps = [s for s in steps if amplitude.neutral + s <= high] or [0.5 * (high - amplitude.neutral)]
-    forms: list[dict[str, float]] = [{}]
-    for name, shape in shapes:
-        forms = [f | {name: float(v)} for f in forms for v in shape.prior.ppf([0.1, 0.5, 0.9])]
-    return [Probe(effect, form | {column: amplitude.neutral + s}, s, one_sided) for form in forms for s in steps]
+    return [
+        Probe(effect, form | {column: amplitude.neutral + s}, s, one_sided)
+        for form in effect.shapes_tried()
+        for s in steps
+    ]
 
 
 @dataclass(frozen=True)

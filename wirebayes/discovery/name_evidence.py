@@ -105,7 +105,7 @@ def weigh_names(
         if not wave:
             break
         waiting = waiting[len(wave) :]
-        tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], scans, reach)
+        tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], trials, scans, reach)
         done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
         found |= zip(tasks, done, strict=True)
         summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks))
@@ -114,16 +114,17 @@ def weigh_names(
 
 
 def _tasks(
-    forms: Sequence[_Form], scans: Sequence[Scan], reach: Mapping[_Place, float]
-) -> dict[_Place, tuple[Effect, float, float, float]]:
-    """What is refitted of some forms: at each place the effect, the amplitude per δ, a guess of it, and its reach."""
-    tasks = {}
+    forms: Sequence[_Form], trials: Sequence[Probe], scans: Sequence[Scan], reach: Mapping[_Place, float]
+) -> dict[_Place, tuple[Effect, float, float, float, Mapping[str, float]]]:
+    """What is refitted of some forms: at each place the effect, the amplitude per δ, a guess, its reach, and shapes."""
+    tasks: dict[_Place, tuple[Effect, float, float, float, Mapping[str, float]]] = {}
     for form in forms:
         best = max(form.linear)
         for place, value, probe in zip(form.places, form.linear, form.probes, strict=True):
             if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
                 _, guess, per_delta = log_bayes(Candidate(probe, form.effect.name, place[1], True), scans)
-                tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf)
+                own = trials[probe].own
+                tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf), own
     return tasks
 
 

@@ -5,7 +5,7 @@ the plain fit, integrated to one: a wide catalogue does not count against an eff
 possible does. Fits with the effect inside, folds, samples and predictions have the same density.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,6 +89,7 @@ def refit(
     per_delta: float,
     guess: float,
     reach: float = np.inf,
+    shapes: Mapping[str, float] = {},
 ) -> Refit:
     """Refit one effect with one amplitude shared by the blocks `which`.
 
@@ -103,6 +104,8 @@ def refit(
         The linear scan's best distance from neutral.
     reach : float
         Distance from neutral at which the effect has δ = `LARGEST` in the noise of the plain fit.
+    shapes : mapping of column to float
+        Shape constants to begin with; their medians where left out.
     """
     main = effect.amplitudes[0]
     low, high = (float(v) for v in main.prior.support())
@@ -117,7 +120,7 @@ def refit(
     steps = np.concatenate([_DELTAS, [max(abs(guess) / per_delta, 0.3)]]) * per_delta
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
-    profile = _climbed(pinned, added, grid, [np.tile(p.starts(), (len(grid), 1)) for p in pinned])
+    profile = _climbed(pinned, added, grid, [np.tile(p.starts(shapes), (len(grid), 1)) for p in pinned])
     outward = refined = 0
     while refined < 2:
         at = float(profile.amplitude[profile.best])

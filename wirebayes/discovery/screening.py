@@ -80,6 +80,8 @@ def candidate_probes(
 
 
 def _variants(kind: type[Effect], block: LaplaceFit, several: bool) -> list[Effect]:
+    if kind.needs_saturation and block.history == "additive":
+        return []
     if not issubclass(kind, EventEffect):
         found_by_all = kind.variants([e.protocol() for e in block.experiments])
         learned = any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names)

@@ -1,6 +1,7 @@
 """Effects of the bench: its clock, its sensor, its screw."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,22 @@ class ReadingDelay(Effect):
         first = np.zeros((len(hold.time_s), 1))
         first[0] = hold.recorded
         return value + own["t_d"] * first
+
+
+class LateClock(Effect):
+    """All readings of a hold are taken t_d seconds later than recorded, and it lasts t_d longer."""
+
+    name = "late_clock"
+    place = "time"
+    formula = "late"
+    scope = "instrument"
+    # the seconds between the end of a move and the start of a clock by hand, in holds of minutes
+    amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 0.05)),)
+    sentence = "The clock of each hold was started some time after the move."
+    shows = "first readings of all holds low"
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["t_d"]
 
 
 class SensorDrift(Effect):
@@ -85,6 +102,76 @@ class _NeedsReversal(Effect):
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
         turned = [p for p in protocols if len(set(np.sign(np.diff(p.setting, prepend=0.0))) - {0.0}) > 1]
         return [cls()] if turned else []
+
+
+_SHORTEST = 2.0  # steps: a shorter period looks like a longer one (Nyquist)
+
+
+@dataclass(frozen=True)
+class ScrewError(Effect):
+    """Position x + a cos(2π x / P + φ) at displacement x: an uneven thread, or a dial that is read unevenly.
+
+    Displacements that are multiples of a step h show no period below 2 h but as one above it: there the prior of P
+    begins. It ends at half the range, for a longer one is a bend. At P = 2 h only a cos φ is seen.
+
+    Attributes
+    ----------
+    longest : float
+        Where the log-uniform prior of P ends, in steps.
+    """
+
+    longest: float = 6.0
+    name = "screw_error"
+    place = "position"
+    formula = "screw"
+    scope = "instrument"
+    sentence = "The position has a periodic error, as of a screw's thread."
+    shows = "level of holds alternates or beats with displacement"
+    # a few per cent of a step; with either sign half a turn of phase is enough
+    amplitudes = (
+        Amplitude("a", "mm", 0.0, stats.norm(0.0, 0.05)),
+        Amplitude("P", "mm", 4.0, stats.loguniform(_SHORTEST, 6.0), is_shape=True),
+        Amplitude("phi", "-", 0.0, stats.uniform(-0.5 * np.pi, np.pi), is_shape=True, of_each_test=True),
+    )
+
+    def __post_init__(self) -> None:
+        size, period, phase = type(self).amplitudes
+        within = stats.loguniform(_SHORTEST, self.longest)
+        object.__setattr__(self, "amplitudes", (size, replace(period, prior=within), phase))
+
+    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+        return value + own["a"] * np.cos(2.0 * np.pi / own["P"] * hold.displacement_mm + own["phi"])
+
+    def on(self, protocols: Sequence[Protocol]) -> Effect:
+        longest = max((_half_range(p) for p in protocols), default=0.0)
+        return type(self)(longest) if longest >= _LEAST * _SHORTEST else self
+
+    def shapes_tried(self) -> list[dict[str, float]]:
+        """Periods so near that no other fits much better between two, and a phase every sixth of a turn."""
+        longest, shortest = 1.0 / self.longest, 1.0 / _SHORTEST
+        count = 1 + min(int(np.ceil(4.0 * self.longest * (shortest - longest))), _MOST_PERIODS)
+        turns = np.linspace(longest, shortest, count)
+        period, phase = self.columns()[1:]
+        return [{period: float(1.0 / t), phase: p} for t in turns for p in (-np.pi / 3.0, 0.0, np.pi / 3.0)]
+
+    @classmethod
+    def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
+        """One where half the range is longer than two steps."""
+        longest = max((_half_range(p) for p in protocols), default=0.0)
+        return [cls(longest)] if longest >= _LEAST * _SHORTEST else []
+
+
+_LEAST = 1.5  # of the longest period to the shortest: seven holds at even steps have it
+_MOST_PERIODS = 60  # so many are looked at in a test of sixty steps; in a longer one they lie further apart
+
+
+def _half_range(protocol: Protocol) -> float:
+    """Half the range of displacements, zero included, in median moves between those that differ; 0 if none are set."""
+    steps = np.abs(np.diff(protocol.setting))
+    if protocol.control != "displacement" or not (steps > 0).any():
+        return 0.0
+    reach = max(float(protocol.setting.max()), 0.0) - min(float(protocol.setting.min()), 0.0)
+    return 0.5 * reach / float(np.median(steps[steps > 0]))
 
 
 class LostMotion(_NeedsReversal):

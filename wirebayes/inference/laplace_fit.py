@@ -1,6 +1,6 @@
 """Samples of one material fitted with the effects accepted so far, ready to be tested for one more effect."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -172,16 +172,26 @@ class Pinned:
         self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
         self._plain = block
 
-    def starts(self, best: int = 2) -> Array:
-        """(k, d) starts: the best modes without the effect, shapes at medians."""
+    def starts(self, shapes: Mapping[str, float] = {}, best: int = 2) -> Array:
+        """(k, d) starts: the best modes without the effect, shapes as given.
+
+        Parameters
+        ----------
+        shapes : mapping of column to float
+            Shape constants of the effect; their medians where left out.
+        best : int
+            How many modes.
+        """
         names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
         known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
         natural = self._plain.target.coordinates.to_natural(self._plain.modes.z[:best])
         theta = np.empty((len(natural), len(names)))
         for i, name in enumerate(names):
-            theta[:, i] = (
-                natural[:, known[name]] if name in known else self.target.problem.prior.distributions[name].median()
-            )
+            if name in known:
+                theta[:, i] = natural[:, known[name]]
+            else:
+                median = self.target.problem.prior.distributions[name].median()
+                theta[:, i] = shapes.get(name.split("[")[0], median)
         return self._drop(self.target.coordinates.to_sampled(np.insert(theta, self.column, 0.0, axis=1)))
 
     def climb(self, start: Array, amplitude: Array) -> Optimum:

@@ -19,7 +19,7 @@ from wirebayes.model.scales import NATURAL, Scales, Units, scales_of
 from wirebayes.typing import Array
 from wirebayes.units import nearest
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
-from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.effect import Amplitude, Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, Model, linearise, streamed, tension_reference
@@ -314,6 +314,7 @@ def build(
         materials.setdefault(experiment.material, []).append(experiment)
     scales = scales or scales_of(experiments)
     several = len(experiments) > 1
+    effects = [effect.on([e.protocol() for e in experiments]) for effect in effects]
     distributions: dict[str, Any] = {}
     samples: list[Sample] = []
     for material, members in materials.items():
@@ -325,6 +326,7 @@ def build(
         defaults = wire_defaults(experiment.length_mm, scales, experiment.control)
         wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
         distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
+        distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(effects) if a.of_each_test}
     units = scales.units
     learned = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.in_natural_units}
     every = {
@@ -473,8 +475,13 @@ def _material_priors(
         out[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
     for effect in effects:
         suffix = mark if effect.scope == "material" else ""
-        out |= {f"{c}{suffix}": a.prior for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
+        out |= {f"{c}{suffix}": a.prior for c, a in _amplitudes([effect]) if not a.of_each_test}
     return out
+
+
+def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:
+    """The amplitudes of effects with the names of their columns."""
+    return [pair for effect in effects for pair in zip(effect.columns(), effect.amplitudes, strict=True)]
 
 
 def _samples(

@@ -116,8 +116,7 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
     if trained:
         setting[:trained] = settings_given_readings(own, sample, rng)
     walk = Walk(protocol, own, sample.model)
-    creep: Floats = np.zeros(n)
-    beside: dict[str, Floats] = {}
+    creep, beside = walk.begin(n)
     out = []
     for j in range(len(request.requested)):
         if j < trained and request.requested[j]:

@@ -244,5 +244,5 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
 
 def _without_events(stored: Stored) -> Stored:
     model = stored.sample.model
-    lasting = tuple(effect for effect in model.effects if not isinstance(effect, EventEffect))
+    lasting = tuple(e for e in model.effects if not isinstance(e, EventEffect) and e.place != "before")
     return replace(stored, sample=replace(stored.sample, model=replace(model, effects=lasting)))

@@ -5,7 +5,7 @@ The twin of `wirebayes.wire.staircase` and of `wirebayes.model.likelihoods`, whi
 the reference, and compute what has no formula here. `wirebayes.wire.compiled` decides who computes.
 """
 
-from libc.math cimport INFINITY, NAN, exp, expm1, fabs, fmax, isinf, isnan, log, log1p, pow, sqrt
+from libc.math cimport INFINITY, NAN, cos, exp, expm1, fabs, fmax, isinf, isnan, log, log1p, pow, sin, sqrt
 
 import numpy as np
 
@@ -16,17 +16,18 @@ MOST_EFFECTS = _MOST_EFFECTS
 
 # In the order of `FORMULAS`.
 cdef enum Formula:
-    STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, THERMAL, LENGTH_POWER, PERMANENT, MEMORY, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
-    AGEING, THRESHOLD, SLIP, WAIT, DELAY, DRIFT, SQUARE, TRANSIENT, LOST_MOTION, FRICTION
+    STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, THERMAL, LENGTH_POWER, PERMANENT, SUPERPOSITION, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
+    AGEING, THRESHOLD, SLIP, BEFORE, WAIT, LATE, DELAY, DRIFT, SQUARE, TRANSIENT, SCREW, LOST_MOTION, FRICTION
     AT_ONCE, NOT_IN_TIME, LOGARITHMIC, POWER_OF_TIME, TWO_MODES
 
 FORMULAS = (
-    "stiffening", "toe", "toe_of_strain", "power", "series", "thermal", "length_power", "permanent", "memory", "second_mode", "flow",
-    "flow_carried", "rate_power", "ageing", "threshold", "slip", "wait", "delay", "drift", "square", "transient",
-    "lost_motion", "friction", "at_once", "not_in_time", "logarithmic", "power_of_time", "two_modes",
+    "stiffening", "toe", "toe_of_strain", "power", "series", "thermal", "length_power", "permanent", "superposition", "second_mode", "flow",
+    "flow_carried", "rate_power", "ageing", "threshold", "slip", "before", "wait", "late", "delay", "drift", "square", "transient",
+    "screw", "lost_motion", "friction", "at_once", "not_in_time", "logarithmic", "power_of_time", "two_modes",
 )
 
 cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
+cdef double PI = 3.141592653589793
 cdef int NEWTON_STEPS = 7  # as in `wirebayes.effects.rivals`
 cdef int MOST_STEPS = 200  # as in `wirebayes.wire.inverse`
 cdef double EXACT = 4.0 * 2.220446049250313e-16
@@ -91,13 +92,16 @@ cdef struct Wire:
     bint own_time, timed  # creep has a rate or a time of its own in each hold; it goes on by another law than eq (5)
     int formula[_MOST_EFFECTS]
     double number[_MOST_EFFECTS]  # the hold of an event, the parameter that depends on the length
-    double own[_MOST_EFFECTS][2]  # amplitudes
-    double beside[_MOST_EFFECTS]  # elongation beside the creep, as it is carried into the hold
+    double own[_MOST_EFFECTS][3]  # amplitudes
+    Dual beside[_MOST_EFFECTS]  # elongation beside the creep, as it is carried into the hold
+    int clocks  # of the holds so far that are kept in mind
+    double late  # by how much every reading is later than recorded, s
+    bint aged  # the ages of clocks are those of the protocol
     double solved, elastic, slope  # a strain, its elastic part, and the slope of this
 
 
 cdef struct Hold:
-    double index, order, start_s, direction
+    double index, order, start_s, direction, displacement_mm
     bint reversed, recorded
     Dual position, carried, tension  # the tension when it begins, or as it is set
     double strain  # under a weight, as it was found for the last reading
@@ -356,22 +360,47 @@ cdef class Test:
         self.read_times = read_times
 
 
-cdef inline Dual remembered(
-    Wire* wire, Hold* hold, Test test, double omega, int j, int r, int earlier, double[:, ::1] shares,
+cdef inline Dual superposed(
+    Wire* wire, Hold* hold, Test test, int j, int r, double time_s, Dual rate, double[:, ::1] shares,
     double[:, ::1] past
 ) noexcept:
-    """What the clocks of earlier holds would still have added by a reading of hold `j`."""
-    cdef double total = 0.0, share, age, k2
+    """Creep that the clocks of all holds add up to, the last one being this hold's, at its reading `r` (-1: another)."""
+    cdef Dual total = constant(0.0), before = constant(0.0), goal, reached
+    cdef double share
     cdef int i
-    for i in range(earlier):
-        if wire.own_time or wire.timed:
-            age, k2 = hold.start_s - past[i, 0], past[i, 2]
-            # a difference of two fractions of the creep
-            share = expm1(-k2 * pow(age, wire.N)) - expm1(-k2 * pow(age + test.time_s[j, r], wire.N))
+    for i in range(wire.clocks):
+        goal = Dual(past[i, 2], past[i, 3], past[i, 4])
+        if i == wire.clocks - 1:
+            reached = fraction_of(rate, pow(hold.start_s - past[i, 0] + time_s, wire.N))
+        elif wire.aged and r >= 0:
+            reached = constant(shares[0, test.which_age[j, i, r + 1]])
         else:
-            share = shares[0, test.which_age[j, i, r + 1]] - shares[0, test.which_age[j, i, 0]]
-        total += past[i, 1] * share
-    return constant(omega * total)
+            share = -expm1(-past[i, 1] * pow(hold.start_s - past[i, 0] + time_s, wire.N))
+            reached = constant(share)
+        total = plus(total, product(minus(goal, before), reached))
+        before = goal
+    return total
+
+
+cdef inline void keep_in_mind(Wire* wire, Hold* hold, Dual goal, double rate, double[:, ::1] past) noexcept:
+    """The clock of a hold that begins."""
+    cdef int i = wire.clocks
+    past[i, 0], past[i, 1], past[i, 2], past[i, 3], past[i, 4] = hold.start_s, rate, goal.v, goal.s, goal.c
+    wire.clocks += 1
+
+
+cdef inline Dual beside_at(
+    Wire* wire, Hold* hold, Test test, int e, int j, int r, double time_s, double share, Dual grown, Dual rate,
+    double[:, ::1] shares, double[:, ::1] past
+) noexcept:
+    """Elongation beside the creep at a time of a hold; `share` is that of a second mode's course."""
+    cdef Dual course
+    if wire.formula[e] == SECOND_MODE:
+        return plus(times(hold.tension, wire.own[e][0] * share), times(wire.beside[e], 1.0 - share))
+    if wire.formula[e] == FLOW:
+        return plus(times(hold.tension, wire.own[e][0] * time_s), wire.beside[e])
+    course = superposed(wire, hold, test, j, r, time_s, rate, shares, past)
+    return times(minus(course, grown), wire.own[e][0])
 
 
 cdef class Law:
@@ -394,8 +423,8 @@ cdef class Law:
             self.amplitudes[e], self.number[e] = amplitudes, number
         self.choose(&self.at.zero, (THERMAL, SLIP))
         self.choose(&self.at.strain, (STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, AT_ONCE))
-        self.choose(&self.at.creep, (MEMORY, FLOW_CARRIED))
-        self.choose(&self.at.beside, (SECOND_MODE, FLOW))
+        self.choose(&self.at.creep, (FLOW_CARRIED,))
+        self.choose(&self.at.beside, (SUPERPOSITION, SECOND_MODE, FLOW))
         self.choose(&self.at.guide, (FRICTION,))
         self.choose(&self.at.reading, (DRIFT, SQUARE, TRANSIENT))
         self.at.empty = not (self.at.zero.n + self.at.strain.n + self.at.creep.n + self.at.beside.n + self.at.guide.n
@@ -426,8 +455,9 @@ cdef void take(
     wire.modified, wire.kept, wire.tension_ref_N = law.modified, law.kept, law.tension_ref_N
     wire.weights = test.weights
     wire.effects, wire.at, wire.own_time, wire.timed, wire.solved = law.effects, &law.at, False, False, 0.0
+    wire.clocks, wire.late, wire.aged = 0, 0.0, test.which_age.shape[0] > 0
     for e in range(law.effects):
-        wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], 0.0
+        wire.formula[e], wire.number[e], wire.beside[e] = law.formula[e], law.number[e], constant(0.0)
         for a in range(law.amplitudes[e]):
             wire.own[e][a] = theta[row, i]
             row += 1
@@ -435,6 +465,10 @@ cdef void take(
             wire.own_time = True
         elif law.formula[e] >= NOT_IN_TIME:
             wire.timed = True
+        elif law.formula[e] == LATE:
+            wire.late += wire.own[e][0]
+        if law.formula[e] in (BEFORE, WAIT, LATE):
+            wire.aged = False
         if law.formula[e] == LENGTH_POWER:
             grown = exp(law.log_length_ratio * wire.own[e][0])
             if law.number[e] == 0:
@@ -446,22 +480,23 @@ cdef void take(
             else:
                 wire.N *= grown
     wire.own_time = wire.own_time and not wire.timed  # another law of time has no rate
+    wire.aged = wire.aged and not (wire.own_time or wire.timed)
     if wire.timed:
         for t in range(test.times.shape[0]):
-            shares[0, t] = law_of_time(wire, test.times[t])
+            shares[0, t] = law_of_time(wire, test.times[t] + wire.late)
     elif wire.own_time:
         for t in range(test.times.shape[0]):
-            shares[0, t] = pow(test.times[t], wire.N)
+            shares[0, t] = pow(test.times[t] + wire.late, wire.N)
     else:
         for t in range(test.times.shape[0]):
-            shares[0, t] = -expm1(-wire.k2 * pow(test.times[t], wire.N))
+            shares[0, t] = -expm1(-wire.k2 * pow(test.times[t] + wire.late, wire.N))
     for e in range(law.effects):
         if law.formula[e] == SECOND_MODE:
             for t in range(test.read_times):
-                shares[1 + e, t] = -expm1(-test.times[t] / wire.own[e][1])
+                shares[1 + e, t] = -expm1(-(test.times[t] + wire.late) / wire.own[e][1])
         elif law.formula[e] == TRANSIENT:
             for t in range(test.read_times):
-                shares[1 + e, t] = exp(-test.times[t] / wire.own[e][1])
+                shares[1 + e, t] = exp(-(test.times[t] + wire.late) / wire.own[e][1])
 
 
 cdef inline double set_in(Wire* wire, Test test, int j) noexcept:
@@ -469,74 +504,120 @@ cdef inline double set_in(Wire* wire, Test test, int j) noexcept:
     return test.setting[j] if wire.weights else wire.base + test.setting[j]
 
 
-cdef void begin(Wire* wire, Hold* hold, Test test, int j, double setting, double carried) noexcept:
-    """Hold `j` at its first moment; what is set is a stretched length, or a tension."""
+cdef double rested(Wire* wire, Hold* hold, Test test, double[:, ::1] shares, double[:, ::1] past) noexcept:
+    """Creep that the wire brings into the first hold, mm; what is beside it stays in `wire`."""
+    cdef double before = 0.0
     cdef int e
-    cdef Dual elongation
-    cdef double waited
-    hold.index, hold.order, hold.start_s = j, test.order[j], test.start_s[j]
-    hold.direction, hold.recorded = test.direction[j], test.recorded[j]
-    hold.reversed = test.direction[j] != test.direction[0]
-    hold.carried, hold.strain = Dual(carried, 0.0, 1.0), 0.0
-    if wire.weights:
-        waited = guided(wire, hold)
-        hold.tension = times(Dual(setting, 1.0, 0.0), 1.0 / waited if waited > 0 else NAN)
-    else:
-        hold.position = Dual(setting + lagging(wire, hold), 1.0, 0.0)
-        elongation = hold.carried
-        elongation.v += beside_of(wire)
-        hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+    for e in range(wire.effects):
+        if wire.formula[e] == BEFORE:
+            before += wire.own[e][0]
+    if before == 0.0:
+        return 0.0
+    enter(wire, hold, test, 0, 0.0 if wire.weights else wire.base, 0.0, 0.0)
+    wait(wire, hold, test, 0, before, shares, past)
+    hold.carried = constant(hold.carried.v)
+    return hold.carried.v
+
+
+cdef void begin(
+    Wire* wire, Hold* hold, Test test, int j, double setting, double carried, double[:, ::1] shares,
+    double[:, ::1] past
+) noexcept:
+    """Hold `j` at its first moment; what is set is a stretched length, or a tension."""
+    cdef int e, i
+    cdef double before = 0.0
+    for i in range(wire.clocks):
+        past[i, 3] = past[i, 4] = 0.0
+    enter(wire, hold, test, j, setting, 0.0 if wire.weights else test.setting[j], carried)
     for e in range(wire.effects):
         if wire.formula[e] == WAIT and hold.order == wire.number[e]:
-            waited = -expm1(-wire.k2 * pow(wire.own[e][0], wire.N))
-            elongation = times(amount_of(wire, hold), waited)
-            hold.carried = plus(hold.carried, elongation)
-            if not wire.weights:
-                elongation = hold.carried
-                elongation.v += beside_of(wire)
-                hold.tension = tension_of(wire, hold, elongation, test.warming_K[j, 0])
+            before += wire.own[e][0]
+    if before != 0.0:
+        wait(wire, hold, test, j, before, shares, past)
 
 
-cdef inline double lagging(Wire* wire, Hold* hold) noexcept nogil:
-    """What effects on the position add to it, mm."""
-    cdef double total = 0.0
+cdef void enter(
+    Wire* wire, Hold* hold, Test test, int j, double setting, double displacement_mm, double carried
+) noexcept:
+    """Hold `j` as its setting is reached."""
+    cdef int e
+    cdef double loose
+    hold.index, hold.order, hold.start_s = j, test.order[j], test.start_s[j] + j * wire.late
+    hold.direction, hold.recorded, hold.displacement_mm = test.direction[j], test.recorded[j], displacement_mm
+    hold.reversed = test.direction[j] != test.direction[0]
+    hold.carried, hold.strain = Dual(carried, 0.0, 1.0), 0.0
+    for e in range(wire.effects):
+        wire.beside[e] = constant(wire.beside[e].v)
+    if wire.weights:
+        loose = guided(wire, hold)
+        hold.tension = times(Dual(setting, 1.0, 0.0), 1.0 / loose if loose > 0 else NAN)
+    else:
+        hold.position = Dual(setting + off(wire, hold, constant(displacement_mm)).v, 1.0, 0.0)
+        hold.tension = tension_of(wire, hold, plus(hold.carried, beside_of(wire)), test.warming_K[j, 0])
+
+
+cdef void wait(
+    Wire* wire, Hold* hold, Test test, int j, double time_s, double[:, ::1] shares, double[:, ::1] past
+) noexcept:
+    """Time passes before hold `j` begins, as in a hold that nobody reads."""
+    cdef Dual amount = amount_of(wire, hold), rate = constant(wire.k2)
+    cdef double share = -expm1(-wire.k2 * pow(time_s, wire.N))
+    cdef int k, e, i
+    if wire.at.beside.n:
+        keep_in_mind(wire, hold, plus(hold.carried, amount), wire.k2, past)
+    hold.carried = plus(hold.carried, times(amount, share))
+    for k in range(wire.at.beside.n):
+        e = wire.at.beside.each[k]
+        share = -expm1(-time_s / wire.own[e][1]) if wire.formula[e] == SECOND_MODE else 0.0
+        wire.beside[e] = beside_at(wire, hold, test, e, j, -1, time_s, share, hold.carried, rate, shares, past)
+    for i in range(wire.clocks):
+        past[i, 0] -= time_s
+    if not wire.weights:
+        hold.tension = tension_of(wire, hold, plus(hold.carried, beside_of(wire)), test.warming_K[j, 0])
+
+
+cdef inline Dual off(Wire* wire, Hold* hold, Dual displacement) noexcept nogil:
+    """What effects on the position add to a displacement, mm."""
+    cdef Dual total = constant(0.0)
+    cdef double turns, phase
     cdef int e
     for e in range(wire.effects):
         if wire.formula[e] == LOST_MOTION and hold.reversed:
-            total -= wire.own[e][0] * hold.direction
+            total.v -= wire.own[e][0] * hold.direction
+        elif wire.formula[e] == SCREW:
+            turns = 2.0 * PI / wire.own[e][1]
+            phase = turns * displacement.v + wire.own[e][2]
+            total = plus(total, through(displacement, wire.own[e][0] * cos(phase), -wire.own[e][0] * turns * sin(phase)))
     return total
 
 
-cdef inline double beside_of(Wire* wire) noexcept nogil:
-    cdef double total = 0.0
-    cdef int e
-    for e in range(wire.effects):
-        if wire.formula[e] == SECOND_MODE or wire.formula[e] == FLOW:
-            total += wire.beside[e]
+cdef inline Dual beside_of(Wire* wire) noexcept nogil:
+    cdef Dual total = constant(0.0)
+    cdef int k
+    for k in range(wire.at.beside.n):
+        total = plus(total, wire.beside[wire.at.beside.each[k]])
     return total
 
 
 cdef Dual follow(
-    Wire* wire, Hold* hold, Test test, int j, int width, int earlier, double[:, ::1] shares, double[:, ::1] past,
-    Dual* readings
+    Wire* wire, Hold* hold, Test test, int j, int width, double[:, ::1] shares, double[:, ::1] past, Dual* readings
 ) noexcept:
-    """The first readings of a hold that has begun, `width` of them, after `earlier` ones that it remembers.
+    """The first readings of a hold that has begun, `width` of them.
 
     Returns the creep carried out, and leaves what is beside it in `wire`.
     """
     cdef Dual amount = amount_of(wire, hold), rate = rate_of(wire, hold), grown, total, course, out
-    cdef double time_s, clock_s, share, carried_beside[_MOST_EFFECTS]
+    cdef double time_s, clock_s, share
+    cdef Dual last[_MOST_EFFECTS]
     cdef int r, k, e
-    past[j, 0], past[j, 1], past[j, 2] = hold.start_s, amount.v, rate.v
     if wire.at.empty and not (wire.own_time or wire.modified or wire.weights):
         follow_hooke(wire, hold, test, j, width, amount, shares, readings)
         return plus(hold.carried, times(amount, shares[0, test.which[j, test.last[j]]]))
+    if wire.at.beside.n:
+        keep_in_mind(wire, hold, plus(hold.carried, amount), rate.v, past)
     out = hold.carried
-    for k in range(wire.at.beside.n):
-        e = wire.at.beside.each[k]
-        carried_beside[e] = wire.beside[e]
     for r in range(width):
-        time_s = test.time_s[j, r]
+        time_s = test.time_s[j, r] + wire.late
         if wire.own_time:
             clock_s = clock_of(wire, hold, time_s, r == 0)
             share = shares[0, test.which[j, r]] if clock_s == time_s else pow(clock_s, wire.N)
@@ -544,33 +625,28 @@ cdef Dual follow(
         else:
             grown = times(amount, shares[0, test.which[j, r]])
         grown = plus(hold.carried, grown)
-        for k in range(wire.at.creep.n):
-            e = wire.at.creep.each[k]
-            if wire.formula[e] == MEMORY:
-                grown = plus(grown, remembered(wire, hold, test, wire.own[e][0], j, r, earlier, shares, past))
-            else:  # flow that is carried
-                grown = plus(grown, times(hold.tension, wire.own[e][0] * time_s))
+        for k in range(wire.at.creep.n):  # flow that is carried
+            grown = plus(grown, times(hold.tension, wire.own[wire.at.creep.each[k]][0] * time_s))
         total = grown
         for k in range(wire.at.beside.n):
             e = wire.at.beside.each[k]
-            if wire.formula[e] == SECOND_MODE:
-                share = shares[1 + e, test.which[j, r]]
-                course = times(hold.tension, wire.own[e][0] * share)
-                course.v += carried_beside[e] * (1.0 - share)
-            else:  # flow
-                course = times(hold.tension, wire.own[e][0] * time_s)
-                course.v += carried_beside[e]
+            share = shares[1 + e, test.which[j, r]]
+            course = beside_at(wire, hold, test, e, j, r, time_s, share, grown, rate, shares, past)
             total = plus(total, course)
             if r == test.last[j]:
-                wire.beside[e] = course.v
+                last[e] = course
         if r == test.last[j]:
             out = grown
         if wire.weights:
             total = position_of(wire, hold, total, test.warming_K[j, r])
-            total.v += lagging(wire, hold) - wire.base
+            total.v -= wire.base
+            total = plus(total, off(wire, hold, total))
         else:
             total = times(tension_of(wire, hold, total, test.warming_K[j, r]), guided(wire, hold))
         readings[r] = reading_of(wire, hold, total, time_s, shares, test.which[j, r])
+    for k in range(wire.at.beside.n):
+        e = wire.at.beside.each[k]
+        wire.beside[e] = last[e] if width > test.last[j] else wire.beside[e]
     return out
 
 
@@ -599,6 +675,7 @@ cdef class Staircases:
     cdef int holds, width
     cdef Dual* readings  # (holds, width) of the column that was asked for
     cdef Dual* carry  # (holds,): creep carried out of each
+    cdef double brought  # creep carried into the first
     cdef double[:, ::1] memory
 
     cdef void allocate(self, Py_ssize_t n, int holds, int width):
@@ -623,7 +700,7 @@ cdef class Computed(Staircases):
     def __init__(self, Test test, Law law, const double[:, ::1] theta):
         self.allocate(theta.shape[1], test.holds, test.width)
         self.test, self.law, self.theta = test, law, theta
-        self.past, self.shares = np.empty((test.holds, 3)), np.empty((1 + law.effects, test.times.shape[0]))
+        self.past, self.shares = np.empty((2 * test.holds + 1, 5)), np.empty((1 + law.effects, test.times.shape[0]))
 
     cdef void ask(self, Py_ssize_t i) noexcept:
         cdef Wire wire
@@ -631,9 +708,10 @@ cdef class Computed(Staircases):
         cdef double creep = 0.0
         cdef int j
         take(&wire, self.law, self.test, self.theta, i, self.shares)
+        creep = self.brought = rested(&wire, &hold, self.test, self.shares, self.past)
         for j in range(self.holds):
-            begin(&wire, &hold, self.test, j, set_in(&wire, self.test, j), creep)
-            self.carry[j] = follow(&wire, &hold, self.test, j, self.width, j, self.shares, self.past,
+            begin(&wire, &hold, self.test, j, set_in(&wire, self.test, j), creep, self.shares, self.past)
+            self.carry[j] = follow(&wire, &hold, self.test, j, self.width, self.shares, self.past,
                                    self.readings + j * self.width)
             creep = self.carry[j].v
 
@@ -675,6 +753,7 @@ def linearise(Test test, Law law, const double[:, ::1] theta):
     cdef Dual read
     for i in range(made.n):
         made.ask(i)
+        e[0, i] = made.brought
         for j in range(holds):
             for r in range(width):
                 read = made.readings[j * width + r]
@@ -689,7 +768,7 @@ def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] 
     cdef int holds = test.holds, width = test.width, j, r
     out = np.empty((holds, width, n))
     cdef double[:, :, ::1] y = out
-    cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
+    cdef double[:, ::1] past = np.empty((2 * holds + 1, 5)), scratch = np.empty((width, 3))
     cdef double[:, ::1] shares = np.empty((1 + law.effects, test.times.shape[0]))
     cdef Dual* readings = <Dual*> &scratch[0, 0]
     cdef double creep, moved
@@ -699,14 +778,14 @@ def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] 
         raise ValueError("setting errors and columns are of different sizes")
     for i in range(n):
         take(&wire, law, test, theta, i, shares)
-        creep = 0.0
+        creep = 0.0 if each_alone else rested(&wire, &hold, test, shares, past)
         for j in range(holds):
             moved = setting_error[j, i if setting_error.shape[1] > 1 else 0]
             if each_alone:
                 alone(&wire, &hold, test, j, width, set_in(&wire, test, j) + moved, shares, past, readings)
             else:
-                begin(&wire, &hold, test, j, set_in(&wire, test, j) + moved, creep)
-                creep = follow(&wire, &hold, test, j, width, j, shares, past, readings).v
+                begin(&wire, &hold, test, j, set_in(&wire, test, j) + moved, creep, shares, past)
+                creep = follow(&wire, &hold, test, j, width, shares, past, readings).v
             for r in range(width):
                 y[j, r, i] = readings[r].v
     return out
@@ -718,7 +797,7 @@ def courses(Test test, Law law, const double[:, ::1] theta, const double[:, :] f
     cdef int holds = test.holds, width = test.width, j, r, step
     tension, slope = np.zeros((holds, width, n)), np.zeros((holds, width, n))
     cdef double[:, :, ::1] y = tension, by = slope
-    cdef double[:, ::1] past = np.empty((holds, 3)), scratch = np.empty((width, 3))
+    cdef double[:, ::1] past = np.empty((2 * holds + 1, 5)), scratch = np.empty((width, 3))
     cdef double[:, ::1] shares = np.empty((1 + law.effects, test.times.shape[0]))
     cdef Dual* readings = <Dual*> &scratch[0, 0]
     cdef double wanted, stretched, move
@@ -755,9 +834,10 @@ cdef void alone(
     """The first readings of a hold without a past."""
     cdef int e
     for e in range(wire.effects):
-        wire.beside[e] = 0.0
-    begin(wire, hold, test, j, setting, 0.0)
-    follow(wire, hold, test, j, width, 0, shares, past, readings)
+        wire.beside[e] = constant(0.0)
+    wire.clocks = 0
+    begin(wire, hold, test, j, setting, 0.0, shares, past)
+    follow(wire, hold, test, j, width, shares, past, readings)
 
 
 cdef struct Read:

@@ -62,7 +62,7 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     log_ratio = float(np.log(protocol.length_mm / (model.length_ref_mm or protocol.length_mm)))
     kept = 1.0 if model.history == "saturating" else 0.0
     law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, tuple(formulas))
-    remembers = any(name == "memory" for name, _, _ in formulas)
+    remembers = any(name == "superposition" for name, _, _ in formulas)
     test = kernel.Test(**(protocol.flat_with_ages if remembers else protocol.flat))
     return Call(test, law, packed)
 

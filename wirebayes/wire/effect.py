@@ -18,6 +18,8 @@ Place = Literal[
     "position",  # stretched length, mm: of the wire by that of the screw, or of the gauge by that of the wire
     "zero_length",  # zero-tension length, creep included, mm
     "strain",  # strain whose product with k1 is the tension
+    "time",  # time of every reading since the hold began, s
+    "before",  # time passed at displacement zero before the first hold, s
     "wait",  # time passed at this displacement before the hold began, s
     "drive",  # tension that drives the creep, N
     "amount",  # creep still to come in this hold, mm
@@ -30,7 +32,14 @@ Place = Literal[
     "reading",  # what the sensor says, N, or the gauge where the tension is set, mm
 ]
 Scope = Literal["material", "instrument", "environment", "event"]
-OF_THE_BENCH = ("position", "wait", "guide", "reading")  # places that a wire away from the bench does not have
+OF_THE_BENCH = (
+    "position",
+    "time",
+    "before",
+    "wait",
+    "guide",
+    "reading",
+)  # places that a wire away from the bench does not have
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,8 @@ class Amplitude:
         True where the amplitude is an elongation of the whole wire, which grows with the length of the sample.
     in_natural_units : bool
         True where the prior was learned from the readings, and is in the amplitude's own unit.
+    of_each_test : bool
+        True where every test has its own, whatever its effect shares.
     """
 
     name: str
@@ -60,6 +71,10 @@ class Amplitude:
     is_shape: bool = False
     is_elongation: bool = False
     in_natural_units: bool = False
+    of_each_test: bool = False
+
+
+Clock = tuple[Any, NDArray[Any], NDArray[Any]]  # when it began, the creep that it heads for, its rate
 
 
 @dataclass
@@ -92,8 +107,10 @@ class HoldContext:
         Creep elongation carried into the hold.
     zero_mm : (R, n) array
         Zero-tension length at the times of the hold, for effects on the strain.
-    past : list of (start_s, amount, k2)
-        The clocks of earlier holds.
+    grown : (R, n) array
+        Creep elongation at the times of the hold, for effects beside it.
+    past : list of (start_s, goal, k2)
+        The clocks of the holds so far, this one's last: when each began, the creep it heads for, mm, and its rate.
     law : {"hooke", "modified"}
         Which strain it is that effects on it change.
     """
@@ -115,7 +132,8 @@ class HoldContext:
     initial_tension: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     carried: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
     zero_mm: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
-    past: list[tuple[float, NDArray[Any], NDArray[Any]]] = field(default_factory=list)
+    grown: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
+    past: list[Clock] = field(default_factory=list)
     law: ElasticLaw = "hooke"
 
     def carrying(self, carried: NDArray[Any]) -> "HoldContext":
@@ -142,6 +160,7 @@ class Effect:
     no_creep_below: ClassVar[str] = ""  # the parameter that is a tension below which nothing creeps, where it has one
     in_series: ClassVar[bool] = False  # its amplitude is a compliance in series with the wire
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
+    needs_saturation: ClassVar[bool] = False  # has no meaning where creep is added anew in every hold
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
         """The quantity at the effect's place, changed by the effect.
@@ -200,6 +219,17 @@ class Effect:
         """
         swapped = control == "force" and cls.place == "reading"
         return amplitude.unit.replace("N", "mm") if swapped else amplitude.unit
+
+    def on(self, protocols: Sequence[Protocol]) -> "Effect":
+        """The effect with the priors that it has for some tests; itself unless they depend on these."""
+        return self
+
+    def shapes_tried(self) -> list[dict[str, float]]:
+        """Values of its shape constants, by column, at which an effect is looked for: quantiles of each."""
+        tried: list[dict[str, float]] = [{}]
+        for name, shape in zip(self.columns()[1:], self.amplitudes[1:], strict=True):
+            tried = [known | {name: float(v)} for known in tried for v in shape.prior.ppf([0.1, 0.5, 0.9])]
+        return tried
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list["Effect"]:

@@ -101,6 +101,7 @@ class FreshSample:
         law, hold = Creep(effects, theta, self.model.history), self._hold(tension_N, time_s)
         with np.errstate(all="ignore"):
             amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
-            creep = law.creep(amount * law.fraction(k2, hold), hold)
-            whole = law.elongation(creep, law.beside({}, hold), hold)
+            hold.grown = law.creep(amount * law.fraction(k2, hold), hold)
+            hold.past = [(0.0, amount, k2)]
+            whole = law.elongation(hold.grown, law.beside({}, hold), hold)
         return np.array(np.broadcast_to(whole, (len(time_s), hold.carried.shape[1])))

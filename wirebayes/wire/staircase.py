@@ -15,7 +15,7 @@ from wirebayes.means import geometric_mean
 from wirebayes.wire import compiled, laws
 from wirebayes.wire.control import SETTINGS
 from wirebayes.wire.creep import Creep
-from wirebayes.wire.effect import Effect, HoldContext, Placed
+from wirebayes.wire.effect import Clock, Effect, HoldContext, Placed
 from wirebayes.wire.elastic import Elastic
 from wirebayes.wire.protocol import Protocol
 
@@ -104,8 +104,7 @@ def simulate(
     if call is not None:
         return compiled.kernel.simulate(*call, exact.astype(float))
     walk = Walk(protocol, theta, model)
-    creep: NDArray[Any] = np.zeros(n)
-    beside: dict[str, NDArray[Any]] = {}
+    creep, beside = walk.begin(n)
     readings = []
     for j in range(len(protocol.setting)):
         row, creep, beside = walk.hold(j, protocol.setting[j] + exact[j], creep, beside)
@@ -160,7 +159,6 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     reading, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
     carry_by_setting, carry_by_creep = np.empty((holds, n)), np.empty((holds, n))
     creep = np.zeros((holds + 1, n))
-    beside: dict[str, NDArray[Any]] = {}
     if by_hand:
         for j in range(holds):
             reading[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
@@ -170,6 +168,8 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     # Both complex steps in one pass: the first n columns take that of the setting error, the others that of the creep.
     of_setting, of_creep = slice(None, n), slice(n, None)
     steps = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
+    before, beside = walk.begin(2 * n)
+    creep[0] = before[:n]
     for j in range(holds):
         y, out, beside = walk.hold(j, protocol.setting[j] + steps[0], np.tile(creep[j], 2) + steps[1], beside)
         reading[j], by_setting[j], by_creep[j] = y[:, of_creep].real, y[:, of_setting].imag, y[:, of_creep].imag
@@ -178,8 +178,7 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
             out[of_setting].imag,
             out[of_creep].imag,
         )
-        start_s, amount, k2 = walk.past[-1]
-        walk.past[-1] = (start_s, amount.real, k2.real)
+        walk.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in walk.past]
         beside = {key: value.real for key, value in beside.items()}
     for derivative in (by_setting, by_creep, carry_by_setting, carry_by_creep):
         derivative /= _STEP
@@ -208,12 +207,14 @@ class Walk:
 
     def __init__(self, protocol: Protocol, theta: Theta, model: Model) -> None:
         self.protocol, self.model = protocol, model
-        self.past: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
+        self.past: list[Clock] = []
+        self.late: Any = 0.0
         self.effects = Placed(model.effects, theta)
         self.at, self.change = self.effects.at, self.effects.change
         self.theta: dict[str, NDArray[Any]] = dict(theta)
         if "sample" in self.at:
             self.theta = self.change("sample", self.theta, self._context(0))
+        self.late = self.change("time", np.zeros((1, 1)), self._context(0)) if "time" in self.at else 0.0
         self.creep = Creep(self.effects, self.theta, model.history)
         self.k1, self.B, self.U = self.theta["k1"], self.theta["B"], self.theta["U"]
         self.k2, self.N = self.theta["k2"], self.theta["N"]
@@ -224,7 +225,7 @@ class Walk:
         self.own_time = bool(self.at.keys() & {"rate", "clock", "fraction"})
         # Holds mostly share their reading times, so the exponentials are few.
         times, self.where = protocol.distinct_times
-        self.fraction = laws.creep_fraction(times[:, None], self.k2, self.N)
+        self.fraction = laws.creep_fraction(times[:, None] + self.late, self.k2, self.N)
 
     def hold(
         self, j: int, setting: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
@@ -253,22 +254,46 @@ class Walk:
         hold, law = self._context(j), self.creep
         held = self.bench.held(setting, hold)
         hold.carried = creep[None]
-        extra = sum((beside.get(e.key, 0.0) for e in self.at.get("elongation", ())), 0.0)
-        hold.initial_tension = self._first(held, hold.carried + extra, hold)
+        hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
         if "wait" in self.at:
-            wait = self.change("wait", np.zeros((1, 1)), hold)
-            waited = law.amount(hold.initial_tension, hold) * laws.creep_fraction(wait, self.k2, self.N)
-            hold.carried = hold.carried + waited
-            hold.initial_tension = self._first(held, hold.carried + extra, hold)
+            beside = self._wait(held, self.change("wait", np.zeros((1, 1)), hold), beside, hold)
         amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
         fraction = law.fraction(k2, hold) if self.own_time else self.fraction[self.where[j]]
-        grown = law.creep(hold.carried + amount * fraction, hold)
-        self.past.append((hold.start_s, amount, k2))
+        hold.grown = law.creep(hold.carried + amount * fraction, hold)
+        self.past.append((hold.start_s, hold.carried + amount, k2))
         courses = law.beside(beside, hold)
-        total = sum(courses.values(), grown)
+        total = sum(courses.values(), hold.grown)
         readings = self.bench.read(held, total, hold)
         end = self.protocol.end[j]
-        return readings, grown[end], {key: course[end][None] for key, course in courses.items()}
+        return readings, hold.grown[end], {key: course[end][None] for key, course in courses.items()}
+
+    def begin(self, n: int) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+        """What the wire brings into the first hold: its creep (n,), and elongations beside it by effect key."""
+        if "before" not in self.at:
+            return np.zeros(n), {}
+        hold = self._context(0)
+        hold.displacement_mm, hold.carried = 0.0, np.zeros((1, n))
+        held = self.bench.held(np.zeros(1), hold)
+        hold.initial_tension = self._first(held, hold.carried, hold)
+        beside = self._wait(held, self.change("before", np.zeros((1, 1)), hold), {}, hold)
+        return np.array(np.broadcast_to(hold.carried[0], (n,))), beside
+
+    def _wait(
+        self, held: NDArray[Any], wait_s: NDArray[Any], beside: dict[str, NDArray[Any]], hold: HoldContext
+    ) -> dict[str, NDArray[Any]]:
+        """Let time pass before a hold begins, as in a hold that nobody reads; what is then beside the creep."""
+        if not np.any(wait_s):
+            return beside
+        law, times, warming = self.creep, hold.time_s, hold.warming_K
+        hold.time_s, hold.warming_K = wait_s, warming[:1]
+        amount = law.amount(hold.initial_tension, hold)
+        hold.grown = hold.carried + amount * laws.creep_fraction(wait_s, self.k2, self.N)
+        self.past.append((hold.start_s, hold.carried + amount, self.k2))
+        beside = law.beside(beside, hold)
+        self.past[:] = [(start_s - wait_s, goal, k2) for start_s, goal, k2 in self.past]
+        hold.time_s, hold.warming_K, hold.carried = times, warming, hold.grown
+        hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
+        return beside
 
     def fresh(self, j: int, setting: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
         """Some readings of a hold without a past, and their derivatives by what is set.
@@ -349,8 +374,12 @@ class Walk:
 
     def _context(self, j: int) -> HoldContext:
         length_ref_mm = self.model.length_ref_mm or self.protocol.length_mm
+        of_hold = self.protocol.holds[j]
+        if "time" in self.at:
+            later = {"start_s": of_hold["start_s"] + j * self.late, "time_s": of_hold["time_s"] + self.late}
+            of_hold = of_hold | later | {"duration_s": of_hold["duration_s"] + self.late}
         return HoldContext(
-            **self.protocol.holds[j],
+            **of_hold,
             length_ref_mm=length_ref_mm,
             tension_ref_N=self.model.tension_ref_N,
             theta=self.theta,

@@ -130,7 +130,7 @@ def fit(
     jobs = []
     for folder, members in groups.items():
         for effect in added:
-            _check_possible(effect, members, file, known_effects)
+            _check_possible(effect, members, file, known_effects, history)
         # checks priors
         build(members, added, law=elastic_law, history=history, likelihood=likelihood, length_exponent=exponent)
         hashes = {e.name: e.data_hash for e in members}
@@ -194,9 +194,14 @@ def _groups(experiments: Sequence[Experiment], together: str | None, file: Path)
 
 
 def _check_possible(
-    effect: Effect, members: Sequence[Experiment], file: Path, known: Mapping[str, type[Effect]]
+    effect: Effect, members: Sequence[Experiment], file: Path, known: Mapping[str, type[Effect]], history: History
 ) -> None:
     """An effect that these holds cannot show at all is an error of the user's, not a prior-shaped posterior."""
+    if effect.needs_saturation and history == "additive":
+        raise InputError(
+            f"--effect {effect.key}: found --history additive, expected saturating: "
+            "creep that is added anew in every hold has no total"
+        )
     protocols = [e.protocol() for e in members]
     if effect.name not in known:
         return  # the flexible discrepancy shows anywhere

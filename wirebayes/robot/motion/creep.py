@@ -32,7 +32,7 @@ class CreepState:
         Holds so far.
     clock_s : float
         Time since the first hold began.
-    past : tuple of (start_s, amount, k2)
+    past : tuple of (start_s, goal, k2)
         The clocks of earlier holds, for effects that remember them.
     elongation_mm : (w, n) array or float
         All that the zero-tension length of the tested sample has grown by.
@@ -72,7 +72,6 @@ class HoldCreep:
     def __init__(self, wires: Wires, carried: CreepState, tension_N: Floats, follow: Follow = "current") -> None:
         self.wires, self.carried, self.follow = wires, carried, follow
         self.hold = hold_context(wires, carried.holds, carried.clock_s, tension_N, carried.creep_mm)
-        self.hold.past.extend(carried.past)
         self.law = Creep(wires.placed, wires.theta, wires.history)
         self.k2 = self.law.rate(self.hold)
         self.amount = self.law.amount(tension_N, self.hold)
@@ -154,14 +153,16 @@ class HoldCreep:
         """What the wires carry now."""
         hold, law, carried = self.hold, self.law, self.carried
         self._look(self.time_s)
+        own = (carried.clock_s, carried.creep_mm + self.amount, self.k2)
+        hold.past = [*carried.past, own]
+        creep = hold.grown = law.creep(carried.creep_mm + self.grown, hold)
         beside = law.beside(carried.beside_mm, hold)
-        creep = law.creep(carried.creep_mm + self.grown, hold)
         return CreepState(
             creep,
             beside,
             carried.holds + 1,
             carried.clock_s + self.time_s,
-            (*carried.past, (carried.clock_s, self.amount, self.k2)),
+            (*carried.past, own),
             law.elongation(creep, beside, hold),
         )
 
