@@ -7,6 +7,8 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any, cast
 
+import numpy as np
+
 from wirebayes.io.run_folder import plain
 from wirebayes.json_files.batch import BatchJson
 from wirebayes.json_files.calibrate import CalibrateJson
@@ -114,8 +116,14 @@ def next_step(result: Result[Any]) -> str:
         return _after_pose(result.summary(), folder)
     if isinstance(result, Calibration):
         if not result.summary()["usable"]:
-            return "wirebayes calibrate with more poses, or once readings, --tension-sd and --reference-sd are checked"
-        return f"set the lengths of {folder / 'calibrate.json'} in the controller"
+            return "wirebayes calibrate with more poses, or once readings, stated errors and --anchor-sd are checked"
+        if (folder / "robot.toml").is_file():
+            robot = folder / "robot.toml"
+            return (
+                f"wirebayes export {robot} --wires DIR, for the controller's settings; references are in "
+                f"{folder / 'calibration.json'}"
+            )
+        return f"set the lengths of {folder / 'calibration.json'} in the controller"
     if isinstance(result, Check):
         return "wirebayes fit FILE.toml --output DIR" + (
             ", once the warnings are settled" if result.warnings else ", then wirebayes discover FILE.toml"
@@ -316,7 +324,15 @@ def _calibration(found: CalibrateJson) -> list[str]:
     length = known["length_m"]
     rows = zip(length["mean"], length["q05"], length["q95"], strict=True)
     lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
-    return [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
+    lines = [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
+    points = found["exit_points_m"]
+    if np.any(np.array(points["sd"]) > 0):
+        lines.append("  exit points in mm, ± standard error:")
+        for i, (mean, sd) in enumerate(zip(points["mean"], points["sd"], strict=True)):
+            place = ", ".join(f"{1e3 * m:.1f} ± {1e3 * s:.2g}" for m, s in zip(mean, sd, strict=True))
+            lines.append(f"    wire {i + 1}: ({place})")
+    lines += [f"  not determined: {text}" for text in found["identified"]["not_determined"][:_MOST_LINES]]
+    return lines
 
 
 def _band(quantity: Quantiles | ParameterRange | None) -> str:

@@ -539,7 +539,7 @@ class Calibration(Result[CalibrateJson]):
     Calibration(linear-7, 9 holds, converged)
     """
 
-    _content: ClassVar[str] = "calibrate.json"
+    _content: ClassVar[str] = "calibration.json"
 
     def _short_form(self) -> list[str]:
         found = self.summary()
