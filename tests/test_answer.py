@@ -90,13 +90,16 @@ def test_a_pose_says_its_drift_for_each_spread(tmp_path: Path) -> None:
     assert line == "r: after 600 s the platform has drifted by 1 mm [0.5, 2] (specimen spread 5 %)"
 
 
+NAMED = {"usable": True, "exit_points_m": {"sd": [[0.0]]}, "identified": {"not_determined": []}}
+
+
 def test_a_calibration_offers_no_lengths_unless_it_converged(tmp_path: Path) -> None:
     known = {"converged": True, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
-    content = {"robot": "r", "with_creep_model": known, "usable": True, "warnings": []}
-    good = stored(Calibration, tmp_path, "calibrate.json", content)
+    content = {"robot": "r", "with_creep_model": known, "warnings": [], **NAMED}
+    good = stored(Calibration, tmp_path, "calibration.json", content)
     assert good.lines() == ["r: zero-tension lengths in m: 1.00000 [0.90000, 1.10000]"]
     bad = {"robot": "r", "with_creep_model": known | {"converged": False}}
-    assert stored(Calibration, tmp_path, "calibrate.json", bad).lines() == ["r: not converged, no lengths to use"]
+    assert stored(Calibration, tmp_path, "calibration.json", bad).lines() == ["r: not converged, no lengths to use"]
 
 
 def test_json_is_the_summary_and_quiet_is_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -134,14 +137,14 @@ def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:
 def test_lengths_that_did_not_converge_are_not_for_the_controller(tmp_path: Path) -> None:
     known = {"converged": False, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
     content = {"robot": "r", "with_creep_model": known, "usable": False, "warnings": []}
-    bad = stored(Calibration, tmp_path, "calibrate.json", content)
+    bad = stored(Calibration, tmp_path, "calibration.json", content)
     assert answer.next_step(bad).startswith("wirebayes calibrate FILE.toml with more poses")
     known = known | {"converged": True}
-    content = {"robot": "r", "with_creep_model": known, "usable": True, "warnings": []}
-    good = stored(Calibration, tmp_path, "calibrate.json", content)
-    assert answer.next_step(good) == f"set the lengths of {tmp_path / 'calibrate.json'} in the controller"
+    content = {"robot": "r", "with_creep_model": known, "warnings": [], **NAMED}
+    good = stored(Calibration, tmp_path, "calibration.json", content)
+    assert answer.next_step(good) == f"set the lengths of {tmp_path / 'calibration.json'} in the controller"
     content = content | {"usable": False}
-    wrong = stored(Calibration, tmp_path, "calibrate.json", content)
+    wrong = stored(Calibration, tmp_path, "calibration.json", content)
     assert answer.next_step(wrong).startswith("wirebayes calibrate FILE.toml with more poses")
 
 

@@ -56,7 +56,7 @@ READERS = {
     "discover/discovery.json": [["report", "{r}/discover"]],
     "discover/configuration.json": [["report", "{r}/discover"]],
     "pose/pose.json": [["report", "{r}/pose"]],
-    "calibrate/calibrate.json": [["report", "{r}/calibrate"]],
+    "calibrate/calibration.json": [["report", "{r}/calibrate"]],
 }
 
 
@@ -195,7 +195,7 @@ def test_readings_that_nothing_explains_end_unconverged(
     line, doubt = capsys.readouterr().err.splitlines()
     assert doubt.startswith("warning: the fit of simulated")
     assert line.startswith("warning: not converged")
-    assert json.loads((out / "calibrate.json").read_text())["joint_values_for_home_m"] is None
+    assert json.loads((out / "calibration.json").read_text())["joint_values_for_home_m"] is None
     assert main(["report", str(out)]) == 0
 
 

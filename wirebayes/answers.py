@@ -203,7 +203,18 @@ def of_calibration(found: CalibrateJson) -> list[str]:
     length = known["length_m"]
     rows = zip(length["mean"], length["q05"], length["q95"], strict=True)
     lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
-    return [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
+    lines = [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
+    points = found["exit_points_m"]
+    if any(sd > 0 for each in points["sd"] for sd in each):
+        lines.append("  exit points in mm, ± standard error:")
+        for i, (mean, errors) in enumerate(zip(points["mean"], points["sd"], strict=True)):
+            place = ", ".join(f"{1e3 * m:.1f} ± {1e3 * sd:.2g}" for m, sd in zip(mean, errors, strict=True))
+            lines.append(f"    wire {i + 1}: ({place})")
+    open_ = found["identified"]["not_determined"]
+    return lines + [f"  not determined: {text}" for text in open_[:_MOST_OPEN]]
+
+
+_MOST_OPEN = 4  # combinations that are listed: a terminal is no table
 
 
 def _with_unit(quantity: Parameter | ParameterRange) -> str:

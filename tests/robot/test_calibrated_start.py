@@ -158,16 +158,16 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     known = content["history"]["calibration"]
     assert known["holds"] == 5
     assert known["duration_s"] == 150
-    calibrated = json.loads((done / "calibrate.json").read_text())["with_creep_model"]["reference_error_mm"]
+    calibrated = json.loads((done / "calibration.json").read_text())["with_creep_model"]["reference_error_mm"]
     np.testing.assert_allclose(known["reference_error_mm"]["mean"], calibrated["mean"])
     np.testing.assert_allclose(known["reference_error_mm"]["sd"], calibrated["sd"])
     assert "goes on where a calibration of 5 holds and 150 s ended" in (out / "report.html").read_text()
     capsys.readouterr()
     astray = tmp_path / "astray"
     shutil.copytree(done, astray)
-    found = json.loads((done / "calibrate.json").read_text())
+    found = json.loads((done / "calibration.json").read_text())
     found["with_creep_model"]["converged"] = False
-    (astray / "calibrate.json").write_text(json.dumps(found))
+    (astray / "calibration.json").write_text(json.dumps(found))
     other = tmp_path / "other"
     other.mkdir()
     (other / "posterior.nc").write_bytes(b"another")
@@ -180,7 +180,7 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     for arguments, message in (
         ([*begin, "--calibration", str(done)], "--calibration: found beside a single pose"),
         ([*begin, *joint, "--calibration", str(done), "--reference-sd", "2"], "--reference-sd: found beside"),
-        ([*begin, *joint, "--calibration", str(tmp_path / "no")], "found no calibrate.json in"),
+        ([*begin, *joint, "--calibration", str(tmp_path / "no")], "found no calibration.json in"),
         ([*begin, *joint, "--calibration", str(astray)], "found one that has not converged in"),
         ([*begin, *joint, "--calibration", str(damaged)], "unknowns.json: cannot be used"),
         (["pose", "linear-6", *wires, *joint, "--calibration", str(done)], "found one of linear-7 in"),

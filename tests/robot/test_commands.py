@@ -236,7 +236,7 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
     file, truth = session_csv
     out = tmp_path / "out"
     assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 0
-    content = json.loads((out / "calibrate.json").read_text())
+    content = json.loads((out / "calibration.json").read_text())
     found = content["with_creep_model"]
     assert found["converged"]
     assert found["misfit"] < 1
@@ -264,7 +264,7 @@ def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(
         assert main(arguments) == 0
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("warning: not converged with the creep model")
-    content = json.loads((out / "calibrate.json").read_text())
+    content = json.loads((out / "calibration.json").read_text())
     assert not content["with_creep_model"]["converged"]
     assert content["joint_values_for_home_m"] is None and content["pose_now"] is None
     assert main(["report", str(out)]) == 0
@@ -312,7 +312,7 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "20", "--output"]
     assert main([*arguments, str(tmp_path / "good")]) == 0
     assert "warning" not in capsys.readouterr().err
-    assert json.loads((tmp_path / "good" / "calibrate.json").read_text())["warnings"] == []
+    assert json.loads((tmp_path / "good" / "calibration.json").read_text())["warnings"] == []
     lines = [line.split(",") for line in file.read_text().splitlines()]
     for k, cells in enumerate(lines[1:]):
         cells[0] = str(10 * (k + 1))
@@ -325,7 +325,7 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     assert [line.split(":")[1] for line in warned] == [" hold 20", " hold 40"]
     assert "the requested pose is 49.9 m and 0.0" in warned[0]
     assert " m and 2.5 rad from the one that its joint values lead to" in warned[1]
-    found = json.loads((tmp_path / "odd" / "calibrate.json").read_text())
+    found = json.loads((tmp_path / "odd" / "calibration.json").read_text())
     assert found["with_creep_model"]["converged"]
     np.testing.assert_allclose(found["with_creep_model"]["length_m"]["mean"], truth, atol=1e-2)
     assert "Hold 20: the requested pose is 49.9 m" in (tmp_path / "odd" / "report.html").read_text()
@@ -348,7 +348,7 @@ def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitte
     assert main([*arguments, "--tension-bias", "-1", "--output", str(tmp_path / "o")]) == 2
     out = tmp_path / "out"
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(out)]) == 0
-    content = json.loads((out / "calibrate.json").read_text())
+    content = json.loads((out / "calibration.json").read_text())
     assert content["prior"]["tension_bias_sd_N"] == 0.2 and content["prior"]["tension_bias_sign"] == "motion"
     bias = content["with_creep_model"]["tension_bias_N"]
     assert abs(bias["mean"][0] - 0.3) < 2 * bias["sd"][0] < 0.4

@@ -103,10 +103,16 @@ def next_step(result: Result[Any], given: Given = Given()) -> str:
     if isinstance(result, Calibration):
         if not result.summary()["usable"]:
             return (
-                f"wirebayes calibrate {file} with more poses, or once readings, --tension-sd and --reference-sd are "
+                f"wirebayes calibrate {file} with more poses, or once readings, stated errors and --anchor-sd are "
                 "checked"
             )
-        return f"set the lengths of {folder / 'calibrate.json'} in the controller"
+        if (folder / "robot.toml").is_file():
+            robot = folder / "robot.toml"
+            return (
+                f"wirebayes export {robot} --wires {given.wires}, for the controller's settings; references are in "
+                f"{folder / 'calibration.json'}"
+            )
+        return f"set the lengths of {folder / 'calibration.json'} in the controller"
     if isinstance(result, Check):
         then = "once the warnings are settled" if result.warnings else f"then wirebayes discover {file}"
         return f"wirebayes fit {file}, {then}"

@@ -117,8 +117,26 @@ def calibrate(
         float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of the platform's normal.")
     ] = 1e-3,
     reference_sd: Annotated[
-        float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the reference lengths.")
+        float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the reference lengths; 0: exact.")
     ] = 5.0,
+    anchor_sd: Annotated[
+        float, typer.Option("--anchor-sd", metavar="MM", help="Standard error of the exit points; 0: exact.")
+    ] = 0.0,
+    platform_sd: Annotated[
+        float, typer.Option("--platform-sd", metavar="MM", help="Standard error of the platform points; 0: exact.")
+    ] = 0.0,
+    pose_sd: Annotated[
+        float | None,
+        typer.Option("--pose-sd", metavar="MM", help="Standard error of the poses that the readings state; 0: exact."),
+    ] = None,
+    drum_sd: Annotated[
+        float, typer.Option("--drum-sd", metavar="PERCENT", help="Standard error of the drums' radii; 0: exact.")
+    ] = 0.0,
+    joint_sd: Annotated[
+        float | None,
+        typer.Option("--joint-sd", metavar="MM", help="Standard error of a joint value; default: estimated."),
+    ] = None,
+    next_poses: Annotated[int, typer.Option("--next-poses", metavar="N", help="Poses to propose for next time.")] = 5,
     tension_bias: Annotated[
         float | None,
         typer.Option(
@@ -133,15 +151,21 @@ def calibrate(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Estimate every wire's current zero-tension length from joint values and tensions, without external sensors."""
+    """Estimate lengths, anchors and poses of a robot from its joint values and tensions, without external sensors.
+
+    A row whose pose is empty is a hold at a pose that nobody knows; a row without tensions was not read. With
+    --anchor-sd and the like the robot's geometry is estimated too, and robot.toml holds what was found:
+    wirebayes calibrate robot.toml log.csv --wires DIR --anchor-sd 50 --output out/anchors
+    """
     from wirebayes.cli.answer import Given, conclude
     from wirebayes.workflows.calibrate import calibrate as run
     from wirebayes.workflows.wires import named_lines
 
     found = run(
         robot, readings, named_lines(wires), tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
-        tension_bias=tension_bias, specimen_spread=spread, draws=draws, experiment=experiment, own_effects=own_effects,
-        seed=seed, output=folder_for("calibrate", robot, output),
+        tension_bias=tension_bias, anchor_sd=anchor_sd, platform_sd=platform_sd, pose_sd=pose_sd, drum_sd=drum_sd,
+        joint_sd=joint_sd, next_poses=next_poses, specimen_spread=spread, draws=draws, experiment=experiment,
+        own_effects=own_effects, seed=seed, output=folder_for("calibrate", robot, output),
     )  # fmt: skip
     for line in found.messages:
         typer.echo(line, err=True)

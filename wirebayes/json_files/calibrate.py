@@ -1,4 +1,4 @@
-"""``calibrate.json``: the zero-tension lengths of a robot's wires."""
+"""``calibration.json``: the zero-tension lengths of a robot's wires."""
 
 from typing import NotRequired, TypedDict
 
@@ -12,11 +12,15 @@ class CalibrationPrior(TypedDict):
 
     reference_sd_mm: float
     specimen_spread: float
+    anchor_sd_mm: NotRequired[float]
+    platform_sd_mm: NotRequired[float]
+    pose_sd_mm: NotRequired[float]
+    drum_sd: NotRequired[float]
     tension_bias_sd_N: NotRequired[float]
     tension_bias_sign: NotRequired[str]
 
 
-class LengthInterval(MeanAndSd):
+class Interval(MeanAndSd):
     """With the 90 % interval."""
 
     q05: Numbers
@@ -29,10 +33,34 @@ class EstimatedLengths(TypedDict):
     converged: bool
     misfit: float
     p_joint: float
-    length_m: LengthInterval
+    length_m: Interval
     creep_strain: Numbers
     reference_error_mm: MeanAndSd
     tension_bias_N: NotRequired[MeanAndSd]
+
+
+class EstimatedPoses(Interval):
+    """A row of x, y, z (m) and of the rotation vector (rad) for each hold, at its end."""
+
+    hold: list[float]
+
+
+class CombinationJson(TypedDict):
+    """A motion of all exit points together."""
+
+    name: str
+    before_mm: float
+    after_mm: float
+    determined: bool
+
+
+class IdentifiedJson(TypedDict):
+    """How many independent combinations the readings determine, and what they leave open, in words."""
+
+    determined: int
+    of: int
+    combinations: list[CombinationJson]
+    not_determined: list[str]
 
 
 class PoseNow(TypedDict):
@@ -102,8 +130,23 @@ class UnknownsJson(BelongsTo, CalibratedUnknowns):
     """The whole of ``unknowns.json``."""
 
 
-class CalibrateJson(CalibratedPoses, Observed, Warned):
+class NamedEstimates(TypedDict):
+    """Geometry (a row a leg), lengths and poses."""
+
+    exit_points_m: Interval
+    platform_points_m: Interval
+    zero_tension_lengths_m: Interval
+    references_m: Interval
+    poses: EstimatedPoses
+    identified: IdentifiedJson
+
+
+class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, Warned):
     """The whole file."""
+
+    length_rms_mm: float | None  # None, and no errors of next poses, where the lengths alone were estimated
+    joint_sd_mm: float | None
+    next_pose_sd_mm: Numbers
 
     version: int
     robot: str

@@ -11,15 +11,18 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.calibrate import BelongsTo, CalibrateJson, UnknownsJson
+from wirebayes.robot.exchange.points import with_points
+from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.self_calibration import session_file
+from wirebayes.robot.self_calibration import session_file, whole_answer
 from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
-from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.unknowns import StatedErrors
 from wirebayes.workers import computing
-from wirebayes.workflows.options import PathLike, above_zero, check_seed, check_spread, path_of
+from wirebayes.workflows.options import PathLike, above_zero, check_seed, check_spread, from_zero, path_of
 from wirebayes.workflows.results import Calibration, Place
 from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import (
@@ -33,6 +36,9 @@ from wirebayes.workflows.wires import (
     robot_of,
 )
 
+ROBOT = "robot.toml"  # with the calibrated points
+_EXACT_MM = 1e-6  # what is exact is known this well
+_MOST_VISITS = 100  # nobody visits more before calibrating again
 UNKNOWNS = "unknowns.json"  # the posterior that a history can start from
 
 
@@ -45,6 +51,12 @@ def calibrate(
     tilt_sd: float = 1e-3,
     reference_sd: float = 5.0,
     tension_bias: float | None = None,
+    anchor_sd: float = 0.0,
+    platform_sd: float = 0.0,
+    pose_sd: float | None = None,
+    drum_sd: float = 0.0,
+    joint_sd: float | None = None,
+    next_poses: int = 5,
     specimen_spread: float = 0.05,
     draws: int = 1000,
     experiment: str | None = None,
@@ -52,21 +64,37 @@ def calibrate(
     seed: int = 0,
     output: PathLike | None = None,
 ) -> Calibration:
-    """Estimate the zero-tension lengths of a robot's wires from joint values and tensions, without external sensors.
+    """Estimate a robot's lengths, geometry and poses from joint values, tensions and whatever else was read.
+
+    With exact geometry, tensions and requested poses this is the calibration of the lengths alone. An error of the
+    anchors, of the platform points, of the drums or of stated poses, poses that nobody knows or a session without
+    tensions make it the calibration of the whole robot.
 
     Parameters
     ----------
     robot : Robot, name of a shipped robot, or path
     readings : path of a CSV, DataFrame, or mapping of name to (r,) array
-        A row per hold, in order: requested pose, duration, joint values or motor angles, and tensions at its
-        end or NaN.
+        A row per hold, in order: pose or NaN, duration, joint values or motor angles, and tensions at its end or
+        NaN.
     wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
     tension_sd : float
         Standard error of a tension, N.
     tilt_sd : float
         Standard error of the platform's normal, rad.
     reference_sd : float
-        Standard error of the reference lengths, mm.
+        Standard error of the reference lengths, mm; 0: exact.
+    anchor_sd, platform_sd : float
+        Standard error of every coordinate of the exit points, of the platform points, mm; 0: exact.
+    pose_sd : float, optional
+        Standard error of every coordinate of the poses that the readings state, mm; 0: exact. Left out, exact poses
+        that contradict the joint values, or only repeat them, are taken for requests, and said so.
+    drum_sd : float
+        Standard error of every drum's radius, percent; 0: exact.
+    joint_sd : float, optional
+        Standard error of a joint value as a length, mm. Left out, it is estimated where geometry is unknown, and zero
+        where it is exact.
+    next_poses : int
+        Number of poses to propose for the next session.
     tension_bias : float, optional
         Standard deviation of each tension sensor's bias, N: its zero or, where the readings say in which direction a
         wire moved last (``motion_1`` and so on: 1 pulled in, -1 let out), friction between sensor and wire. Left out:
@@ -86,7 +114,7 @@ def calibrate(
     Returns
     -------
     Calibration
-        Its `summary` is the content of ``calibrate.json``.
+        Its `summary` is the content of ``calibration.json``.
 
     Raises
     ------
@@ -102,7 +130,13 @@ def calibrate(
     own, seed = path_of(own_effects), check_seed(seed)
     tension_sd, tilt_sd, reference_sd = float(tension_sd), float(tilt_sd), float(reference_sd)
     specimen_spread = check_spread(specimen_spread)
-    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd), ("--reference-sd", reference_sd))
+    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
+    from_zero(
+        ("--reference-sd", reference_sd), ("--anchor-sd", anchor_sd), ("--platform-sd", platform_sd),
+        ("--pose-sd", pose_sd or 0.0), ("--drum-sd", drum_sd), ("--joint-sd", joint_sd or 0.0),
+    )  # fmt: skip
+    if not 0 <= next_poses <= _MOST_VISITS:
+        raise InputError(f"--next-poses: found {next_poses}; expected a number from 0 to {_MOST_VISITS}")
     machine = robot_of(robot)
     bias = machine.tension_bias_N if tension_bias is None else float(tension_bias)
     if not 0 <= bias < math.inf:
@@ -118,25 +152,76 @@ def calibrate(
     options = {
         "--experiment": experiment, "--tension-sd": tension_sd, "--tilt-sd": tilt_sd, "--reference-sd": reference_sd,
         "--specimen-spread": specimen_spread, "readings": read, **({"--tension-bias": bias} if bias else {}),
+        "--anchor-sd": float(anchor_sd), "--platform-sd": float(platform_sd), "--pose-sd": pose_sd,
+        "--drum-sd": float(drum_sd), "--joint-sd": joint_sd, "--next-poses": next_poses,
     }  # fmt: skip
     place = Place.at(output)
     decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
-            prior = Prior(line, 1e-3 * reference_sd, typical_spread(line, specimen_spread), bias_sd_N=bias)
+            prior = Prior(
+                line, 1e-3 * max(reference_sd, _EXACT_MM), typical_spread(line, specimen_spread), bias_sd_N=bias
+            )
+            errors = _errors(machine, session, anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd)
+            calibrated = machine
             with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-                found, known = answer(machine, prior, session, values, seed)
-            write_json(run.directory / "calibrate.json", found)
+                if errors is None:
+                    found, known = answer(machine, prior, session, values, seed, next_poses)
+                else:
+                    requests = pose_sd is None
+                    whole = whole_answer.answer(machine, prior, errors, session, values, seed, requests, next_poses)
+                    found, known = whole.content, whole.known
+                    calibrated = _write_robot(run.directory / ROBOT, robot, whole.robot)
+            write_json(run.directory / "calibration.json", found)
             if found["with_creep_model"]["converged"]:
-                unknowns: UnknownsJson = {**_belongs_to(machine, wires, experiment), **to_dict(known)}
+                unknowns: UnknownsJson = {**_belongs_to(calibrated, wires, experiment), **to_dict(known)}
                 write_json(run.directory / UNKNOWNS, unknowns)
-            if found["pose_now"] is not None:
-                from wirebayes.report.pictures.robot import still_points  # matplotlib only where it is needed
-
-                here, turn = (np.asarray(found["pose_now"][key]) for key in ("position_m", "rotation_vector_rad"))
-                write_json(run.directory / "scene.json", still_points(machine, here, matrix(turn)))
+            _write_scene(run.directory / "scene.json", calibrated, found)
             run.finish()
     return Calibration(place, own, computed=run.state != "done")
+
+
+def _errors(
+    robot: Robot,
+    session: Session,
+    anchor_sd: float,
+    platform_sd: float,
+    pose_sd: float | None,
+    drum_sd: float,
+    joint_sd: float | None,
+) -> StatedErrors | None:
+    """Errors of geometry and poses in metres; None where the lengths alone are to be estimated."""
+    somewhere = bool(np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all())
+    exact = not (anchor_sd or platform_sd or drum_sd)
+    if exact and not pose_sd and joint_sd is None and somewhere and session.read.any():
+        return None
+    joint = joint_sd if joint_sd is not None else (0.0 if exact else None)
+    return StatedErrors(
+        1e-3 * anchor_sd,
+        1e-3 * platform_sd if robot.degrees == 6 else 0.0,  # of a point, they are errors of the exit points
+        1e-3 * (pose_sd or 0.0),
+        None if joint is None else 1e-3 * joint,
+        1e-2 * drum_sd,
+    )
+
+
+def _write_scene(path: Path, robot: Robot, found: CalibrateJson) -> None:
+    """Write the points of the view that can be turned, where the platform's place is known."""
+    if found["pose_now"] is None:
+        return
+    from wirebayes.report.pictures.robot import still_points  # matplotlib only where it is needed
+
+    here, turn = (np.asarray(found["pose_now"][key]) for key in ("position_m", "rotation_vector_rad"))
+    write_json(path, still_points(robot, here, matrix(turn)))
+
+
+def _write_robot(path: Path, given: RobotLike, calibrated: Robot) -> Robot:
+    """Write the robot's file with its calibrated points, and read what it says; a robot without a file has none."""
+    if isinstance(given, Robot):
+        return calibrated
+    text = with_points(schema.text_of(Path(given)), calibrated)
+    path.write_text(text, encoding="utf-8")
+    return schema.parse(text, str(path))
 
 
 def calibrated_of(
@@ -165,8 +250,8 @@ def calibrated_of(
     """
     folder = calibration.folder if isinstance(calibration, Calibration) else Path(calibration)
     expected = f"expected a calibration of {robot.name} that has converged"
-    summary = folder / "calibrate.json"
-    found: CalibrateJson = read_json(summary, f"--calibration: found no calibrate.json in {folder}, {expected}")
+    summary = folder / "calibration.json"
+    found: CalibrateJson = read_json(summary, f"--calibration: found no calibration.json in {folder}, {expected}")
     with stored_results(summary):
         name, converged = str(found["robot"]), bool(found["with_creep_model"]["converged"])
     if name != robot.name:

@@ -203,3 +203,10 @@ def above_zero(*options: tuple[str, float]) -> None:
     for name, value in options:
         if not 0 < value < float("inf"):
             raise InputError(f"{name}: found {value:g}; expected a finite number above 0")
+
+
+def from_zero(*options: tuple[str, float]) -> None:
+    """Refuse what is not a finite number of at least zero."""
+    for name, value in options:
+        if not 0 <= value < float("inf"):
+            raise InputError(f"{name}: found {value:g}; expected a finite number of at least 0")

@@ -604,7 +604,7 @@ class Calibration(Result[CalibrateJson]):
     Calibration(linear-7, 9 holds, converged)
     """
 
-    _content: ClassVar[str] = "calibrate.json"
+    _content: ClassVar[str] = "calibration.json"
 
     def lines(self) -> list[str]:
         return answers.of_calibration(self.summary())

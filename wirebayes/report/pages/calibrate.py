@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wirebayes.answers import calibration_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths
@@ -22,17 +24,18 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
-from wirebayes.robot.self_calibration.answer import SIGNIFICANT
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
-    """The content of ``calibrate.json``."""
-    found: CalibrateJson = read_json(folder / "calibrate.json")
+    """The content of ``calibration.json``."""
+    found: CalibrateJson = read_json(folder / "calibration.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
     first = [*before_the_answer(found), columns, *beside_the_answer(found)]
     sections = [
         Section("Summary", first),
+        *_geometry(found),
         Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
         Section("What to do", _next(found)),
     ]
@@ -44,11 +47,44 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 
 _FILES = (
-    ("calibrate.json", "every number of this page as JSON"),
+    ("calibration.json", "every number of this page as JSON"),
+    ("robot.toml", "the robot's file with the calibrated points"),
     ("unknowns.json", "the posterior that pose --calibration starts from"),
     ("scene.json", "points of the view that can be turned"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
+
+
+def _geometry(found: CalibrateJson) -> list[Section]:
+    """Points that were estimated, what the readings leave open, and where the robot was at each hold."""
+    blocks: list[Block] = []
+    for points, of in ((found["exit_points_m"], "exit point"), (found["platform_points_m"], "platform point")):
+        if not np.any(np.array(points["sd"], float) > 0):
+            continue
+        columns = zip(points["mean"], points["q05"], points["q95"], strict=True)
+        lines = [[str(i + 1), *_intervals(mean, low, high)] for i, (mean, low, high) in enumerate(columns)]
+        header = [value for axis in "xyz" for value in (f"{axis}, mm", "90 %")]
+        blocks.append(Table(["wire", *header], lines, f"The {of} of every wire."))
+    if not blocks:
+        return []
+    open_ = found["identified"]["not_determined"]
+    seen = found["identified"]
+    words = [f"The readings determine {seen['determined']} of {seen['of']} combinations of geometry and references."]
+    words += [f"Not determined: {text}." for text in open_]
+    poses = found["poses"]
+    places = zip(poses["hold"], poses["mean"], poses["q05"], poses["q95"], strict=True)
+    rows = [[f"{hold:g}", *_intervals(mean[:3], low[:3], high[:3])] for hold, mean, low, high in places]
+    header = [value for axis in "xyz" for value in (f"{axis}, mm", "90 %")]
+    return [
+        Section("Geometry", [*blocks, Columns([Points("What the readings determine", words)])]),
+        Section("Poses", [Table(["hold", *header], rows, "Where the platform was when each hold ended.")]),
+    ]
+
+
+def _intervals(mean: Any, low: Any, high: Any) -> list[str]:
+    """Thousandths with their intervals."""
+    rows = zip(mean, low, high, strict=True)
+    return [cell for m, a, b in rows for cell in (_milli(m), f"{_milli(a)} … {_milli(b)}")]
 
 
 def _done(found: CalibrateJson) -> Points:
@@ -59,8 +95,15 @@ def _done(found: CalibrateJson) -> Points:
         biases = [
             f"Biases of the tension sensors were estimated too, {kind}; before, {prior['tension_bias_sd_N']:g} N."
         ]
+    stated = (
+        ("exit points", prior.get("anchor_sd_mm", 0.0)),
+        ("platform points", prior.get("platform_sd_mm", 0.0)),
+        ("poses", prior.get("pose_sd_mm", 0.0)),
+    )
+    known = [f"{name} were known to {sd:g} mm" for name, sd in stated if sd]
     return Points("What was done", [
-        f"{found['holds']} holds, {found['read']} of them read.",
+        f"{found['holds']} holds, tensions read in {found['read']} of them.",
+        *([f"Before, {' and '.join(known)}."] if known else []),
         f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line were "
         f"assumed to differ by {100 * prior['specimen_spread']:g} %.",
         *biases,
@@ -137,10 +180,19 @@ def _next(found: CalibrateJson) -> list[Block]:
         values = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])
         joints = f"Joint values that bring the platform to its home pose now, m: {values}."
     rows = [[f"{v:.3f}" for v in place] for place in found["next_positions_m"]]
-    caption = "Positions whose readings would shrink the lengths' uncertainty most, the most useful first."
+    caption = "Positions whose readings would sharpen what is known most, the most useful first."
     if found["joint_values_for_home_m"] is not None and not found["usable"]:
         joints = "Set nothing in the controller: readings, robot and wires contradict each other."
+    caption += _gain(found)
     return [
         Text(joints),
         Table(["x, m", "y, m", "z, m"], rows, caption),
     ]
+
+
+def _gain(found: CalibrateJson) -> str:
+    """What visiting the proposed poses is worth."""
+    sd = found["next_pose_sd_mm"]
+    if len(sd) < 2:
+        return ""
+    return f" They take the error of a commanded position from {number(sd[0], 2)} to {number(sd[-1], 2)} mm (sd)."

@@ -67,6 +67,11 @@ def parse(text: str, where: str) -> Robot:
     return _robot(_Table(table, where, ""))
 
 
+def text_of(name_or_file: str | Path) -> str:
+    """The text of a robot's file, or of a shipped one."""
+    return _text(str(name_or_file))[0]
+
+
 def _text(name: str) -> tuple[str, str]:
     if name in shipped():
         entry = resources.files("wirebayes") / "data" / "robots" / f"{name}.toml"

@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm
 
-from wirebayes.json_files.calibrate import CalibratedPoses, CalibrateJson, CalibrationPrior, EstimatedLengths, Observed
+from wirebayes.json_files.calibrate import (
+    CalibratedPoses,
+    CalibrateJson,
+    CalibrationPrior,
+    EstimatedLengths,
+    NamedEstimates,
+    Observed,
+)
 from wirebayes.notice import Notice, to_json
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
@@ -15,19 +22,17 @@ from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
 from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval
 from wirebayes.typing import Floats
 
-CANDIDATES, NEXT = 200, 5
+CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
 # simulated sessions of every shipped robot it was off by at most 2.7 times their sum.
 _FAR = 10.0
-# Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
-# lengths that are wrong cost a crash.
-SIGNIFICANT = 0.01
 
 
 def answer(
-    robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0
+    robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0, visits: int = 5
 ) -> tuple[CalibrateJson, Calibrated]:
     """Calibrate one robot and say how far the answer can be trusted.
 
@@ -39,11 +44,13 @@ def answer(
     readings : (r,) array
         Standardised, as `session.Prediction.readings`.
     seed : int
+    visits : int
+        Number of poses to propose.
 
     Returns
     -------
     content : dict
-        Of ``calibrate.json``; without a pose and joint values where the search did not converge.
+        Of ``calibration.json``; without a pose and joint values where the search did not converge.
     known : Calibrated
         What a history can start from.
     """
@@ -55,17 +62,21 @@ def answer(
         given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
     contradicted = _contradicted(robot, prior, session, known)
     content: CalibrateJson = {
-        "version": 1,
+        "version": 2,
         "robot": robot.name,
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
         "usable": usable(known) and not contradicted,
         "misfit": float(known.misfit[0]),
         "prior": given,
+        **_named(robot, prior, session, known),
+        "length_rms_mm": None,
+        "joint_sd_mm": None,
+        "next_pose_sd_mm": [],
         "with_creep_model": _lengths(robot, prior, known),
         "by_hooke_alone": _lengths(robot, prior, plain),
         **_poses(robot, prior, known),
-        **_observed(robot, prior, session, np.random.default_rng(seed)),
+        **_observed(robot, prior, session, np.random.default_rng(seed), visits),
         "warnings": to_json([*_unsure(known, plain), *contradicted, *doubts(robot, prior.line)]),
     }
     return content, calibrated(robot, prior, session, known)
@@ -80,6 +91,27 @@ def usable(known: Calibration) -> bool:
         Of one robot.
     """
     return bool(known.converged[0] and known.p_joint[0] >= SIGNIFICANT)
+
+
+def _named(robot: Robot, prior: Prior, session: Session, known: Calibration) -> NamedEstimates:
+    """Estimates in the words of a whole robot's calibration; its geometry is exact here."""
+    half = float(norm.ppf(0.95))
+    zero = np.zeros((robot.legs, 3))
+    sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
+    turn = rotation.vector(np.where(np.isfinite(known.ended_rotation[0]), known.ended_rotation[0], np.eye(3)))
+    pose = np.hstack([known.ended_m[0], turn])
+    numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
+    determined = int((sd < 0.5 * prior.reference_sd_m).sum())
+    open_ = [f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
+             f"{1e3 * sd[i]:.2g} mm now" for i in np.flatnonzero(~(sd < 0.5 * prior.reference_sd_m))]  # fmt: skip
+    return {
+        "exit_points_m": interval((robot.exit_m, zero), half),
+        "platform_points_m": interval((robot.platform_m, zero), half),
+        "zero_tension_lengths_m": interval((known.length_m[0], known.length_sd_m[0]), half),
+        "references_m": interval((known.unknowns[0, : robot.legs], sd), half),
+        "poses": {"hold": np.asarray(numbers, float).tolist(), **interval((pose, known.ended_sd[0]), half)},
+        "identified": {"determined": determined, "of": robot.legs, "combinations": [], "not_determined": open_},
+    }
 
 
 def _poses(robot: Robot, prior: Prior, known: Calibration) -> CalibratedPoses:
@@ -156,7 +188,7 @@ def _lengths(robot: Robot, prior: Prior, known: Calibration) -> EstimatedLengths
     return found
 
 
-def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator) -> Observed:
+def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator, visits: int) -> Observed:
     """Rank and sentence for the poses that were read; poses worth reading next."""
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
     wires = control.known(wires)
@@ -171,7 +203,7 @@ def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Gener
     good = np.isfinite(tau).all(1)
     commands = inverse.commands(robot, wires, x[good], R[good], tau[good])
     ahead = observability.sensitivity(robot, wires, x[good], R[good], commands.zero_m, commands.offset_m)[1]
-    pick = observability.choose_poses(ahead, NEXT, session.tension_sd_N, prior.reference_sd_m)
+    pick = observability.choose_poses(ahead, visits, session.tension_sd_N, prior.reference_sd_m)
     return {
         "observability": {
             "rank": seen.rank,

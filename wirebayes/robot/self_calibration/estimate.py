@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 from wirebayes.linear_algebra import inv, solve
+from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
 from wirebayes.robot.self_calibration.start import start
+from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.typing import Floats
-
-_UNLEARNT = 1e-6  # of a prior's variance: of a length of which the readings say less, there is nothing to be tested
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,14 @@ class Calibration:
         Where the robot is now, at the mode.
     begun_m, begun_rotation : (m, p, 3), (m, p, 3, 3) arrays
         Where it was at the beginning of every hold.
+    ended_m, ended_rotation : (m, p, 3), (m, p, 3, 3) arrays
+        Where it was at the end of every hold.
+    ended_sd : (m, p, 6) array
+        Standard errors of these: m, and rad about the world's axes.
     misfit : (m,) array
         Mean squared standardised residual; well above one when the model cannot explain the readings.
     p_joint : (m,) array
-        Probability that readings and reference lengths as stated contradict model and priors as much (`_joint_test`).
+        Probability of readings and references that contradict model and priors as much: `trust.joint_test`.
     converged : (m,) bool array
     """
 
@@ -52,6 +56,9 @@ class Calibration:
     rotation: Floats
     begun_m: Floats
     begun_rotation: Floats
+    ended_m: Floats
+    ended_rotation: Floats
+    ended_sd: Floats
     misfit: Floats
     p_joint: Floats
     converged: NDArray[np.bool_]
@@ -111,42 +118,17 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
         white, moved = np.where(better[:, None], white + step, white), better
         damping = np.where(better, damping / 10, damping * 10)
         here, cost = _pick(better, there, here), np.where(better, new, cost)
-    J, G = derivatives(robot, prior, session, mean, root, white, here)
+    J, G, P = derivatives(robot, prior, session, mean, root, white, here)
     spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(d))
     variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
+    ended = np.sqrt(np.einsum("mxd,mde,mxe->mx", P, spread, P)).reshape(m, -1, 6)
     misfit = ((readings - here.readings) ** 2).mean(1)
     return Calibration(
         mean + white @ root.T, root @ spread @ root.T, here.length_m, np.sqrt(variance), here.creep,
-        here.position_m[:, -1], here.rotation[:, -1], here.begun_m, here.begun_rotation, misfit,
-        _joint_test(cost, readings.shape[1], white, spread, robot.legs), converged & here.solved,
+        here.position_m[:, -1], here.rotation[:, -1], here.begun_m, here.begun_rotation,
+        here.ended_m, here.ended_rotation, ended, misfit,
+        joint_test(cost, readings.shape[1], white, spread, robot.legs), converged & here.solved,
     )  # fmt: skip
-
-
-def _joint_test(cost: Floats, count: int, white: Floats, spread: Floats, legs: int) -> Floats:
-    """Probability ``(m,)`` of readings and estimates that contradict model and priors at least as much.
-
-    Under the model the least sum of squares, residuals and unknowns in units of their errors, is chi-squared with as
-    many degrees of freedom as there are readings. Geometry that is wrong, but held exact, often hides in the reference
-    lengths, which are few among them all; so those are tested alone too: the covariance of their estimates is what the
-    readings took off that of their prior. The smaller of both probabilities counts, times two.
-
-    Parameters
-    ----------
-    cost : (m,) array
-        Sum of squares at the mode.
-    count : int
-        Number of readings.
-    white : (m, d) array
-        Mode in units of the prior, references first.
-    spread : (m, d, d) array
-        Posterior covariance in these units.
-    legs : int
-    """
-    reference = white[:, :legs, None]
-    learnt = (1.0 + _UNLEARNT) * np.eye(legs) - spread[:, :legs, :legs]
-    moved = (reference * solve(learnt, reference)).sum((1, 2))
-    least = np.minimum(chi2.sf(cost, count), chi2.sf(moved, legs))
-    return np.asarray(np.minimum(1.0, 2.0 * least))
 
 
 def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats, rotation: Floats) -> Floats:
@@ -175,8 +157,8 @@ def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats
 
 def derivatives(
     robot: Robot, prior: Prior, session: Session, mean: Floats, root: Floats, white: Floats, at: Prediction
-) -> tuple[Floats, Floats]:
-    """Derivatives of readings and final lengths by the unknowns in units of their prior.
+) -> tuple[Floats, Floats, Floats]:
+    """Derivatives of readings, final lengths and final poses by the unknowns in units of their prior.
 
     Central differences of the whole history in one batch: creep answers to tensions about a fifth as much as the
     elastic stretch does, so no part of the loop may be held fixed.
@@ -201,6 +183,8 @@ def derivatives(
         Of standardised readings.
     by_length : (m, w, d) array
         Of final lengths, m.
+    by_pose : (m, 6 p, d) array
+        Of the pose at every hold's end: m, and rad about the world's axes.
     """
     m, d = white.shape
     step = 1e-3
@@ -212,7 +196,12 @@ def derivatives(
         both = values.reshape(m, 2, d, -1)
         return np.asarray(np.swapaxes((both[:, 0] - both[:, 1]) / (2 * step), 1, 2))
 
-    return difference(p.readings), difference(p.length_m)
+    turn = p.ended_rotation.reshape(m, 2 * d, *at.ended_rotation.shape[1:])
+    change = turn @ np.swapaxes(at.ended_rotation, -1, -2)[:, None]
+    held = np.isfinite(change).all((-1, -2), keepdims=True)
+    turned = rotation.vector(np.where(held, change, np.eye(3))).reshape(*p.ended_m.shape)
+    poses = np.concatenate([p.ended_m, turned], -1).reshape(2 * d * m, -1)
+    return difference(p.readings), difference(p.length_m), difference(poses)
 
 
 def _cost(p: Prediction, readings: Floats, white: Floats) -> Floats:

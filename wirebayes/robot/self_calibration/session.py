@@ -63,6 +63,12 @@ class Session:
     number: Floats | None = None
 
     @property
+    def readings(self) -> int:
+        """Number of values that were read."""
+        tilts = 0 if self.tilt_sd_rad is None else 2
+        return int(self.read.sum()) * (self.joint_m.shape[1] + tilts)
+
+    @property
     def bias_sign(self) -> Floats:
         """(q, w) How the bias enters the tensions that were read."""
         signs = np.ones_like(self.joint_m) if self.motion is None else self.motion
@@ -179,6 +185,8 @@ class Prediction:
         Pose at every reading.
     begun_m, begun_rotation : (n, p, 3), (n, p, 3, 3) arrays
         Pose at the beginning of every hold.
+    ended_m, ended_rotation : (n, p, 3), (n, p, 3, 3) arrays
+        Pose at the end of every hold.
     read_length_m : (n, q, w) array
         Zero-tension lengths at every reading.
     solved : (n,) bool array
@@ -191,6 +199,8 @@ class Prediction:
     rotation: Floats
     begun_m: Floats
     begun_rotation: Floats
+    ended_m: Floats
+    ended_rotation: Floats
     read_length_m: Floats
     solved: NDArray[np.bool_]
 
@@ -220,10 +230,11 @@ def predict(
     n, legs = len(unknowns), robot.legs
     bias, sign = prior.bias_N(legs, unknowns), iter(session.bias_sign)
     solved = np.ones(n, bool)
-    tensions, poses, turns, lengths, begun = [], [], [], [], []
+    tensions, poses, turns, lengths, begun, ended = [], [], [], [], [], []
     for k, hold in enumerate(_holds(robot, wires, error, session, longest_step, near)):
         here, length = hold.here, hold.bare_m * (1 + hold.state.strain(wires).T)
         begun.append(hold.begun)
+        ended.append(here)
         solved &= here.found
         if session.read[k]:
             tensions.append(here.tension_N + bias * next(sign))
@@ -238,6 +249,7 @@ def predict(
     return Prediction(
         readings, length, strain, np.stack(poses, 1), np.stack(turns, 1),
         np.stack([b.position_m for b in begun], 1), np.stack([b.rotation for b in begun], 1),
+        np.stack([b.position_m for b in ended], 1), np.stack([b.rotation for b in ended], 1),
         np.stack(lengths, 1), solved,
     )  # fmt: skip
 

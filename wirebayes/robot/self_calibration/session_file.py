@@ -63,9 +63,10 @@ def read(
 ) -> tuple[Session, Floats]:
     """A session and its standardised readings ``(r,)``.
 
-    A row without tensions is a hold that was not read. With the columns ``normal_x,normal_y`` an inclinometer's
-    readings join in. Sensors that may be `biased` may read below zero, and directions of motion, ``motion_1`` and so
-    on, may be given for them only.
+    A row without tensions is a hold that was not read; one without a position is a hold at a pose that nobody knows,
+    and one without a rotation at an orientation that nobody knows: NaN in the session. With the columns
+    ``normal_x,normal_y`` an inclinometer's readings join in. Sensors that may be `biased` may read below zero, and
+    directions of motion, ``motion_1`` and so on, may be given for them only.
 
     Raises
     ------
@@ -163,12 +164,12 @@ def parse(
         raise InputError(
             f"{source}: {place(numbered[int(np.argmax(half)) + 1][0])}: found some readings empty; expected all or none"
         )
-    if not read_here.any():
-        raise InputError(f"{source}: found no row with tensions; expected at least one")
+    _refuse_half(source, place, numbered, table[:, 1:4], "the position")
+    _refuse_half(source, place, numbered, table[:, 4:7], "the rotation")
     turn = table[:, 4:7] if robot.degrees == 6 else np.tile(robot.home_rotation_rad, (len(table), 1))
     session = Session(
         table[:, 1:4],
-        matrix(turn),
+        np.where(np.isfinite(table[:, 1:4]).all(1)[:, None, None], matrix(turn), np.nan),
         joint,
         table[:, 7],
         read_here,
@@ -177,10 +178,22 @@ def parse(
         motion,
         table[:, 0],
     )
+    # without any tension read, what is left is for the calibration of the whole robot
     readings = [(tension[read_here] / tension_sd_N).ravel()]
     if tilted:
         readings.append((table[read_here][:, -2:] / tilt_sd_rad).ravel())
     return session, np.concatenate(readings)
+
+
+def _refuse_half(
+    source: str, place: Callable[[int], str], numbered: Sequence[tuple[int, list[str]]], cells: Floats, name: str
+) -> None:
+    """Refuse rows with some of three cells empty."""
+    given = np.isfinite(cells)
+    half = given.any(1) & ~given.all(1)
+    if half.any():
+        line = numbered[int(np.argmax(half)) + 1][0]
+        raise InputError(f"{source}: {place(line)}: found some cells of {name} empty; expected all or none")
 
 
 _LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
@@ -191,7 +204,7 @@ def _row(place: str, row: list[str], names: list[str], biased: bool) -> list[flo
         raise InputError(f"{place}: found {len(row)} cells; expected {len(names)}")
     out = []
     for name, cell in zip(names, row, strict=True):
-        optional = name.startswith(("tension_", "normal_"))
+        optional = name.startswith(("tension_", "normal_")) or name in POSE
         if optional and not cell.strip():
             out.append(np.nan)
             continue

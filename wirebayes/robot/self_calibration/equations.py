@@ -1,0 +1,344 @@
+"""What every hold of a session says of a robot and of its own pose and tensions, linearised.
+
+Of every hold: each wire's loop closes (stretched length = way from winch to platform), the platform is in balance,
+tensions, pose and tilt are what was read. Latent tensions keep these equations smooth: a slack wire has a negative one,
+pulls at nothing, and its gap follows Hooke's law.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration.session import Session
+from wirebayes.robot.self_calibration.strain import Grown, stretch
+from wirebayes.robot.self_calibration.unknowns import Parts, Unknowns
+from wirebayes.typing import Floats
+
+EXACT = 1e-8  # of the robot's span: what is exact is known this well, far below anything that matters
+FRICTIONLESS = 1e-5  # of the weight: balance holds this well
+
+
+@dataclass(frozen=True)
+class Holds:
+    """What the session states and reads, p holds.
+
+    Attributes
+    ----------
+    session : Session
+        Poses that nobody knows are NaN.
+    tension_N : (p, w) array
+        NaN where it was not read.
+    tilt : (p, 2) array or None
+        Components of the platform's normal, NaN where they were not read.
+    """
+
+    session: Session
+    tension_N: Floats
+    tilt: Floats | None = None
+
+    @property
+    def placed(self) -> NDArray[np.bool_]:
+        """(p,) Whether the hold's position is stated."""
+        return np.asarray(np.isfinite(self.session.position_m).all(1))
+
+    @property
+    def oriented(self) -> NDArray[np.bool_]:
+        """(p,) Whether the hold's orientation is stated."""
+        return np.asarray(np.isfinite(self.session.rotation).all((1, 2)))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations that the readings may have to tell.
+
+    Attributes
+    ----------
+    joint_m : float
+        Of a loop.
+    balance : float
+        Of the balance, over the weight.
+    pull_N : float
+        Of a tension that was not read, about `usual_N`.
+    usual_N : float
+    soft_N : float
+        Over which range of latent tensions a wire begins to pull: small beside all that is known of tensions, so that
+        a wire thought slack can still be found taut, and the other way round.
+    """
+
+    joint_m: float
+    balance: float
+    pull_N: float
+    usual_N: float
+    soft_N: float
+
+
+@dataclass(frozen=True)
+class State:
+    """A robot's unknowns in units of their prior, with the pose and the latent tensions at every hold's end."""
+
+    white: Floats
+    position_m: Floats
+    rotation: Floats
+    pull_N: Floats
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Residuals in standard deviations, k a hold, and their slopes.
+
+    Attributes
+    ----------
+    residual : (p, k) array
+    by_robot : (p, k, m) array
+    by_hold : (p, k, d + w) array
+        By a small motion (m, and rad times the robot's size) and the latent tensions, N.
+    rows : dict of str to slice
+        Which of the k are ``loop``, ``balance``, ``tension``, ``pose`` and ``tilt``.
+    known : (p, k) bool array
+        False where nothing was stated or read.
+    """
+
+    residual: Floats
+    by_robot: Floats
+    by_hold: Floats
+    rows: dict[str, slice]
+    known: NDArray[np.bool_]
+
+
+def scale(robot: Robot) -> Floats:
+    """(d,) what makes small motions of metres at the platform's edge."""
+    return np.where(np.arange(robot.degrees) < 3, 1.0, 1.0 / robot.size_m)
+
+
+def pulled(latent_N: Floats, soft_N: float) -> tuple[Floats, Floats]:
+    """What wires of latent tensions pull, N, and its slope: nothing when slack."""
+    around = np.hypot(latent_N, soft_N)
+    return 0.5 * (latent_N + around), 0.5 * (1 + latent_N / around)
+
+
+def moved(robot: Robot, parts: Parts) -> Robot:
+    """The robot with its exit and platform points where the unknowns say."""
+    changed = replace(robot, exit_m=parts.exit_m, platform_m=parts.platform_m)
+    # measures of length stay those of the file, so that units do not move with the unknowns
+    changed.__dict__.update(span_m=robot.span_m, size_m=robot.size_m)
+    return changed
+
+
+def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, since: State) -> Equations:
+    """The equations about a state.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    noise : Noise
+    state : State
+    creep : Grown
+        About `since`; straight from there.
+    since : State
+    """
+    robot, session = unknowns.robot, holds.session
+    parts = unknowns.parts(state.white)
+    here = moved(robot, parts)
+    p, w, d = len(session.duration_s), robot.legs, robot.degrees
+    rows = _rows(robot, holds)
+    k = max(part.stop for part in rows.values())
+    residual, known = np.zeros((p, k)), np.ones((p, k), bool)
+    by_robot, by_hold = np.zeros((p, k, unknowns.count)), np.zeros((p, k, d + w))
+
+    R = np.moveaxis(state.rotation, 0, -1)
+    shape = statics.geometry(here, state.position_m.T, R)
+    J = np.moveaxis(statics.jacobian(here, shape) * robot.lines[:, None], -1, 0).swapaxes(1, 2) * scale(robot)
+    out = Equations(residual, by_robot, by_hold, rows, known)
+    _loops(out, unknowns, holds, noise, state, creep, since, shape, J)
+    _balance(out, unknowns, noise, state, here, shape, J)
+    _tensions(rows["tension"], unknowns, holds, noise, state, residual, by_robot, by_hold)
+    _poses(rows["pose"], unknowns, holds, state, residual, by_hold, known)
+    if holds.tilt is not None:
+        _tilts(rows["tilt"], robot, holds, state, residual, by_hold, known)
+    return out
+
+
+def _loops(
+    out: Equations,
+    unknowns: Unknowns,
+    holds: Holds,
+    noise: Noise,
+    state: State,
+    creep: Grown,
+    since: State,
+    shape: statics.Geometry,
+    J: Floats,
+) -> None:
+    """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
+    robot, session, at = unknowns.robot, holds.session, unknowns.slices
+    parts, w, d = unknowns.parts(state.white), unknowns.robot.legs, unknowns.robot.degrees
+    residual, by_robot, by_hold = out.residual, out.by_robot, out.by_hold
+    u = np.moveaxis(shape.direction, -1, 0).swapaxes(1, 2) * robot.lines[:, None]  # (p, w, 3)
+    loop = out.rows["loop"]
+    bare, offset = inverse.lengths(robot, session.joint_m)
+    drawn = robot.ratio * session.joint_m * robot.is_linear + session.joint_m * ~robot.is_linear
+    bare = bare + parts.reference_m + parts.drum * drawn * ~robot.is_linear
+    offset = offset + parts.drum * drawn * robot.is_linear
+    elastic = stretch(unknowns, state.white, state.pull_N)
+    change = state.white[at["wires"]] - since.white[at["wires"]]
+    strain = creep.strain + creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N)
+    longer = (1 + strain) * elastic.ratio
+    residual[:, loop] = statics.stretched(robot, shape, offset.T).T - bare * longer
+    by_hold[:, loop, :d] = J
+    leg = np.arange(w)
+    by_hold[:, leg, d + leg] = -bare * (creep.by_pull * elastic.ratio + (1 + strain) * elastic.by_pull)
+    wires = by_robot[:, loop, at["wires"]]
+    wires -= bare[..., None] * (creep.by_wires * elastic.ratio[..., None] + (1 + strain)[..., None] * elastic.by_wires)
+    wires[:, leg, leg] -= longer * unknowns.prior.reference_sd_m
+    if unknowns.errors.drum > 0:
+        by_robot[:, leg, at["drum"].start + leg] = (
+            np.where(robot.is_linear, drawn, -drawn * longer) * unknowns.errors.drum
+        )
+    _points(by_robot[:, loop], unknowns, -u, np.einsum("pwi,pij->pwj", u, state.rotation))
+    for values in (residual, by_robot, by_hold):
+        values[:, loop] /= noise.joint_m
+
+
+def _balance(
+    out: Equations, unknowns: Unknowns, noise: Noise, state: State, here: Robot, shape: statics.Geometry, J: Floats
+) -> None:
+    """The wires carry the platform."""
+    robot, d = unknowns.robot, unknowns.robot.degrees
+    residual, by_robot, by_hold = out.residual, out.by_robot, out.by_hold
+    R = np.moveaxis(state.rotation, 0, -1)
+    balance = out.rows["balance"]
+    pull, taut = pulled(state.pull_N, noise.soft_N)
+    gradient, H = statics.unbalance_and_stiffness(here, shape, R, pull.T, np.zeros_like(pull.T))
+    force = noise.balance * robot.mass_kg * GRAVITY
+    residual[:, balance] = gradient.T * scale(robot) / force
+    by_hold[:, balance, :d] = np.moveaxis(H, -1, 0) * scale(robot) * scale(robot)[:, None] / force
+    by_hold[:, balance, d:] = J.swapaxes(1, 2) * taut[:, None] / force
+    by_exit, by_platform = _swing(here, shape, state.rotation, pull)
+    _points(by_robot[:, balance], unknowns, by_exit * scale(robot)[:, None, None] / force,
+            by_platform * scale(robot)[:, None, None] / force)  # fmt: skip
+
+
+def _rows(robot: Robot, holds: Holds) -> dict[str, slice]:
+    counts = {"loop": robot.legs, "balance": robot.degrees, "tension": robot.legs, "pose": robot.degrees}
+    if holds.tilt is not None:
+        counts["tilt"] = 2
+    ends = np.cumsum(list(counts.values()))
+    return {name: slice(int(end) - count, int(end)) for (name, count), end in zip(counts.items(), ends, strict=True)}
+
+
+def _points(out: Floats, unknowns: Unknowns, by_exit: Floats, by_platform: Floats) -> None:
+    """Slopes by exit and platform points, where these are unknown.
+
+    `by_exit` and `by_platform` are ``(p, w, 3)`` of equations that speak of one leg each, or ``(p, d, w, 3)``.
+    """
+    for name, slope, sd in (
+        ("exit", by_exit, unknowns.errors.exit_m), ("platform", by_platform, unknowns.errors.platform_m)
+    ):  # fmt: skip
+        at = unknowns.slices[name]
+        if at.stop == at.start:
+            continue
+        if slope.ndim == 3:
+            leg = np.arange(slope.shape[1])
+            for axis in range(3):
+                out[:, leg, at.start + 3 * leg + axis] = slope[..., axis] * sd
+        else:
+            out[:, :, at] = slope.reshape(*slope.shape[:2], -1) * sd
+
+
+def _swing(robot: Robot, shape: statics.Geometry, rotation: Floats, pull: Floats) -> tuple[Floats, Floats]:
+    """How the wires' pull on the platform changes when a point moves: ``(p, d, w, 3)`` by exit and platform points."""
+    tau = (pull * robot.lines).T  # (w, p)
+    u, r = np.moveaxis(shape.direction, -1, 0), np.moveaxis(shape.arm_m, -1, 0)  # (p, 3, w)
+    turn = (tau / shape.straight_m).T[..., None, None] * np.eye(3)
+    turn = turn - np.einsum("wp,piw,pjw->pwij", tau / shape.straight_m, u, u)
+    if shape.over is not None:
+        side = np.moveaxis(shape.over.across, -1, 0)
+        turn = turn + np.einsum("wp,piw,pjw->pwij", tau * shape.over.swing_1_m, side, side)
+    by_line = np.moveaxis(turn, 1, 2)  # (p, 3, w, 3)
+    by_arm = np.zeros_like(by_line)
+    if robot.degrees == 6:
+        crossed = turns.cross_matrix(np.swapaxes(r, 1, 2))  # (p, w, 3, 3)
+        by_line = np.concatenate([by_line, np.moveaxis(crossed @ turn, 1, 2)], 1)
+        pulls = turns.cross_matrix(np.swapaxes(u, 1, 2) * tau.T[..., None])
+        by_arm = np.concatenate([by_arm, np.moveaxis(-pulls, 1, 2)], 1)
+    by_platform = np.einsum("pdwi,pij->pdwj", by_line + by_arm, rotation)
+    return -by_line, by_platform
+
+
+def _tensions(
+    rows: slice,
+    unknowns: Unknowns,
+    holds: Holds,
+    noise: Noise,
+    state: State,
+    residual: Floats,
+    by_robot: Floats,
+    by_hold: Floats,
+) -> None:
+    """Tensions that were read, and what is usual where none was."""
+    robot, session = unknowns.robot, holds.session
+    w, d = robot.legs, robot.degrees
+    read = np.isfinite(holds.tension_N)
+    sign = np.ones_like(session.joint_m) if session.motion is None else session.motion
+    parts = unknowns.parts(state.white)
+    pull, taut = pulled(state.pull_N, noise.soft_N)
+    off = (pull + sign * parts.bias_N - holds.tension_N) / session.tension_sd_N
+    usual = (state.pull_N - noise.usual_N) / noise.pull_N
+    residual[:, rows] = np.where(read, off, usual)
+    leg = np.arange(w)
+    by_hold[:, rows.start + leg, d + leg] = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
+    if unknowns.prior.bias_sd_N > 0:
+        bias = unknowns.count - w + leg
+        by_robot[:, rows.start + leg, bias] = np.where(
+            read, sign * unknowns.prior.bias_sd_N / session.tension_sd_N, 0.0
+        )
+
+
+def _poses(
+    rows: slice,
+    unknowns: Unknowns,
+    holds: Holds,
+    state: State,
+    residual: Floats,
+    by_hold: Floats,
+    known: NDArray[np.bool_],
+) -> None:
+    """Poses that were stated."""
+    robot, session = unknowns.robot, holds.session
+    sd = max(unknowns.errors.pose_m, EXACT * robot.span_m)
+    known[:, rows][:, :3] = holds.placed[:, None]
+    residual[:, rows][:, :3] = np.where(holds.placed[:, None], state.position_m - session.position_m, 0.0) / sd
+    by_hold[:, rows, : robot.degrees] = known[:, rows, None] * np.eye(robot.degrees) / sd
+    if robot.degrees == 6:
+        there = np.where(holds.oriented[:, None, None], session.rotation, state.rotation)
+        turned = turns.vector(state.rotation @ np.swapaxes(there, 1, 2))
+        known[:, rows][:, 3:] = holds.oriented[:, None]
+        residual[:, rows][:, 3:] = turned * robot.size_m / sd
+        by_hold[:, rows, :6] = known[:, rows, None] * np.eye(6) / sd
+
+
+def _tilts(
+    rows: slice,
+    robot: Robot,
+    holds: Holds,
+    state: State,
+    residual: Floats,
+    by_hold: Floats,
+    known: NDArray[np.bool_],
+) -> None:
+    """Components of the platform's normal that an inclinometer read."""
+    sd = holds.session.tilt_sd_rad
+    if holds.tilt is None or sd is None:
+        return
+    known[:, rows] = np.isfinite(holds.tilt)
+    normal = state.rotation[:, :, 2]
+    residual[:, rows] = np.where(known[:, rows], normal[:, :2] - holds.tilt, 0.0) / sd
+    if robot.degrees == 6:
+        slope = -turns.cross_matrix(normal)[:, :2] / robot.size_m
+        by_hold[:, rows, 3:6] = known[:, rows, None] * slope / sd

@@ -1,0 +1,118 @@
+"""Starts for the calibration of a whole robot: poses from lengths, as far as these tell them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.linear_algebra import solve
+from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration.equations import Holds, State, moved, scale
+from wirebayes.robot.self_calibration.strain import stretch
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.robot.self_calibration.unknowns import Unknowns
+from wirebayes.robot.self_calibration.whole import Whole, estimate, trust
+from wirebayes.typing import Floats
+
+_TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
+_OTHERS = 2  # further starts, where the first does not explain the readings
+
+
+def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: np.random.Generator) -> State:
+    """A state about a robot's unknowns: stated poses where there are some, else those that close the loops best.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    white : (m,) array
+    rng : numpy Generator
+        Draws the places that the search begins from.
+    """
+    robot, session = unknowns.robot, holds.session
+    p = len(session.duration_s)
+    read = np.where(np.isfinite(holds.tension_N), holds.tension_N, robot.rule.lowest_N)
+    pull = np.maximum(read, 1e-3 * robot.rule.lowest_N)
+    position = np.where(holds.placed[:, None], session.position_m, robot.home_m)
+    home = turns.matrix(robot.home_rotation_rad)
+    turn = np.where(holds.oriented[:, None, None], session.rotation, home)
+    lost = np.flatnonzero(~holds.placed | (~holds.oriented & (robot.degrees == 6)))
+    if len(lost):
+        ratio = stretch(unknowns, white, pull).ratio
+        position[lost], turn[lost] = _located(unknowns, holds, white, ratio, lost, position, turn, rng)
+    return State(np.array(white), position, turn, np.array(pull, float).reshape(p, robot.legs))
+
+
+def _located(
+    unknowns: Unknowns,
+    holds: Holds,
+    white: Floats,
+    ratio: Floats,
+    lost: NDArray[np.intp],
+    position: Floats,
+    turn: Floats,
+    rng: np.random.Generator,
+) -> tuple[Floats, Floats]:
+    """Poses ``(l, 3)``, ``(l, 3, 3)`` of holds that close the loops best, of many trials each."""
+    parts = unknowns.parts(white)
+    robot = moved(unknowns.robot, parts)
+    joint = holds.session.joint_m[lost]
+    bare, offset = inverse.lengths(robot, joint)
+    goal = np.repeat((bare + parts.reference_m) * ratio[lost], _TRIALS, 0)
+    offset = np.repeat(offset, _TRIALS, 0)
+    middle, half = 0.5 * (robot.lower_m + robot.upper_m), 0.5 * (robot.upper_m - robot.lower_m)
+    half = np.maximum(half, 0.05 * robot.span_m)
+    x = middle + 1.2 * half * rng.uniform(-1, 1, (len(goal), 3))
+    stated = np.repeat(holds.placed[lost], _TRIALS)
+    x = np.where(stated[:, None], np.repeat(position[lost], _TRIALS, 0), x)
+    R = np.moveaxis(np.repeat(turn[lost], _TRIALS, 0), 0, -1)
+    x = x.T
+    d, reach = robot.degrees, 10 * half  # a weak pull towards the workspace and the home orientation
+    weak = 1e-2
+    home = turns.matrix(robot.home_rotation_rad)
+    for _ in range(_STEPS):
+        shape = statics.geometry(robot, x, R)
+        gap = statics.stretched(robot, shape, offset.T).T - goal
+        J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0).swapaxes(1, 2) * scale(robot)
+        toward = np.zeros((len(gap), d))
+        toward[:, :3] = (x.T - middle) * (robot.span_m / reach)
+        pull = np.zeros(d)
+        pull[:3] = robot.span_m / reach
+        if d == 6:
+            toward[:, 3:] = turns.vector(np.moveaxis(R, -1, 0) @ home.T) * robot.size_m
+            pull[3:] = 1.0
+        A = J.swapaxes(1, 2) @ J + weak**2 * np.diag(pull**2)
+        b = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + weak**2 * pull * toward
+        step = -solve(A, b[..., None])[..., 0]
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        step = step * np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300)) * scale(robot)
+        x = x + np.where(stated[:, None], 0.0, step[:, :3]).T
+        if d == 6:
+            R = turns.compose(step[:, 3:].T, R)
+    shape = statics.geometry(robot, x, R)
+    gap = statics.stretched(robot, shape, offset.T).T - goal
+    out = np.maximum(np.abs(x.T - middle) - 1.2 * half, 0.0)
+    bad = np.nan_to_num((gap**2).sum(1) + (out**2).sum(1), nan=np.inf).reshape(len(lost), _TRIALS)
+    best = np.arange(len(lost)) * _TRIALS + bad.argmin(1)
+    return x.T[best], np.moveaxis(R, -1, 0)[best]
+
+
+def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
+    """The posterior from the likeliest of several starts: about the file's geometry, and about others near it.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    rng : numpy Generator
+    """
+    found = estimate(unknowns, holds, seed(unknowns, holds, np.zeros(unknowns.count), rng))
+    for _ in range(_OTHERS):
+        if found.converged and trust(found) >= SIGNIFICANT:
+            break
+        white = np.zeros(unknowns.count)
+        white[: unknowns.slices["drum"].start] = 0.5 * rng.standard_normal(unknowns.slices["drum"].start)
+        other = estimate(unknowns, holds, seed(unknowns, holds, white, rng))
+        if other.converged > found.converged or other.evidence > found.evidence:
+            found = other
+    return found

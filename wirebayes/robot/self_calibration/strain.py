@@ -1,0 +1,162 @@
+"""How much longer than its zero-tension length before creep a wire of known tension is: creep, then stretch.
+
+Creep follows the tensions of the whole session. Within a hold with fixed joint values it lengthens the wires and so
+lowers their tensions; the equilibrium's response says by how much.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wirebayes.robot.mechanics.wires import Wires, stretched_length
+from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.self_calibration.unknowns import Unknowns
+from wirebayes.typing import Floats
+
+_STEP = 1e-3  # of a prior's standard deviation: differences of smooth functions
+_LOAD = 1e-2  # relative change of all tensions
+_SHARES = np.array([1e-3, 1e-2, 1e-1, 1.0])  # of a hold's duration
+
+
+@dataclass(frozen=True)
+class Grown:
+    """Creep strains at the end of every hold, with slopes.
+
+    Attributes
+    ----------
+    strain : (p, w) array
+    by_wires : (p, w, d) array
+        By the wires' unknowns in units of their prior.
+    by_pull : (p, w) array
+        By the hold's tension, 1/N.
+    """
+
+    strain: Floats
+    by_wires: Floats
+    by_pull: Floats
+
+
+def differing_wires(unknowns: Unknowns, white: Floats) -> Wires:
+    """Wires at a vector of unknowns, then with each of their unknowns a little up, then down.
+
+    A specimen's own parameters belong to its leg alone, so those of all legs change at once: a column for each of
+    their names.
+    """
+    mean, root = unknowns.moments
+    at = white[unknowns.slices["wires"]]
+    moves = _STEP * np.concatenate([np.zeros((1, len(mean))), _directions(unknowns), -_directions(unknowns)])
+    return unknowns.prior.wires(unknowns.robot, mean + (at + moves) @ root.T)[0]
+
+
+def _directions(unknowns: Unknowns) -> Floats:
+    """(c, d) which unknowns each column of `differing_wires` changes."""
+    legs, prior = unknowns.robot.legs, unknowns.prior
+    p, own = len(prior.names), len(prior.own)
+    out = np.zeros((p + own, len(unknowns.moments[0])))
+    out[np.arange(p), legs + np.arange(p)] = 1.0
+    for k in range(own):
+        first = legs + p + k * legs
+        out[p + k, first : first + legs] = 1.0
+    return out
+
+
+def by_unknown(unknowns: Unknowns, values: Floats) -> Floats:
+    """Slopes ``(p, w, d)`` of values ``(p, w, 1 + 2 c)`` at the columns of `differing_wires`."""
+    legs, p = unknowns.robot.legs, len(unknowns.prior.names)
+    c = (values.shape[2] - 1) // 2
+    slope = (values[..., 1 : 1 + c] - values[..., 1 + c :]) / (2 * _STEP)
+    out = np.zeros((*values.shape[:2], len(unknowns.moments[0])))
+    out[..., legs : legs + p] = slope[..., :p]
+    leg = np.arange(legs)
+    for k in range(c - p):
+        out[:, leg, legs + p + k * legs + leg] = slope[..., p + k]
+    return out
+
+
+def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, response_N: Floats, duration_s: Floats) -> Grown:
+    """Creep of every hold under tensions that ended at known values.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    white : (m,) array
+    pull_N : (p, w) array
+        Tensions when the holds ended; negative ones are slack.
+    response_N : (p, w, w) array
+        Change of the tensions when wires lengthen by a strain, at fixed joint values.
+    duration_s : (p,) array
+    """
+    wires = differing_wires(unknowns, white)
+    columns = _count(wires)
+    if not unknowns.prior.creeps:
+        strain = np.zeros((*pull_N.shape, columns))
+        return Grown(strain[..., 0], by_unknown(unknowns, strain), strain[..., 0])
+    # two more columns: all tensions a little larger, and smaller
+    more = wires.part(np.concatenate([np.arange(columns), [0, 0]]))
+    factor = np.ones(columns + 2)
+    factor[-2:] = 1 + _LOAD, 1 - _LOAD
+    strain = _through(more, pull_N, factor, response_N, duration_s)
+    slope = (strain[..., -2] - strain[..., -1]) / (2 * _LOAD * np.maximum(pull_N, 1e-300))
+    taut = pull_N > 0
+    return Grown(strain[..., 0], by_unknown(unknowns, strain[..., :-2]), np.where(taut, slope, 0.0))
+
+
+def _count(wires: Wires) -> int:
+    return max(np.shape(v)[-1] for v in wires.theta.values())
+
+
+def _through(wires: Wires, pull_N: Floats, factor: Floats, response_N: Floats, duration_s: Floats) -> Floats:
+    """Creep strains ``(p, w, n)`` at the end of every hold, for n wires under tensions times a factor."""
+    state = fresh(pull_N.shape[1], len(factor))
+    out = []
+    for k, duration in enumerate(duration_s):
+        end = np.maximum(pull_N[k, :, None] * factor, 0.0)
+        times = duration * _SHARES
+        path = [end] * len(times)
+        for _ in range(2):  # first under the last tension, then under those that creep leads to it by
+            creep = HoldCreep(wires, state, path[0])
+            states = [creep.advance(float(time), tension) for time, tension in zip(times, path, strict=True)]
+            ahead = [s.strain(wires) - states[-1].strain(wires) for s in [state, *states[:-1]]]
+            path = [np.maximum(end + response_N[k] @ a, 0.0) for a in ahead]
+        state = states[-1]
+        out.append(state.strain(wires))
+    return np.stack(out)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Stretched over zero-tension length, ``(p, w)``, with slopes by tension (1/N) and by the wires' unknowns."""
+
+    ratio: Floats
+    by_pull: Floats
+    by_wires: Floats
+
+
+def stretch(unknowns: Unknowns, white: Floats, pull_N: Floats) -> Stretch:
+    """Elastic stretch of wires under tensions ``(p, w)``; a slack wire's gap is a negative tension by Hooke's law.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    white : (m,) array
+    pull_N : (p, w) array
+        Latent tensions.
+    """
+    wires = differing_wires(unknowns, white)
+    p, legs = pull_N.shape
+    columns = _count(wires)
+    step = 1e-4 * np.abs(pull_N).max() + 1e-9
+    values = []
+    for tensions in (pull_N, pull_N + step):
+        taut = np.maximum(tensions, 0.0).T
+        load = np.repeat(taut[:, None], columns, 1).reshape(legs, columns * p)  # column by column, hold by hold
+        each = wires.part(np.repeat(np.arange(columns), p))
+        long = stretched_length(each, np.ones_like(load), load)
+        gap = np.minimum(tensions, 0.0).T[:, None] / _k1(wires, columns, legs)[..., None]
+        values.append(np.moveaxis(long.reshape(legs, columns, p) + gap, -1, 0))
+    here, up = values
+    return Stretch(here[..., 0], (up[..., 0] - here[..., 0]) / step, by_unknown(unknowns, here))
+
+
+def _k1(wires: Wires, columns: int, legs: int) -> Floats:
+    return np.broadcast_to(wires.theta["k1"], (legs, columns))

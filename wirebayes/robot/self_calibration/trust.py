@@ -1,0 +1,64 @@
+"""Whether a calibration's residuals, and its estimates against their priors, are as large as they should be."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from wirebayes.json_files.calibrate import Interval
+from wirebayes.linear_algebra import solve
+from wirebayes.notice import Notice
+from wirebayes.typing import Floats
+
+# Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
+# lengths that are wrong cost a crash.
+SIGNIFICANT = 0.01
+_UNLEARNT = 1e-6  # of a prior's variance: of a length of which the readings say less, there is nothing to be tested
+
+
+def joint_test(cost: Floats, count: int, white: Floats, spread: Floats, count_alone: int) -> Floats:
+    """Probability ``(m,)`` of readings and estimates that contradict model and priors at least as much.
+
+    Under the model the least sum of squares, residuals and unknowns in units of their errors, is chi-squared with as
+    many degrees of freedom as there are readings. Geometry that is wrong, but held exact, often hides in the reference
+    lengths, which are few among them all; so those are tested alone too: the covariance of their estimates is what the
+    readings took off that of their prior. The smaller of both probabilities counts, times two.
+
+    Parameters
+    ----------
+    cost : (m,) array
+        Sum of squares at the mode.
+    count : int
+        Number of readings.
+    white : (m, d) array
+        Mode in units of the prior, references first.
+    spread : (m, d, d) array
+        Posterior covariance in these units.
+    count_alone : int
+        Number of first unknowns that are tested alone too.
+    """
+    reference = white[:, :count_alone, None]
+    learnt = (1.0 + _UNLEARNT) * np.eye(count_alone) - spread[:, :count_alone, :count_alone]
+    moved = (reference * solve(learnt, reference)).sum((1, 2))
+    least = np.minimum(chi2.sf(cost, count), chi2.sf(moved, count_alone))
+    return np.asarray(np.minimum(1.0, 2.0 * least))
+
+
+def unlikely(p: float) -> Notice:
+    """What to say of a calibration that did not pass."""
+    return Notice(
+        "misfit",
+        f"readings and model do not belong together (p = {p:.2g}): something that is taken as exact, or a stated "
+        "error, is wrong; do not use these values",
+    )
+
+
+def interval(moment: tuple[Floats, Floats], half: float) -> Interval:
+    """Mean, standard deviation and an interval of `half` standard deviations to either side.
+
+    Parameters
+    ----------
+    moment : pair of arrays
+        Mean and standard deviation.
+    half : float
+    """
+    mean, sd = moment
+    return {"mean": mean, "sd": sd, "q05": mean - half * sd, "q95": mean + half * sd}

@@ -1,0 +1,130 @@
+"""The unknowns of a whole robot: exit points, platform points, reference lengths, wires and sensors, in one vector.
+
+All are kept in units of what was known before: the prior of the vector is standard normal.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.typing import Floats
+
+
+@dataclass(frozen=True)
+class StatedErrors:
+    """Standard deviations of what a robot's file and a session state; 0 is exact.
+
+    Attributes
+    ----------
+    exit_m, platform_m : float
+        Of every coordinate of an exit point, of a platform point.
+    pose_m : float
+        Of every coordinate of a stated pose; its rotation is as uncertain at the platform's edge.
+    joint_m : float or None
+        Of a joint value, as a length; None: estimated from the readings.
+    drum : float
+        Relative, of the radius of every drum.
+    """
+
+    exit_m: float = 0.0
+    platform_m: float = 0.0
+    pose_m: float = 0.0
+    joint_m: float | None = None
+    drum: float = 0.0
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Physical values of one vector of unknowns.
+
+    Attributes
+    ----------
+    exit_m, platform_m : (w, 3) arrays
+    reference_m : (w,) array
+        What the zero-tension lengths before creep are beyond what the joint values say.
+    bias_N : (w,) array
+    drum : (w,) array
+        Relative error of every drum's radius.
+    wires : (d,) array
+        A row of unknowns as `Prior.wires` takes it.
+    """
+
+    exit_m: Floats
+    platform_m: Floats
+    reference_m: Floats
+    bias_N: Floats
+    drum: Floats
+    wires: Floats
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Where each unknown stands in the vector, and its scale.
+
+    Attributes
+    ----------
+    robot : Robot
+        As its file says: the mean of the geometry's prior.
+    prior : Prior
+        Of reference lengths, wires and sensors.
+    errors : StatedErrors
+    """
+
+    robot: Robot
+    prior: Prior
+    errors: StatedErrors
+
+    @cached_property
+    def moments(self) -> tuple[Floats, Floats]:
+        """Mean ``(d,)`` of references, wires and sensors, and a factor ``(d, d)`` of their covariance."""
+        mean, covariance = self.prior.moments(self.robot.legs)
+        return mean, np.asarray(np.linalg.cholesky(covariance), np.float64)
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where exit points, platform points, drums and the rest (``wires``) stand; empty slices for what is exact."""
+        legs = self.robot.legs
+        counts = {
+            "exit": 3 * legs if self.errors.exit_m > 0 else 0,
+            "platform": 3 * legs if self.errors.platform_m > 0 else 0,
+            "drum": legs if self.errors.drum > 0 else 0,
+            "wires": len(self.moments[0]),
+        }
+        ends = np.cumsum(list(counts.values()))
+        return {
+            name: slice(int(end) - count, int(end)) for (name, count), end in zip(counts.items(), ends, strict=True)
+        }
+
+    @property
+    def count(self) -> int:
+        """Length of the vector."""
+        return self.slices["wires"].stop
+
+    @property
+    def references(self) -> slice:
+        """Where the reference errors stand."""
+        first = self.slices["wires"].start
+        return slice(first, first + self.robot.legs)
+
+    def parts(self, white: Floats) -> Parts:
+        """Physical values of a vector ``(m,)``."""
+        at, legs = self.slices, self.robot.legs
+        mean, root = self.moments
+        wires = mean + root @ white[at["wires"]]
+
+        def moved(name: str, points: Floats, sd: float) -> Floats:
+            part = white[at[name]]
+            return points + sd * part.reshape(-1, 3) if len(part) else points
+
+        drum = white[at["drum"]]
+        return Parts(
+            moved("exit", self.robot.exit_m, self.errors.exit_m),
+            moved("platform", self.robot.platform_m, self.errors.platform_m),
+            wires[:legs],
+            self.prior.bias_N(legs, wires[None])[0],
+            self.errors.drum * drum if len(drum) else np.zeros(legs),
+            wires,
+        )

@@ -1,0 +1,422 @@
+"""Calibration of the whole robot: the posterior of its unknowns and of every hold's pose, about their mode.
+
+Levenberg-Marquardt over robot and holds together, the holds eliminated one by one. A wide error of the loops at first,
+then ever smaller ones, lead from rough geometry to the mode.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from wirebayes.linear_algebra import inv, solve
+from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration.equations import (
+    EXACT,
+    FRICTIONLESS,
+    Equations,
+    Holds,
+    Noise,
+    State,
+    linearised,
+    moved,
+    scale,
+)
+from wirebayes.robot.self_calibration.strain import Grown, grown
+from wirebayes.robot.self_calibration.trust import joint_test
+from wirebayes.robot.self_calibration.unknowns import Unknowns
+from wirebayes.typing import Floats
+
+_FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
+_ROUNDS = 25  # of noise and creep
+_AHEAD = 1.7  # times the logarithmic step of a noise: alone it creeps towards where it ends
+_STEPS = 12  # of a descent: noise and creep change before more are worth it
+_EASINGS = 16  # quarterings that lead from a tenth of the span to a micrometre
+_ESTIMATED = ("joint_m", "balance", "pull_N")  # of the noise: no other part of it changes
+_LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of freedom
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Posterior of a robot and its session.
+
+    Attributes
+    ----------
+    unknowns : Unknowns
+    state : State
+        The mode.
+    covariance : (m, m) array
+        Of the robot's unknowns, in units of their prior.
+    by_robot : (p, d + w, m) array
+        How a hold's motion and tensions follow the robot's unknowns.
+    hold_covariance : (p, d + w, d + w) array
+        Of a hold's small motion (metres at the platform's edge) and its tensions.
+    equations : Equations
+        At the mode.
+    noise : Noise
+    degrees : float
+        Degrees of freedom that the error of the loops was estimated from; infinite where it was given.
+    creep : Grown
+    converged : bool
+    cost : float
+        Sum of squares, the prior's included.
+    last_m : (w,) array
+        Lengths that the last joint values stand for, without reference errors.
+    """
+
+    unknowns: Unknowns
+    state: State
+    covariance: Floats
+    by_robot: Floats
+    hold_covariance: Floats
+    equations: Equations
+    noise: Noise
+    degrees: float
+    creep: Grown
+    converged: bool
+    cost: float
+    last_m: Floats
+
+    @property
+    def quantile(self) -> float:
+        """Half width of a 90 % interval in standard deviations."""
+        return float(student.ppf(0.95, self.degrees))
+
+    @property
+    def evidence(self) -> float:
+        """What modes from different starts are compared by: log density, their estimated noise included."""
+        e = self.equations
+        noise = e.residual[:, e.rows["loop"]].size * np.log(self.noise.joint_m)
+        noise += e.residual[:, e.rows["balance"]].size * np.log(self.noise.balance)
+        return float(-0.5 * self.cost - noise)
+
+
+@dataclass(frozen=True)
+class _Normal:
+    """Normal equations with the holds eliminated."""
+
+    by_robot: Floats
+    alone: Floats
+    inverse: Floats
+    matrix: Floats
+    slope: Floats
+
+
+def _eliminated(e: Equations, white: Floats, damping: float) -> _Normal:
+    z, g, r = e.by_hold, e.by_robot, e.residual[..., None]
+    zt = z.swapaxes(1, 2)
+    A = zt @ z
+    diagonal = np.einsum("pii->pi", A)
+    A = A + (damping + 1e-13) * diagonal[:, None] * np.eye(A.shape[1])
+    inverse_ = inv(A)
+    B = zt @ g
+    by_robot = -inverse_ @ B
+    alone = -inverse_ @ (zt @ r)
+    gt = g.swapaxes(1, 2)
+    left = (gt @ g + B.swapaxes(1, 2) @ by_robot).sum(0)
+    right = (gt @ r + B.swapaxes(1, 2) @ alone).sum(0)[:, 0]
+    m = len(white)
+    matrix = left + (1.0 + damping) * np.eye(m) + damping * np.diag(np.einsum("pki,pki->i", g, g))
+    return _Normal(by_robot, alone[..., 0], inverse_, matrix, right + white)
+
+
+def _cost(e: Equations, white: Floats) -> float:
+    value = float((e.residual**2).sum() + white @ white)
+    return value if np.isfinite(value) else np.inf
+
+
+def _stepped(robot: Robot, state: State, change: Floats, hold: Floats) -> State:
+    d = robot.degrees
+    motion = hold[:, :d] * scale(robot)
+    turn = state.rotation
+    if d == 6:
+        turn = np.moveaxis(turns.compose(motion[:, 3:].T, np.moveaxis(turn, 0, -1)), -1, 0)
+    return State(state.white + change, state.position_m + motion[:, :3], turn, state.pull_N + hold[:, d:])
+
+
+@dataclass(frozen=True)
+class Descent:
+    """Where Levenberg-Marquardt ended, the equations and the sum of squares there, and whether it had come down."""
+
+    state: State
+    equations: Equations
+    cost: float
+    converged: bool
+
+
+def descend(
+    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, since: State, steps: int = _STEPS
+) -> Descent:
+    """Levenberg-Marquardt for one noise and one creep.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    noise : Noise
+    state : State
+        Where to start.
+    creep : Grown
+        About the state `since`.
+    since : State
+    steps : int
+        At most.
+    """
+    damping = 1e-6
+    equations = linearised(unknowns, holds, noise, state, creep, since)
+    cost = _cost(equations, state.white)
+    for _ in range(steps):
+        normal = _eliminated(equations, state.white, damping)
+        change = -solve(normal.matrix, normal.slope[:, None])[:, 0]
+        hold = normal.alone + normal.by_robot @ change
+        there = _stepped(unknowns.robot, state, change, hold)
+        ahead = linearised(unknowns, holds, noise, there, creep, since)
+        new = _cost(ahead, there.white)
+        if new < cost:
+            gain = cost - new
+            state, equations, cost = there, ahead, new
+            damping = max(damping / 10, 1e-12)
+            if gain < 1e-4 + 1e-9 * cost:
+                return Descent(state, equations, cost, True)
+        else:
+            damping = max(damping * 10, 1e-9)
+            if damping > 1e6:
+                return Descent(state, equations, cost, True)
+    return Descent(state, equations, cost, False)
+
+
+def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
+    """The posterior next to a start.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    state : State
+        A rough guess.
+    """
+    robot, stated = unknowns.robot, unknowns.errors.joint_m
+    target = _FLOOR * robot.span_m if stated is None else max(stated, EXACT * robot.span_m)
+    low, high = robot.rule.lowest_N, robot.rule.highest_N
+    usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
+    noise = Noise(target, FRICTIONLESS, 0.25 * (high - low), usual, 0.03 * min(holds.session.tension_sd_N, low))
+    since, creep = state, _creep(unknowns, holds, state)
+    unread = ~np.isfinite(holds.tension_N)
+
+    state = _from_rough(unknowns, holds, noise, state, creep)
+    noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
+    if stated is None:
+        noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
+    for _ in range(_ROUNDS):
+        since, creep = state, _creep(unknowns, holds, state)
+        down = descend(unknowns, holds, noise, state, creep, since, _STEPS)
+        state = down.state
+        last = inverse.lengths(robot, holds.session.joint_m[-1])[0]
+        found = _posterior(unknowns, down, noise, creep, last)
+        before = noise
+        noise, degrees = _estimated(found, unread, noise, high - low)
+        found = replace(found, degrees=degrees)
+        moved_on = np.abs(state.white - since.white).max() if len(state.white) else 0.0
+        settled = max(abs(np.log(getattr(noise, name) / getattr(before, name))) for name in _ESTIMATED) < 0.02
+        if settled and moved_on < 1e-2:
+            break
+    return found
+
+
+def _creep(unknowns: Unknowns, holds: Holds, state: State) -> Grown:
+    """Creep under the tensions of a state."""
+    response = _response(unknowns, holds, state)
+    return grown(unknowns, state.white, state.pull_N, response, holds.session.duration_s)
+
+
+def _response(unknowns: Unknowns, holds: Holds, state: State) -> Floats:
+    """(p, w, w) change of the tensions with a strain of the wires."""
+    parts = unknowns.parts(state.white)
+    robot = moved(unknowns.robot, parts)
+    wires = unknowns.prior.wires(unknowns.robot, parts.wires[None])[0]
+    bare, offset = inverse.lengths(robot, holds.session.joint_m)
+    stretched = _way(robot, state, offset)
+    zero = stretched / (1 + np.maximum(state.pull_N, 0.0) / wires.theta["k1"].T)
+    change = observability.sensitivity(robot, wires, state.position_m, state.rotation, zero, offset)[1]
+    answer = change * zero[:, None]
+    # beyond these, a state is no equilibrium yet
+    usual = np.abs(answer).max((1, 2)) <= 2 * np.max(wires.theta["k1"])
+    return np.where(usual[:, None, None] & np.isfinite(answer).all((1, 2), keepdims=True), answer, 0.0)
+
+
+def _way(robot: Robot, state: State, offset: Floats) -> Floats:
+    shape = statics.geometry(robot, state.position_m.T, np.moveaxis(state.rotation, 0, -1))
+    return statics.stretched(robot, shape, offset.T).T
+
+
+def _posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, last_m: Floats) -> Whole:
+    state, e, cost = down.state, down.equations, down.cost
+    normal = _eliminated(e, state.white, 0.0)
+    covariance = inv(normal.matrix)
+    by_robot = normal.by_robot
+    hold = normal.inverse + by_robot @ covariance @ by_robot.swapaxes(1, 2)
+    good = down.converged and bool(np.isfinite(covariance).all() and np.isfinite(cost))
+    return Whole(unknowns, state, covariance, by_robot, hold, e, noise, np.inf, creep, good, cost, last_m)
+
+
+def _leverage(found: Whole, rows: slice) -> Floats:
+    """(p, r) share of each residual's variance that the unknowns take up."""
+    z, g = found.equations.by_hold[:, rows], found.equations.by_robot[:, rows]
+    total = g + z @ found.by_robot
+    alone = found.hold_covariance - found.by_robot @ found.covariance @ found.by_robot.swapaxes(1, 2)
+    own = np.einsum("pri,pij,prj->pr", z, alone, z)
+    return own + np.einsum("pri,ij,prj->pr", total, found.covariance, total)
+
+
+def _estimated(found: Whole, unread: NDArray[np.bool_], noise: Noise, span_N: float) -> tuple[Noise, float]:
+    """Noise that the residuals show, and the degrees of freedom that the error of the loops rests on."""
+    e, robot, stated = found.equations, found.unknowns.robot, found.unknowns.errors.joint_m
+
+    def shown(rows: str, which: NDArray[np.bool_], sd: float, usual: float) -> tuple[float, float]:
+        """Restricted maximum likelihood, with `usual` worth one degree of freedom."""
+        left = (1.0 - _leverage(found, e.rows[rows]))[which]
+        squares = float((e.residual[:, e.rows[rows]][which] ** 2).sum()) * sd**2
+        free = float(np.maximum(left, 0.0).sum()) + _LEAST_DEGREES
+        return float(np.sqrt((squares + _LEAST_DEGREES * usual**2) / free)), free
+
+    def all_of(rows: str) -> NDArray[np.bool_]:
+        return np.ones_like(e.residual[:, e.rows[rows]], bool)
+
+    floor = _FLOOR * robot.span_m
+    balance, _ = shown("balance", all_of("balance"), noise.balance, FRICTIONLESS)
+    joint, degrees = shown("loop", all_of("loop"), noise.joint_m, floor) if stated is None else (noise.joint_m, np.inf)
+    pull = noise.pull_N
+    if unread.any():
+        pull, free = shown("tension", unread, noise.pull_N, 0.25 * span_N)
+        degrees += free
+
+    def ahead(old: float, new: float, low: float, high: float) -> float:
+        return float(np.clip(old * (new / old) ** _AHEAD, low, high))
+
+    balance = ahead(noise.balance, balance, 1e-2 * FRICTIONLESS, 1e2)
+    if stated is None:
+        joint = ahead(noise.joint_m, joint, 1e-2 * floor, robot.span_m)
+    pull = ahead(noise.pull_N, pull, 1e-3 * span_N, span_N)
+    return replace(noise, joint_m=joint, balance=balance, pull_N=pull), degrees
+
+
+def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> State:
+    """A state near the mode: errors of loops and balance are thought as large as they are at first, then ever less."""
+    since = state
+    fine = {"joint_m": noise.joint_m, "balance": noise.balance}
+    eased = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"), balance=0.3,
+                    soft_N=float(np.median(np.abs(state.pull_N))))  # fmt: skip
+    for _ in range(_EASINGS):
+        down = descend(unknowns, holds, eased, state, creep, since, 6)
+        state, equations = down.state, down.equations
+        smaller = {}
+        for name, rows in (("joint_m", "loop"), ("balance", "balance")):
+            fits = np.mean(equations.residual[:, equations.rows[rows]] ** 2) < 2
+            smaller[name] = max(getattr(eased, name) / 4, fine[name]) if fits else getattr(eased, name)
+        if smaller == {name: getattr(eased, name) for name in smaller} and eased.soft_N == noise.soft_N:
+            break
+        eased = replace(eased, **smaller, soft_N=max(eased.soft_N / 4, noise.soft_N))
+    return state
+
+
+def _shown(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, rows: str) -> float:
+    """Root mean square of the loops (m) or of the balance (over the weight) at a state, no less than what is exact."""
+    e = linearised(unknowns, holds, noise, state, creep, state)
+    unit = noise.joint_m if rows == "loop" else noise.balance
+    size = float(np.sqrt(np.mean(e.residual[:, e.rows[rows]] ** 2))) * unit
+    return max(size, unit) if np.isfinite(size) else 1e3 * unit
+
+
+Moment = tuple[Floats, Floats]  # mean and standard deviation
+
+
+@dataclass(frozen=True)
+class Summarised:
+    """Means and standard deviations of what a robot's owner asks for.
+
+    Attributes
+    ----------
+    exit_m, platform_m : pairs of (w, 3) arrays
+    reference_m, length_m, drum, bias_N : pairs of (w,) arrays
+        `length_m`: zero-tension lengths after the last hold, creep included.
+    position_m, turn_rad : pairs of (p, 3) arrays
+        `turn_rad`: rotation vectors; their errors are small turns about the world's axes.
+    pull_N : pair of (p, w) arrays
+    strain : (w,) array
+        Creep after the last hold.
+    """
+
+    exit_m: Moment
+    platform_m: Moment
+    reference_m: Moment
+    length_m: Moment
+    drum: Moment
+    bias_N: Moment
+    position_m: Moment
+    turn_rad: Moment
+    pull_N: Moment
+    strain: Floats
+
+
+def summarised(found: Whole) -> Summarised:
+    """What the posterior says of everything by name."""
+    unknowns, state, robot = found.unknowns, found.state, found.unknowns.robot
+    parts, w, d = unknowns.parts(state.white), robot.legs, robot.degrees
+    sd = np.sqrt(np.diag(found.covariance))
+
+    def points(name: str, values: Floats, error: float) -> Moment:
+        own = sd[unknowns.slices[name]]
+        return values, error * own.reshape(values.shape) if len(own) else np.zeros_like(values)
+
+    prior, at = unknowns.prior, unknowns.slices["wires"]
+    hold = np.sqrt(np.maximum(np.einsum("pii->pi", found.hold_covariance), 0.0))
+    turn = hold[:, 3:d] / robot.size_m if d == 6 else np.zeros_like(state.position_m)
+    bias = prior.bias_sd_N * sd[-w:] if prior.bias_sd_N > 0 else np.zeros(w)
+    # the last zero-tension lengths: references, drums and the strain, with all that it depends on
+    joint = found.last_m
+    bare = joint + parts.reference_m
+    strain = found.creep.strain[-1]
+    slope = np.zeros((w, unknowns.count))
+    slope[:, at] = bare[:, None] * found.creep.by_wires[-1]
+    leg = np.arange(w)
+    slope[leg, unknowns.references.start + leg] += (1 + strain) * prior.reference_sd_m
+    if unknowns.errors.drum > 0:
+        slope[leg, unknowns.slices["drum"].start + leg] = unknowns.errors.drum * joint * ~robot.is_linear
+    length_sd = np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope))
+    return Summarised(
+        points("exit", parts.exit_m, unknowns.errors.exit_m),
+        points("platform", parts.platform_m, unknowns.errors.platform_m),
+        (parts.reference_m, prior.reference_sd_m * sd[unknowns.references]),
+        (bare * (1 + strain), length_sd),
+        points("drum", parts.drum, unknowns.errors.drum),
+        (parts.bias_N, bias),
+        (state.position_m, hold[:, :3]),
+        (turns.vector(state.rotation), turn),
+        (np.maximum(state.pull_N, 0.0), hold[:, d:]),
+        strain,
+    )  # fmt: skip
+
+
+def trust(found: Whole) -> float:
+    """Probability of residuals and estimates this far from model and priors: `trust.joint_test`.
+
+    A hold's own unknowns have no prior, so each of them costs a degree of freedom. Geometry and references are tested
+    alone too.
+    """
+    e, unknowns = found.equations, found.unknowns
+    count = int(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2]
+    first = np.r_[0 : unknowns.slices["wires"].start, unknowns.references]
+    white, spread = found.state.white[first], found.covariance[np.ix_(first, first)]
+    return float(joint_test(np.array([found.cost]), max(count, 1), white[None], spread[None], len(first))[0])
+
+
+def misfit(found: Whole) -> float:
+    """Mean squared residual of what was read or stated, the balance aside."""
+    e = found.equations
+    read = [e.residual[:, part][e.known[:, part]] for name, part in e.rows.items() if name != "balance"]
+    return float(np.mean(np.concatenate(read) ** 2))

@@ -1,0 +1,275 @@
+"""Everything that the calibration of a whole robot reports, as ``calibration.json`` holds it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from wirebayes.json_files.calibrate import (
+    CalibratedPoses,
+    CalibrateJson,
+    CalibrationPrior,
+    EstimatedLengths,
+    EstimatedPoses,
+    IdentifiedJson,
+)
+from wirebayes.notice import Notice, to_json
+from wirebayes.robot.mechanics import drums, rotation
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import doubts
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration import whole
+from wirebayes.robot.self_calibration.calibrated import Calibrated
+from wirebayes.robot.self_calibration.equations import Holds, moved
+from wirebayes.robot.self_calibration.identified import Identified, identified
+from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
+from wirebayes.robot.self_calibration.seeds import best
+from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlikely
+from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
+from wirebayes.robot.self_calibration.whole import Summarised, Whole
+from wirebayes.typing import Floats
+
+_RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
+_WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
+_UNEVEN = 0.05  # of the weight: balance that fails by more is worth a word
+
+
+@dataclass(frozen=True)
+class WholeAnswer:
+    """The content of ``calibration.json``, and the robot with the history that it can go on from."""
+
+    content: CalibrateJson
+    robot: Robot
+    known: Calibrated
+
+
+def holds_of(robot: Robot, session: Session, readings: Floats) -> Holds:
+    """A session with its readings, hold by hold.
+
+    Parameters
+    ----------
+    robot : Robot
+    session : Session
+    readings : (r,) array
+        Standardised: tensions of the holds that were read, then tilts.
+    """
+    tension = np.full(session.joint_m.shape, np.nan)
+    count = int(session.read.sum()) * robot.legs
+    tension[session.read] = readings[:count].reshape(-1, robot.legs) * session.tension_sd_N
+    if session.tilt_sd_rad is None:
+        return Holds(session, tension)
+    tilt = np.full((len(tension), 2), np.nan)
+    tilt[session.read] = readings[count:].reshape(-1, 2) * session.tilt_sd_rad
+    return Holds(session, tension, tilt)
+
+
+def answer(
+    robot: Robot,
+    prior: Prior,
+    errors: StatedErrors,
+    session: Session,
+    readings: Floats,
+    seed: int = 0,
+    requests: bool = False,
+    visits: int = 5,
+) -> WholeAnswer:
+    """Calibrate a whole robot and say how far the answer can be trusted.
+
+    Parameters
+    ----------
+    robot : Robot
+        As its file says.
+    prior : Prior
+        Of references, wires and sensors.
+    errors : StatedErrors
+        Of geometry and poses.
+    session : Session
+    readings : (r,) array
+        Standardised, as `session.Prediction.readings`.
+    seed : int
+    requests : bool
+        Stated poses may turn out to be requests, which the robot followed as well as it could.
+    visits : int
+        Number of poses to propose.
+    """
+    unknowns, holds = Unknowns(robot, prior, errors), holds_of(robot, session, readings)
+    rng = np.random.default_rng(seed)
+    found, holds, requested = _rather_requests(best(unknowns, holds, rng), holds, rng, requests)
+    plain = whole.estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
+    seen, p = identified(found), whole.trust(found)
+    ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
+    s = whole.summarised(found)
+    usable = bool(found.converged and p >= SIGNIFICANT)
+    content: CalibrateJson = {
+        "version": 2,
+        "robot": robot.name,
+        "holds": len(session.duration_s),
+        "read": int(session.read.sum()),
+        "prior": _prior(robot, prior, errors, session),
+        "exit_points_m": interval(s.exit_m, found.quantile),
+        "platform_points_m": interval(s.platform_m, found.quantile),
+        "zero_tension_lengths_m": interval(s.length_m, found.quantile),
+        "references_m": interval(s.reference_m, found.quantile),
+        "poses": _poses(s, found, session),
+        "misfit": whole.misfit(found),
+        "length_rms_mm": _length_rms(found),
+        "joint_sd_mm": 1e3 * found.noise.joint_m,
+        "identified": _identified(seen),
+        "usable": usable,
+        "with_creep_model": _lengths(found, s),
+        "by_hooke_alone": _lengths(plain, whole.summarised(plain)),
+        **_now(robot, found, s, usable),
+        "observability": {
+            "rank": seen.determined,
+            "of": seen.of,
+            "weakest_combination": [],
+            "sentence": f"The readings determine {seen.determined} of {seen.of} combinations of points and references.",
+        },
+        "next_positions_m": ahead.position_m,
+        "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
+        "warnings": to_json([*_warnings(found, p, requested), *doubts(robot, prior.line)]),
+    }
+    return WholeAnswer(content, moved(robot, unknowns.parts(found.state.white)), _known(found, session))
+
+
+def _rather_requests(found: Whole, holds: Holds, rng: np.random.Generator, allowed: bool) -> tuple[Whole, Holds, bool]:
+    """What is found without the poses, where they are commands or contradict the joint values: they were requests."""
+    if not (allowed and holds.placed.any() and found.unknowns.errors.pose_m == 0):
+        return found, holds, False
+    session = holds.session
+    nowhere = replace(
+        session,
+        position_m=np.full_like(session.position_m, np.nan),
+        rotation=np.full(session.rotation.shape, np.nan),
+    )
+    blind = replace(holds, session=nowhere)
+    state = replace(found.state, white=np.zeros_like(found.state.white))
+    other = whole.estimate(found.unknowns, blind, state)
+    clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and whole.trust(other) >= SIGNIFICANT
+    if _too_good(found) or (other.converged and clearer):
+        return other, blind, True
+    return found, holds, False
+
+
+def _too_good(found: Whole) -> bool:
+    """Whether estimates that the readings determine well lie nearer to the robot's file than its stated errors allow.
+
+    Then the joint values were computed from the poses and the file: they are commands, and say nothing of where the
+    robot went.
+    """
+    part = np.r_[0 : found.unknowns.slices["wires"].start, found.unknowns.references]
+    values, vectors = np.linalg.eigh(found.covariance[np.ix_(part, part)])
+    seen = np.sqrt(np.maximum(values, 0.0)) < _WELL
+    deviations = vectors[:, seen].T @ found.state.white[part]
+    return bool(seen.any() and chi2.cdf(float(deviations @ deviations), int(seen.sum())) < _CHANCE)
+
+
+def _prior(robot: Robot, prior: Prior, errors: StatedErrors, session: Session) -> CalibrationPrior:
+    given: CalibrationPrior = {
+        "reference_sd_mm": 1e3 * prior.reference_sd_m,
+        "specimen_spread": prior.spread,
+        "anchor_sd_mm": 1e3 * errors.exit_m,
+        "platform_sd_mm": 1e3 * errors.platform_m,
+        "pose_sd_mm": 1e3 * errors.pose_m,
+        "drum_sd": errors.drum,
+    }
+    if prior.bias_sd_N > 0:
+        given["tension_bias_sd_N"] = prior.bias_sd_N
+        given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
+    return given
+
+
+def _poses(s: Summarised, found: Whole, session: Session) -> EstimatedPoses:
+    numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
+    pose = tuple(np.hstack([place, turn]) for place, turn in zip(s.position_m, s.turn_rad, strict=True))
+    return {"hold": np.asarray(numbers, float).tolist(),
+            **interval((pose[0], pose[1]), found.quantile)}  # fmt: skip
+
+
+def _length_rms(found: Whole) -> float:
+    """Root mean square of what is left of the loops, along one line each, mm."""
+    e = found.equations
+    left = e.residual[:, e.rows["loop"]] * found.noise.joint_m / found.unknowns.robot.lines
+    return 1e3 * float(np.sqrt(np.mean(left**2)))
+
+
+def _lengths(found: Whole, s: Summarised) -> EstimatedLengths:
+    out: EstimatedLengths = {
+        "converged": found.converged,
+        "misfit": whole.misfit(found),
+        "p_joint": whole.trust(found),
+        "length_m": interval(s.length_m, found.quantile),
+        "creep_strain": s.strain,
+        "reference_error_mm": {"mean": 1e3 * s.reference_m[0], "sd": 1e3 * s.reference_m[1]},
+    }
+    if found.unknowns.prior.bias_sd_N > 0:
+        out["tension_bias_N"] = {"mean": s.bias_N[0], "sd": s.bias_N[1]}
+    return out
+
+
+def _identified(seen: Identified) -> IdentifiedJson:
+    return {
+        "determined": seen.determined,
+        "of": seen.of,
+        "combinations": [
+            {"name": one.name, "before_mm": one.before_mm, "after_mm": one.after_mm, "determined": one.determined}
+            for one in seen.combinations
+        ],
+        "not_determined": seen.sentences,
+    }
+
+
+def _now(robot: Robot, found: Whole, s: Summarised, usable: bool) -> CalibratedPoses:
+    """Where the platform is after the last hold; joint values of the home pose where they can be used."""
+    if not found.converged:
+        return {"pose_now": None, "joint_values_for_home_m": None}
+    out: CalibratedPoses = {
+        "pose_now": {"position_m": s.position_m[0][-1], "rotation_vector_rad": s.turn_rad[0][-1]},
+        "joint_values_for_home_m": None,
+    }
+    unknowns = found.unknowns
+    parts = unknowns.parts(found.state.white)
+    wires = unknowns.prior.wires(robot, parts.wires[None])[0]
+    there, home, turn = moved(robot, parts), robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
+    tau = inverse.tensions(there, home, turn)
+    joint = inverse.commands(there, wires, home, turn, tau, s.strain[:, None], parts.reference_m[:, None]).joint_m[0]
+    if usable and np.isfinite(joint).all():
+        out["joint_values_for_home_m"] = joint
+        if robot.drums is not None:
+            out["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
+    return out
+
+
+def _warnings(found: Whole, p: float, requested: bool) -> list[Notice]:
+    out = []
+    if not found.converged:
+        text = "not converged: do not use these values; read more poses, or check the readings and the stated errors"
+        out.append(Notice("not-converged", text))
+    if requested:
+        text = (
+            "the stated poses are those that the joint values were computed for, or contradict the readings: they are "
+            "taken for requests, and the poses as unknown; give --pose-sd if they were measured"
+        )
+        out.append(Notice("data", text))
+    if found.converged and p < SIGNIFICANT:
+        out.append(unlikely(p))
+    if found.noise.balance > _UNEVEN:
+        text = (
+            f"the tensions leave {100 * found.noise.balance:.2g} % of the weight unbalanced: the platform was held by "
+            "something else, or the tensions are not those of the wires"
+        )
+        out.append(Notice("data", text))
+    return out
+
+
+def _known(found: Whole, session: Session) -> Calibrated:
+    """The posterior of references, wires and specimens, for a history on the calibrated robot."""
+    unknowns, state = found.unknowns, found.state
+    parts, (_, root) = unknowns.parts(state.white), unknowns.moments
+    at = unknowns.slices["wires"]
+    own = replace(unknowns.prior, bias_sd_N=0.0)
+    d = len(own.moments(unknowns.robot.legs)[0])
+    covariance = root @ found.covariance[at, at] @ root.T
+    there = replace(session, position_m=state.position_m, rotation=state.rotation)
+    return Calibrated(unknowns.robot, own, there, parts.wires[:d], covariance[:d, :d])
