@@ -4,6 +4,8 @@ from collections import Counter
 from textwrap import wrap
 from typing import cast
 
+import numpy as np
+
 from wirebayes.json_files.batch import BatchJson
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
@@ -205,7 +207,7 @@ def of_calibration(found: CalibrateJson) -> list[str]:
     lengths = ", ".join(f"{mean:.5f} [{low:.5f}, {high:.5f}]" for mean, low, high in rows)
     lines = [f"{found['robot']}: zero-tension lengths in m: {lengths}"]
     points = found["exit_points_m"]
-    if any(sd > 0 for each in points["sd"] for sd in each):
+    if np.any(np.array(points["sd"], float) > 0):
         lines.append("  exit points in mm, ± standard error:")
         for i, (mean, errors) in enumerate(zip(points["mean"], points["sd"], strict=True)):
             place = ", ".join(f"{1e3 * m:.1f} ± {1e3 * sd:.2g}" for m, sd in zip(mean, errors, strict=True))
