@@ -47,10 +47,12 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     likelihood = problem.log_likelihood(theta)
     correlation = np.atleast_2d(np.corrcoef(z.T))
     out: dict[str, Identifiability] = {}
+    drawn = prior.rvs(20000, np.random.default_rng(0))
     for i, name in enumerate(names):
-        distribution = prior.distributions[name]
-        before = distribution.ppf([0.05, 0.95])
-        sample = distribution.rvs(size=20000, random_state=np.random.default_rng(0))
+        sample = drawn[:, i]
+        before = np.quantile(sample, [0.05, 0.95])
+        if name not in prior.powers:
+            before = prior.distributions[name].ppf([0.05, 0.95])
         after = np.quantile(theta[:, i], [0.05, 0.95])
         along = [j for j in range(len(names)) if j != i and abs(correlation[i, j]) > RIDGE]
         figures: IdentifiabilityFigures = {
@@ -100,10 +102,11 @@ def sensitivity(values: Array, log_component: Array) -> float:
 def log_priors(fitted: Fit, theta: Array) -> Array:
     """(n, d) log prior density of each parameter, of the logarithm of positive ones."""
     prior = fitted.problem.prior
+    known = prior.known(theta)
     columns = []
     for i, (name, distribution) in enumerate(prior.distributions.items()):
-        value = fast_logpdf(distribution)(theta[:, i])
-        columns.append(value + np.log(theta[:, i]) if name in prior.logarithmic else value)
+        value = fast_logpdf(distribution)(known[:, i])
+        columns.append(value + np.log(known[:, i]) if name in prior.logarithmic else value)
     return np.stack(columns, axis=1)
 
 
