@@ -40,7 +40,7 @@ def test_metrics_are_equally_likely():
 
 
 def test_each_metric_is_that_of_the_dense_covariance():
-    geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 0)).geo
+    geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 6)).geo
     rows = np.random.default_rng(0).normal(size=(3, len(geo.plain)))
     (bench,), by_eta = geo.rig.benches, derivatives(geo.rig)[2]
     true = geo.chol @ geo.chol.T
@@ -67,7 +67,7 @@ def test_what_counts_as_said():
 
 
 def test_more_speaks_for_something_hidden_the_larger_it_is():
-    geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 0)).geo
+    geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 6)).geo
     z = geo.project(geo.chol @ np.random.default_rng(0).normal(size=len(geo.plain)))[0]
     units = np.vstack([z / np.linalg.norm(z), np.eye(len(z))[:3]])
     some = Directions(units, np.arange(4), ["a", "b", "c", "d"])
@@ -96,7 +96,7 @@ def test_a_foreign_form_that_no_name_resembles_is_left_over():
 
 
 def test_the_answers_follow_the_random_stream_alone():
-    case = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 0))
+    case = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 6))
     z = np.zeros(len(case.geo.plain))
     some = Directions(np.eye(len(z))[:4], np.arange(4), ["a", "b", "c", "d"])
     one, other = (answers(case.geo, some, z, np.random.default_rng(1), draws=6) for _ in range(2))
