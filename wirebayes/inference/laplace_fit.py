@@ -20,8 +20,6 @@ from wirebayes.wire.laws import ElasticLaw, History
 _FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
 # its log density in those units, taken out again: the amplitude's own prior is not in the evidence
 _LOG_FLAT = float(stats.norm.logpdf(0.0))
-_ABSURD = 0.5  # setting error, in steps of the test: no bench is set like that
-_AS_HELD = 0.05  # standard deviation of the log of a setting error that is held
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from wirebayes.means import geometric_mean
 _SMALLEST_STEP = 1e-3  # of the length: stands in where a test has no displacement at all
 TYPICAL_K1_N = 2000.0  # a light line, where nothing is said of a wire that is not tested yet
 _DIMENSIONS = {"mm": "length_mm", "N": "tension_N", "s": "time_s"}
-_TERM = re.compile(r"(?P<base>[A-Za-z]+)")
+_TERM = re.compile("[A-Za-z]+")
 
 
 @dataclass(frozen=True)
