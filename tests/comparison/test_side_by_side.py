@@ -25,7 +25,7 @@ PLAIN = Candidate(BASE, "", "")
 
 def row(name: str, elpd: list[float], **more: object) -> dict[str, object]:
     return {
-        "name": name, "scored": "all readings", "failed": None, "converged": True, "held_out": None,
+        "name": name, "scored": "all readings", "failed": None, "converged": True, "held_out": None, "warnings": [],
         "leave_one_hold_out": {"per_hold": elpd, "elpd": sum(elpd)},
     } | more  # fmt: skip
 
@@ -88,7 +88,7 @@ def test_held_out_differences_stand_beside_and_decide_where_models_are_scored_on
 
 
 def test_without_a_reference_nothing_is_compared() -> None:
-    broken = {"name": BASE, "failed": "LinAlgError: no", "scored": "all readings"}
+    broken = {"name": BASE, "failed": "LinAlgError: no", "scored": "all readings", "warnings": []}
     table = side_by_side([broken, row("other", [10.0, 11.0]), row("best", [12.0, 11.0])], BASE)
     assert [r["name"] for r in table["models"]] == ["best", "other", BASE]
     assert all(r["weight"] is None and r["difference"] is None for r in table["models"])
@@ -97,7 +97,7 @@ def test_without_a_reference_nothing_is_compared() -> None:
 
 @pytest.mark.parametrize(("likelihood", "scored"), [("chain", "all readings"), ("hold", "later readings")])
 def test_a_judgement_says_what_was_scored(likelihood: str, scored: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compare, "_scores", lambda task, seed, policy: {"parameters": 8})
+    monkeypatch.setattr(compare, "_scores", lambda task, seed, policy: {"parameters": 8, "converged": True})
     found = judge(Task(experiments()[0], replace(PLAIN, likelihood=likelihood)), 0)  # type: ignore[arg-type]
     assert found["scored"].startswith(scored) and found["failed"] is None and found["parameters"] == 8
 
@@ -265,9 +265,9 @@ def test_exactly_four_and_exactly_two_standard_errors_mean_something(gains: list
 def test_models_come_by_score_then_those_scored_otherwise_then_failures() -> None:
     later = "later readings given each hold's first"
     models = [
-        {"name": "broken", "failed": "no", "scored": "all readings"}, row("low", [1.0, 1.0]), row(BASE, [2.0, 2.0]),
+        {"name": "broken", "failed": "no", "scored": "all readings", "warnings": []}, row("low", [1.0, 1.0]), row(BASE, [2.0, 2.0]),
         row("worse", [8.0, 7.0], scored=later), row("better", [9.0, 9.0], scored=later), row("high", [3.0, 3.0]),
-        {"name": "also", "failed": "no", "scored": later},
+        {"name": "also", "failed": "no", "scored": later, "warnings": []},
     ]  # fmt: skip
     table = side_by_side(models, BASE)  # type: ignore[arg-type]
     assert [r["name"] for r in table["models"]] == ["high", BASE, "low", "better", "worse", "broken", "also"]

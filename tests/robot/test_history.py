@@ -545,7 +545,7 @@ def test_a_trajectory_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys)
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,9,0,.6\n")
     arguments = ["pose", "linear-7", "--wires", str(fitted), "--trajectory", str(tmp_path / "way.csv")]
     assert main([*arguments, "--output", str(tmp_path / "out"), "--draws", "5"]) == 0
-    assert "No tensions within the bounds hold the platform" in capsys.readouterr().err
+    assert "no tensions within the bounds hold the platform" in capsys.readouterr().err
     assert (tmp_path / "out" / "report.html").is_file()
 
 

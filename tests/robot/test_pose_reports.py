@@ -330,7 +330,7 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
         return np.array([10.0, 20.0, 99.0, 60.0])
 
     monkeypatch.setattr(answer.forward, "solve", solve)
-    monkeypatch.setattr(answer.path, "lowest_stiffness", stiffness)
+    monkeypatch.setattr(answer.one_sided, "lowest_stiffness", stiffness)
     found = answer._round_trip(robot, None, commands, x, R)  # type: ignore[arg-type]
     assert found["solved"] == 0.5 and found["largest_round_trip_error_m"] == pytest.approx(3e-9)
     assert found["slack_wires"] == 2 and found["lowest_stiffness_N_m"]["mean"] == 30.0
