@@ -18,7 +18,18 @@ from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import UNITS, Quantiles
-from wirebayes.sentences import likely, listed, number, p_in_words, quantity, span, unit_text
+from wirebayes.sentences import (
+    beyond_said,
+    families_said,
+    likely,
+    listed,
+    number,
+    p_in_words,
+    quantity,
+    span,
+    undecided,
+    unit_text,
+)
 
 _NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
 
@@ -47,13 +58,15 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
     finding = _NAMED.get(verdict, f"{verdict}: {effects}")
     if verdict == "ambiguous":
-        finding = f"ambiguous: {likely(report)}"
+        finding = f"ambiguous: {undecided(report)}"
     if verdict == "partial":
         are = "are" if report["effects"][1:] else "is"
         finding = f"{effects} {are} missing, and something that is not in the catalogue"
     lines = [f"{name}: {finding} ({p_in_words(report['p_global'], report['p_simulations'])})"]
     if verdict == "unknown" and likely(report):
         lines.append(f"  beside it most likely {likely(report)}; none of these is established")
+    families = [] if verdict == "ambiguous" else families_said(report)
+    lines += [f"  {sentence}" for sentence in (*families, *beyond_said(report))]
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
         unit = "" if size["unit"] == "-" else f" {size['unit']}"
@@ -271,7 +284,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         "nothing-missing": "nothing is missing: the plain model and its noise explain these readings",
         "unknown": "something is missing that no effect in the catalogue explains"
         + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
-        "ambiguous": f"something is missing; these readings do not tell what: {candidates}",
+        "ambiguous": undecided(report, lambda effect: effect.replace("_", " ")),
         "named": f"{listed(effects)} {are} missing",
         "partial": f"{listed(effects)} {are} missing, and something else that no effect in the catalogue explains",
     }[report["verdict"]]

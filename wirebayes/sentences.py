@@ -31,6 +31,48 @@ def likely(found: Answer, spoken: Callable[[str], str] = str) -> str:
     return listed([f"{'nothing known' if n == 'unknown' else spoken(n)} ({100 * p:.0f} %)" for n, p in ranked], "or")
 
 
+def families_said(found: Answer) -> list[str]:
+    """Sentences of the established families that have several members.
+
+    Parameters
+    ----------
+    found : dict
+        Of one experiment, as in ``discovery.json``.
+    """
+    families = found.get("families", [])
+    return [family["sentence"] for family in families if family["established"] and family["members"][1:]]
+
+
+def undecided(found: Answer, spoken: Callable[[str], str] = str) -> str:
+    """What an ambiguous answer is undecided between: an established family in its own words, else the likely names.
+
+    Parameters
+    ----------
+    found : dict
+        Of one experiment, as in ``discovery.json``.
+    spoken : function of str, optional
+        How a name is written.
+    """
+    families = families_said(found)
+    if families:
+        return f"{listed(families)}; these readings do not tell which"
+    return f"something is missing; these readings do not tell what: {likely(found, spoken)}"
+
+
+def beyond_said(found: Answer) -> list[str]:
+    """The sentence of a remainder that is likely beside what is named and does not count; empty where there is none.
+
+    Parameters
+    ----------
+    found : dict
+        Of one experiment, as in ``discovery.json``.
+    """
+    rest = found["remainder"]["probability"] if "remainder" in found else 0.0
+    if found["verdict"] not in ("named", "ambiguous") or rest <= 0.5:
+        return []
+    return [f"something beyond it is likely ({100 * rest:.0f} %), but predicts nothing better"]
+
+
 def p_in_words(p: float, simulations: int) -> str:
     """A p-value with as much as its simulations can tell.
 

@@ -1,15 +1,18 @@
 """Families: names that look alike, by their likeness to the best of them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import screening
-from wirebayes.discovery.families import block_ratio, called, families_of, grouped, refitted_probe
+from wirebayes.discovery.families import block_ratio, called, families_of, grouped, refitted_probe, sentence
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import fitted
+from wirebayes.sentences import beyond_said, families_said, undecided
 from wirebayes.simulation.synthetic import Bench, Truth
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
@@ -38,6 +41,29 @@ def test_a_family_is_called_by_what_its_members_have_in_common() -> None:
     assert called(("toe", "strain_stiffening")) == "elastic curve" and called(("toe",)) == "toe"
     assert called(("screw_wobble", "toe")) == "screw_wobble"  # a user's own effect has no other name
     assert {n for n in CATALOGUE if called((n, n)) == n} == set()
+
+
+def test_a_family_is_said_as_a_person_who_tests_lines_would() -> None:
+    found = {"strain_stiffening": 0.83, "sensor_nonlinearity": 0.08, "toe": 0.06, "power_strain": 0.004}
+    assert sentence(found) == "the elastic curve is bent: strain stiffening 83 %, sensor nonlinearity 8 %, toe 6 %"
+    assert sentence({"screw_wobble": 0.9}) == "there is screw wobble: screw wobble 90 %"
+
+
+def test_only_established_families_of_several_are_said_and_a_remainder_that_does_not_count() -> None:
+    several = {"members": ["a", "b"], "established": True, "sentence": "one of both"}
+    families = [several, several | {"established": False}, several | {"members": ["c"]}]
+    found: Any = {"verdict": "ambiguous", "families": families, "remainder": {"probability": 0.51}}
+    assert families_said(found) == ["one of both"]
+    assert undecided(found) == "one of both; these readings do not tell which"
+    assert beyond_said(found) == ["something beyond it is likely (51 %), but predicts nothing better"]
+    assert beyond_said(found | {"remainder": {"probability": 0.5}}) == []
+    assert beyond_said(found | {"verdict": "partial"}) == []
+
+
+def test_without_an_established_family_the_likely_names_are_said() -> None:
+    family = {"members": ["a", "b"], "established": False, "sentence": "one of both"}
+    found: Any = {"families": [family], "set": ["a", "b"], "probabilities": {"a": 0.6, "b": 0.35, "unknown": 0.05}}
+    assert undecided(found) == "something is missing; these readings do not tell what: a (60 %) or b (35 %)"
 
 
 def test_a_bent_line_and_a_bent_sensor_are_one_family_and_a_delay_is_another() -> None:

@@ -130,3 +130,22 @@ def noise_ratio(block: LaplaceFit, found: Refit, b: int) -> float:
 def called(family: Family) -> str:
     """The family's name: what its members have in common, or the effect itself where it is alone."""
     return _OF.get(family[0], family[0]) if len(family) > 1 else family[0]
+
+
+def sentence(members: Mapping[str, float]) -> str:
+    """What a family says of the wire, and the probability of each of its members to be what is missing.
+
+    Those below one in a hundred are left out.
+
+    Parameters
+    ----------
+    members : mapping of name to float
+        The most probable first.
+    """
+    label = called(tuple(members))
+    pattern = PATTERNS.get(label, f"there is {label.replace('_', ' ')}")
+    shares = [f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in members.items() if p >= _WORTH_SAYING]
+    return f"{pattern}: {', '.join(shares)}" if shares else pattern
+
+
+_WORTH_SAYING = 0.01  # probability of a member: less is no candidate

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.discovery import gross_errors, next_measurement, power, residual_patterns, shrinking
-from wirebayes.discovery.families import Family, block_ratio, called, families_of, noise_ratio, refitted_probe
+from wirebayes.discovery.families import Family, block_ratio, called, families_of, noise_ratio, refitted_probe, sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence, Judgement, judge
@@ -405,6 +405,7 @@ def _family(family: FamilyEvidence) -> FamilyReport:
         "inclusion": family.inclusion,
         "leave_one_hold_out": family.gain,
         "established": family.is_established,
+        "sentence": sentence(family.members),
     }
 
 

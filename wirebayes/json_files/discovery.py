@@ -42,6 +42,7 @@ class FamilyReport(TypedDict):
     inclusion: float
     leave_one_hold_out: float | None
     established: bool
+    sentence: str
 
 
 class Interval(TypedDict):
