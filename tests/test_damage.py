@@ -178,7 +178,6 @@ def test_damaged_robots_and_sessions(results: Path, tmp_path: Path, capsys: pyte
     ("column", "wild"),
     [
         ("x_m", "-1e7"),
-        pytest.param("joint_1_m", "1e8", marks=pytest.mark.slow),
         pytest.param("tension_1_N", "9e8", marks=pytest.mark.slow),
     ],
 )

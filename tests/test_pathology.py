@@ -41,15 +41,13 @@ CASES: dict[str, tuple[Experiment, str]] = {
     # slack up to 6 mm takes a preload 6.5 standard deviations from its prior's middle: a soft wire is likelier
     "nothing read": (reading(0.0 * CLEAN), "far outside its prior"),
     "slack": (reading(NOISE), "far outside its prior"),
-    "kN written as N": (reading(USUAL / 1000), "check that tension_N is in N"),
-    "mN written as N": (reading(USUAL * 1000, 10.0), "check that tension_N is in N"),
     "holds in the wrong order": (reading(USUAL[[4, 1, 5, 0, 3, 2]]), "the displacements do not explain the tensions"),
     "time runs backward": (reading(USUAL[:, ::-1]), "check that time_s runs forward"),
     "a misprint": (reading(spiked()), "check it, correct a misprint"),
     "two holds": (reading(USUAL).train(2), "setting_sd: the data say next to nothing about it"),
     "metres written as mm": (replace(reading(USUAL), length_mm=1.5), "length_mm"),
 }
-SLOW = set(CASES) - {"constant tension", "holds in the wrong order", "mN written as N"}
+SLOW = set(CASES) - {"constant tension", "holds in the wrong order"}
 
 
 @pytest.mark.parametrize(

@@ -120,14 +120,29 @@ def hold(xp, theta, d):
 
 
 def prior_terms(problem):
-    """(name, is log-normal, location, scale) of every parameter; the benchmark's wires have no other distributions."""
+    """(name, coordinate, location, scale) of every parameter, normal in its coordinate: itself, its logarithm or log odds.
+
+    A number in place of the coordinate's name is the largest value of a parameter whose log odds are normal.
+    """
     out = []
     for name, dist in problem.prior.distributions.items():
         if dist.dist.name == "lognorm":
-            out.append((name, True, float(np.log(dist.kwds["scale"])), float(dist.args[0])))
+            out.append((name, "log", float(np.log(dist.kwds["scale"])), float(dist.args[0])))
+        elif dist.dist.name == "logitnorm":
+            middle, spread = dist.args
+            out.append((name, float(dist.kwds["scale"]), float(middle + np.log(dist.kwds["scale"])), float(spread)))
         else:
-            out.append((name, False, float(dist.args[0]), float(dist.args[1])))
+            out.append((name, "itself", float(dist.mean()), float(dist.std())))
     return out
+
+
+def _value(xp, coordinate, kind):
+    if kind == "itself":
+        return coordinate
+    if kind == "log":
+        return xp.exp(coordinate)
+    odds = xp.exp(coordinate)
+    return odds / (1.0 + odds / kind)
 
 
 def log_likelihood(xp, problem):
@@ -162,7 +177,7 @@ def natural(xp, problem, coordinates):
         softened = xp.logaddexp(0.0, v["B"] - ridge.log_step) if "k1" in ridge.shifted else 0.0
         v["k1"] = v["k1"] + softened
         v["B"] = v["B"] - creep - v["k1"] + ridge.log_length
-        theta = {name: xp.exp(v[name]) if positive else v[name] for name, positive, *_ in terms}
+        theta = {name: _value(xp, v[name], coordinate) for name, coordinate, *_ in terms}
         volume = 0.0
         for slack in coordinates.slack_edges:  # the benchmark's wires have no threshold of creep
             near = (v["preload"] - slack.at) / slack.width
@@ -181,6 +196,7 @@ def natural(xp, problem, coordinates):
 
 def difference(xp, problem, seed):
     """Largest difference from the package's log likelihood and log posterior, over 20 draws about the mode."""
+    problem = problem.in_units(problem.own_units)
     target, rng = LogPosterior(problem), np.random.default_rng(seed)
     found = modes(target, rng)
     z = found.z[0] + rng.normal(size=(20, len(found.z[0]))) @ np.linalg.cholesky(found.covariance[0]).T

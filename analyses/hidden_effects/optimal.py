@@ -164,9 +164,10 @@ def _with_directions(
     )
     z = signature(geo, [list(case.hidden)])[0]
     removed = case.spec.names if case.spec.kind == "without" else ()
-    said = answers(geo, directions.without(removed), z, rng)
+    few = max(1, draws // 4)  # data sets for the judge who does not know the noise: a tenth of a second each
+    said = answers(geo, directions.without(removed), z, rng, few)
     if case.spec.kind == "single":  # small ones are not always seen, and are easier to name where they are
-        seen = said.above(float(np.quantile(answers(geo, directions, 0.0 * z, rng).odds, 1 - ALPHA)))
+        seen = said.above(float(np.quantile(answers(geo, directions, 0.0 * z, rng, few).odds, 1 - ALPHA)))
         return {"blind": seen.rates(groups)} if seen.names else {}
     result: dict[str, Any] = {"blind": said.rates(groups)}
     if case.spec.kind in ("two", "three"):

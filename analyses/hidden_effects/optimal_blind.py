@@ -25,26 +25,32 @@ from .rig import Array, Mask
 # variance of setting errors in true ones, half a decade apart: from none to all
 SETTING = np.logspace(-3.0, 3.0, 13)
 LARGEST_SET = 3
+EVALUATED_AT_ONCE = 30_000  # sets times data sets: what stays in the processor's cache
+NEGLIGIBLE = 1e-6  # share of the largest variance of a smooth remainder: of no size that a reading shows
 
 
 @dataclass(frozen=True)
 class Metric:
-    """Directions and data in the metric of one guess of the noise, what the plain parameters absorb taken out.
+    """Inner products in the metric of one guess of the noise, what the plain parameters absorb taken out.
 
     Attributes
     ----------
     log_volume : of the noise and of the plain parameters.
-    units : directions (c, R).
-    data : data sets (m, R).
+    gram : of the directions, (c, c).
+    along : of the data sets with the directions, (m, c).
+    square : of each data set with itself, (m,).
     """
 
     log_volume: float
-    units: Array
-    data: Array
+    gram: Array
+    along: Array
+    square: Array
 
 
 def metrics(geo: Geometry, units: Array, data: Array, remainder: bool = False) -> Iterator[Metric]:
     """One metric for each size of setting errors, or for each and each smooth remainder beside them.
+
+    The noise differs from the true one in a few directions alone: those of the setting errors and of the remainder.
 
     Parameters
     ----------
@@ -54,26 +60,37 @@ def metrics(geo: Geometry, units: Array, data: Array, remainder: bool = False) -
     by_eta = derivatives(geo.rig)[2]
     sd = np.concatenate([np.full(len(b.holds), b.setting_sd) for b in geo.rig.benches])
     setting = solve_triangular(geo.chol, by_eta * sd, lower=True)
-    setting = setting @ setting.T
-    for factor in SETTING:
-        noise = np.eye(len(setting)) + (factor - 1.0) * setting
-        for more in _remainders(geo) if remainder else [np.zeros_like(noise)]:
-            chol = np.linalg.cholesky(noise + more)
-            basis, u, y = (solve_triangular(chol, rows.T, lower=True) for rows in (geo.basis.T, units, data))
-            q, triangle = np.linalg.qr(basis)
-            u, y = u - q @ (q.T @ u), y - q @ (q.T @ y)
-            volume = np.log(np.diag(chol)).sum() + np.log(np.abs(np.diag(triangle))).sum()
-            yield Metric(-float(volume), u.T, y.T)
+    rows = np.vstack([units, data])
+    for smooth in _remainders(geo) if remainder else [np.zeros((len(setting), 0))]:
+        core, _ = np.linalg.qr(np.hstack([setting, smooth, geo.basis]))
+        within = rows @ core
+        outside = rows - within @ core.T  # where the noise is the true one
+        by_setting, by_remainder, basis = (part.T @ core for part in (setting, smooth, geo.basis))
+        common = outside @ outside[: len(units)].T
+        own = np.einsum("ij,ij->i", outside, outside)
+        sizes = np.geomspace(*DELTA_RANGE, REMAINDER_SIZES) if remainder else [0.0]
+        for factor in SETTING:
+            noise = np.eye(core.shape[1]) + (factor - 1.0) * by_setting.T @ by_setting
+            for delta in sizes:
+                chol = np.linalg.cholesky(noise + delta**2 * by_remainder.T @ by_remainder)
+                absorbed, x = (solve_triangular(chol, part.T, lower=True) for part in (basis, within))
+                q, triangle = np.linalg.qr(absorbed)
+                x = (x - q @ (q.T @ x)).T
+                volume = np.log(np.diag(chol)).sum() + np.log(np.abs(np.diag(triangle))).sum()
+                products = common + x @ x[: len(units)].T
+                square = own + np.einsum("ij,ij->i", x, x)
+                yield Metric(-float(volume), products[: len(units)], products[len(units) :], square[len(units) :])
 
 
 def _remainders(geo: Geometry) -> Iterator[Array]:
-    """Covariances (R, R) of smooth remainders, whitened, of the sizes that the judge of known noise considers."""
+    """Factors (R, r) of covariances of smooth remainders, whitened, whose part that no parameter absorbs has length 1."""
     for kernel in gaussian_process(geo.rig, np.ones(len(geo.plain), dtype=bool)):
         inner = solve_triangular(geo.chol, solve_triangular(geo.chol, kernel, lower=True).T, lower=True)
-        left = inner - geo.basis @ (geo.basis.T @ inner)
-        left = left - (left @ geo.basis) @ geo.basis.T
-        for delta in np.geomspace(*DELTA_RANGE, REMAINDER_SIZES):
-            yield delta**2 / np.trace(left) * 0.5 * (inner + inner.T)
+        values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+        kept = values > NEGLIGIBLE * values[-1]
+        factor = vectors[:, kept] * np.sqrt(values[kept])
+        left = factor - geo.basis @ (geo.basis.T @ factor)
+        yield factor / np.linalg.norm(left)
 
 
 def log_evidence(found: list[Metric], sets: Sets, degrees: int) -> Array:
@@ -89,19 +106,19 @@ def log_evidence(found: list[Metric], sets: Sets, degrees: int) -> Array:
     left = degrees - k
     # of amplitudes flat up to the largest delta, and of a noise whose logarithm is flat
     constant = k * (0.5 * np.log(2 * np.pi) - np.log(2 * DELTA_RANGE[1])) + gammaln(0.5 * left) - gammaln(0.5 * degrees)
-    total = np.full((len(found[0].data), len(sets.members)), -np.inf)
+    at_once = max(1, EVALUATED_AT_ONCE // len(sets.members))
+    total = np.full((len(found[0].square), len(sets.members)), -np.inf)
     for metric in found:
-        gram = (metric.units @ metric.units.T)[sets.members[:, :, None], sets.members[:, None, :]]
+        gram = metric.gram[sets.members[:, :, None], sets.members[:, None, :]]
         inverse = np.asarray(np.linalg.inv(gram), dtype=np.float64)
         half_log_det = 0.5 * np.log(np.asarray(np.linalg.det(gram), dtype=np.float64))
         own = Sets(sets.members, inverse, half_log_det, sets.first, sets.effects)
-        whole = (metric.data**2).sum(axis=1)
-        along = metric.data @ metric.units.T
-        for i, square in enumerate(whole):
-            explained = own.explained(along[i])
-            rest = np.maximum(square - np.maximum(explained, 0.0), 1e-9)
+        for some in range(0, len(total), at_once):
+            part = slice(some, some + at_once)
+            explained = own.explained(metric.along[part])
+            rest = np.maximum(metric.square[part, None] - np.maximum(explained, 0.0), 1e-9)
             height = constant + metric.log_volume - half_log_det - 0.5 * left * np.log(0.5 * rest)
-            total[i] = np.logaddexp(total[i], np.where(np.isfinite(explained), height, -np.inf))
+            total[part] = np.logaddexp(total[part], np.where(np.isfinite(explained), height, -np.inf))
     counts = np.diff(np.append(sets.first, total.shape[1]))
     ends = [*sets.first[1:], total.shape[1]]
     with np.errstate(divide="ignore"):

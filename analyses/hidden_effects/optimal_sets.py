@@ -92,15 +92,15 @@ class Sets:
         )  # fmt: skip
 
     def explained(self, along: Array) -> Array:
-        """(s,) square length of data in the sets' span, -inf where an amplitude would be negative.
+        """(…, s) square length of data in the sets' span, -inf where an amplitude would be negative.
 
         Parameters
         ----------
-        along : the data's components along each candidate's direction, (c,).
+        along : the data's components along each candidate's direction, (…, c).
         """
-        a = along[self.members]
-        amplitudes = np.einsum("sij,sj->si", self.inverse, a)
-        return np.where(np.all(amplitudes >= 0, axis=1), np.einsum("si,si->s", amplitudes, a), -np.inf)
+        a = along[..., self.members]
+        amplitudes = (self.inverse @ a[..., None])[..., 0]
+        return np.where(np.all(amplitudes >= 0, axis=-1), np.einsum("...i,...i->...", amplitudes, a), -np.inf)
 
     def log_evidence(self, along: Array) -> Array:
         """(n,) of each choice of effects against none: amplitudes integrated over their prior, candidates averaged."""

@@ -114,7 +114,7 @@ def test_fit_puts_a_failed_check_first(
     assert next(iter(summary)) == "model_check" and summary["model_check"]["passed"] is False
     shown = capsys.readouterr()
     captured = shown.err.strip()
-    assert captured == f"simulated: {summary['model_check']['sentence']}"
+    assert captured.splitlines()[0] == f"warning: simulated: {summary['model_check']['sentence']}".rstrip(".")
     assert shown.out.startswith("simulated: converged, MODEL CHECK FAILED\n")
     assert "Next: wirebayes discover" in shown.out
     page = (out / "report.html").read_text()
@@ -144,8 +144,10 @@ def test_a_single_fit_is_checked_while_it_is_sampled(tmp_path: Path, monkeypatch
     monkeypatch.setattr(model_check, "workers", lambda prepare: _Serial())
     with model_check.checked_meanwhile(job, tmp_path, 5):
         assert begun.wait(10.0)  # before there is a fit
-        summary.write_text('{"experiment": "a"}')
-    assert list(json.loads(summary.read_text()).items()) == [("model_check", found.to_dict()), ("experiment", "a")]
+        summary.write_text('{"experiment": "a", "warnings": []}')
+    assert list(json.loads(summary.read_text()).items()) == [
+        ("model_check", found.to_dict()), ("experiment", "a"), ("warnings", []),
+    ]  # fmt: skip
     begun.clear()
     with model_check.checked_meanwhile(job, tmp_path, 5):
         assert not begun.wait(0.1)

@@ -10,6 +10,7 @@ from wirebayes.discovery import next_measurement as module
 from wirebayes.discovery.next_measurement import alternatives
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
+from wirebayes.model.scales import NATURAL
 from wirebayes.wire.protocol import Protocol
 
 
@@ -35,8 +36,8 @@ def test_plans_are_what_their_words_say() -> None:
     assert finer.displacement_mm.tolist() == [1.0, 1.5, 2.0, 3.0, 4.0]
     assert unload.times_s.tolist() == finer.times_s.tolist() == TIMES.tolist()
     for plan in (longer, both):
-        assert "600 s with 25 readings" in plan.words and len(plan.times_s) == 25
-        assert plan.times_s[0] == 0.0 and plan.times_s[-1] == pytest.approx(600.0)
+        assert "200 s with 25 readings" in plan.words and len(plan.times_s) == 25
+        assert plan.times_s[0] == 0.0 and plan.times_s[-1] == pytest.approx(200.0)
         assert np.ptp(np.diff(np.log(plan.times_s[1:]))) < 1e-9
     assert "from 4 to 1 mm, each held 40 s" in unload.words and "1 to 4 mm" in longer.words
     assert "of every sample" in alternatives(WHOLE, False)[0].words
@@ -99,7 +100,7 @@ def test_the_plan_with_the_largest_value_wins_and_is_compared_with_the_present_t
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A plan's value is here the number of holds: unloading makes five of three, twice as many steps too."""
-    problem = SimpleNamespace(samples=[SimpleNamespace(protocol=WHOLE)])
+    problem = SimpleNamespace(samples=[SimpleNamespace(protocol=WHOLE)], units=NATURAL)
     monkeypatch.setattr(module, "_another_length", lambda problem: ("length", WHOLE))
     monkeypatch.setattr(module, "with_protocols", lambda problem, protocols, empty: protocols[0])
     monkeypatch.setattr(module, "replace_problem", lambda target, other: other)

@@ -16,7 +16,7 @@ def previewed(bench):
     sample = draw([bench], Truth(WIRE), seed=3)
     experiment = bench.experiment()
     holds = tuple(
-        type(hold)(**vars(hold) | {"tension_N": row[: hold.time_s.size]})
+        type(hold)(**vars(hold) | {"readings": row[: hold.time_s.size]})
         for hold, row in zip(experiment.holds, sample.problem.samples[0].readings[..., 0], strict=True)
     )
     measured = type(experiment)(**vars(experiment) | {"holds": holds})
@@ -71,7 +71,7 @@ def test_parameters_lie_where_the_truth_is_and_the_prior_is_named_where_it_answe
 
 def test_what_is_suspicious_is_said_with_the_fits_own_checks(loading):
     experiment = loading[0]
-    scaled = tuple(type(h)(**vars(h) | {"tension_N": 1e4 * h.tension_N}) for h in experiment.holds)
-    checked = check(type(experiment)(**vars(experiment) | {"holds": scaled}))
-    assert any("far outside its prior" in line for line in checked.messages)
+    stuck = tuple(type(h)(**vars(h) | {"readings": 0.0 * h.readings + 2.0}) for h in experiment.holds)
+    checked = check(type(experiment)(**vars(experiment) | {"holds": stuck}))
+    assert any("stays at 2 N while the displacement changes" in line for line in checked.messages)
     assert check(experiment).messages == ()

@@ -66,7 +66,7 @@ def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
     found = answer(experiments)
     assert found["best"] == "toe" and found["effects"][0] == "toe" and "toe" in found["set"]
     size = found["amplitudes"]["toe"]
-    assert size["q05"] < 0.0015 < size["q95"] and size["unit"] == "-"
+    assert size["q05"] < 1.5 < size["q95"] and size["unit"] == "mm"
     held = found["held_out"]
     assert held["final"]["rmse_N"] < 0.5 * held["plain"]["rmse_N"] and held["gap_closed"] > 0.8 and held["shrinks"]
     # A smooth curve follows, but does not predict as well.

@@ -72,11 +72,11 @@ def test_truth_says_what_was_hidden(tmp_path):
 
 
 def test_the_ideal_judge_names_what_is_separable_and_tosses_a_coin_for_twins():
-    slips = [judge(build(Spec("single", "dense", ("grip_slip",), 20.0, r)), draws=100)["optimal"] for r in range(3)]
+    slips = [judge(build(Spec("single", "dense", ("grip_slip",), 20.0, r)), draws=40)["optimal"] for r in range(3)]
     assert np.mean([slip["top1"] for slip in slips]) > 0.9
     assert all(slip["power"] == 1.0 for slip in slips)
     twin = [
-        judge(build(Spec("single", "paper", (name,), 10.0, r)), draws=100)["optimal"]["top1"]
+        judge(build(Spec("single", "paper", (name,), 10.0, r)), draws=40)["optimal"]["top1"]
         for name in ("strain_stiffening", "sensor_nonlinearity")
         for r in range(4)
     ]

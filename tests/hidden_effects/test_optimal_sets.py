@@ -68,7 +68,7 @@ def test_more_names_leave_no_more():
 
 
 def test_a_step_of_the_zero_is_a_slip_to_the_judge_and_a_worn_thread_is_not():
-    known, step, thread = "superposition", "zero_step", "worn_thread"
+    known, step, thread = "steady_creep", "zero_step", "worn_thread"
     mimicked = judge(build(Spec("mixed", "unloading", (known, step), 10.0, 0)), draws=40)
     strange = judge(build(Spec("mixed", "unloading", (known, thread), 10.0, 0)), draws=40)
     assert mimicked["left_over"]["2"]["delta"] < 3.3 < strange["left_over"]["2"]["delta"]

@@ -8,6 +8,7 @@ from scipy.stats import binom, norm
 from analyses.hidden_effects import page
 from analyses.hidden_effects import pooled as program
 from analyses.hidden_effects import several as names_and_remainders
+from analyses.hidden_effects.catalogue import EFFECTS
 from analyses.hidden_effects.rates import (
     closed,
     closed_of_oracle,
@@ -215,12 +216,13 @@ def test_bins_of_a_stated_probability_with_their_95_percent_intervals():
 
 
 def test_kinds_can_count_as_the_prior_expects_them():
-    """Twenty single names; one of them beside a remainder in half as many files; a remainder alone in one."""
+    """As many single names as there are; one of them beside a remainder in half as many files; a remainder alone in one."""
+    n = len(EFFECTS)
     rows = [said("single", 0.05)] * 6 + [said("mixed", 0.05, ())] * 3 + [said("foreign", 0.05, ())] * 3
     weights = prior_weights(rows)
-    assert weights == pytest.approx({"single": 20 / 6, "mixed": 10 / 3, "without": 1 / 3, "foreign": 1 / 3})
+    assert weights == pytest.approx({"single": n / 6, "mixed": n / 6, "without": 1 / 3, "foreign": 1 / 3})
     (bin_, *_) = calibration(rows, weights)
-    assert bin_["found"]["value"] == pytest.approx(11 / 31)
+    assert bin_["found"]["value"] == pytest.approx((n / 2 + 1) / (n + n / 2 + 1))
     assert calibration([said("pair", 0.05)], {"single": 1.0})[0]["found"] is None
 
 

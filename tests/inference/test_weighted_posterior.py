@@ -140,25 +140,25 @@ def test_what_few_draws_of_great_weight_made_of_a_hill_is_not_overlooked() -> No
 
 
 def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The 1 m line has two modes of about equal mass, and the first search is made to miss one of them."""
-    problem = build([experiments()[0]])
+    """Five holds of the 1.71 m line have two modes, and the first search is made to miss the one with more mass."""
+    problem = build([experiments()[1].train(5)])
     true, made = module.searches, []
 
     def searches(target: object, rng: np.random.Generator, n: int, starts: int) -> list[Optimum]:
         first, *others = true(target, rng, n, starts=starts)  # type: ignore[arg-type]
         made.extend(len(found.z) for found in (first, *others))
-        return [first if len(made) > n else first.rows([0]), *others]
+        return [first if len(made) > n else first.rows([1]), *others]
 
     whole = weighted_posterior(problem, 0, 1000.0)
     monkeypatch.setattr(module, "searches", searches)
     found = weighted_posterior(problem, 0, 1000.0)
     assert whole.converged and found.converged and made[0] == 2
-    assert found.log_evidence == pytest.approx(whole.log_evidence, abs=0.15)
+    assert found.log_evidence == pytest.approx(whole.log_evidence, abs=0.05)
     # without a witness
     monkeypatch.setattr(module, "overlooked", lambda *given: 0.0)
     made.clear()
     blind = weighted_posterior(problem, 0, 1000.0)
-    assert blind.converged and blind.log_evidence < whole.log_evidence - 0.3
+    assert blind.converged and blind.log_evidence < whole.log_evidence - 0.1
 
 
 def test_draws_are_of_the_whole_problem_and_follow_the_weights(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from wirebayes.inference.sampler import ensemble
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
+from wirebayes.model.scales import NATURAL, Units
 from wirebayes.prediction import left_out_density as module
 from wirebayes.prediction.leave_one_hold_out import log_mean, smoothed_leave_one_hold_out
 from wirebayes.prediction.left_out_density import joined, log_densities, without_hold
@@ -61,6 +62,17 @@ class Normals:
     names = ("x", "y")
     samples = (SimpleNamespace(protocol=SimpleNamespace(mask=np.ones((3, 5), bool))),)
     moved, widened, elpd = np.array([0.5, 2.0, 30.0]), np.array([1.0, 2.0, 1.0]), np.array([3.0, -1.0, -9.0])
+
+    own_units = NATURAL
+
+    def in_units(self, units: Units) -> "Normals":
+        return self
+
+    def theta_in(self, units: Units, theta: np.ndarray) -> np.ndarray:
+        return theta
+
+    def read_unit(self, sample: object) -> float:
+        return 1.0
 
     def without_each_hold(self, theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         away = (theta[:, None, :] - self.moved[:, None]) / self.widened[:, None]

@@ -71,7 +71,7 @@ def test_later_holds_continue_the_test_though_no_training_hold_is_repeated(tmp_p
     assert alone.prediction.trained == repeating.prediction.trained == 3
     assert list(alone.prediction.requested) == [False, False, False, True, True, True]
     one, other = alone.prediction.protocol, repeating.prediction.protocol
-    for name in ("number", "displacement_mm", "duration_s", "start_s", "time_s", "mask", "warming_K"):
+    for name in ("number", "setting", "duration_s", "start_s", "time_s", "mask", "warming_K"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
     # the slip at hold 3 goes on, the temperature reference is the training's, the clock goes on after 150 s
     assert [e.key for e in alone.stored.sample.model.effects] == ["thermal_expansion", "grip_slip@3"]

@@ -58,10 +58,15 @@ def test_a_stiffness_outside_its_prior_is_named(simulated):
     prior = simulated.problem.parameters(
         simulated.problem.prior.rvs(4000, np.random.default_rng(0)), simulated.problem.samples[0]
     )
-    for k1, warned in ((0.7, True), (2.0, True), (5.0, False), (1e5, False), (1e6, True), (6.9e8, True)):
+    logs = np.log(prior["k1"])
+    far = posterior_checks.FAR_OUT * logs.std()
+    for away, warned in ((-1.02, True), (-0.98, False), (0.0, False), (0.98, False), (1.02, True)):
+        k1 = float(np.exp(np.median(logs) + away * far))
         assert ("prior of its own" in posterior_checks.stiffness(draws(simulated.problem, k1=k1), prior)) == warned
     rope = prior | {"k1": prior["k1"] * 1e5}  # as a prior in the file says
-    assert posterior_checks.stiffness(draws(simulated.problem, k1=5e7), rope) == ""
+    stiff = 1e5 * float(np.median(prior["k1"]))
+    assert "prior of its own" in posterior_checks.stiffness(draws(simulated.problem, k1=stiff), prior)
+    assert posterior_checks.stiffness(draws(simulated.problem, k1=stiff), rope) == ""
 
 
 def test_a_posterior_that_is_the_prior_is_named(simulated):

@@ -14,6 +14,7 @@ from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import plain
 from wirebayes.model.prior import wire_defaults
+from wirebayes.model.scales import Scales
 from wirebayes.notice import Notice
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, schema
@@ -196,7 +197,7 @@ def test_legs_are_new_specimens_where_several_were_tested():
 
 
 def test_commands_take_several_tests_of_one_line(fitted, tmp_path, capsys, monkeypatch):  # noqa: F811
-    known = wire_defaults(1000.0)
+    known = wire_defaults(1000.0, Scales(step_mm=1.0, range_mm=12.0, tension_N=4.0, hold_s=120.0, step_N=0.35))
     before = {name: known[name].rvs(500, random_state=i) for i, name in enumerate(draws.CORE)}
     monkeypatch.setattr("wirebayes.results.store.prior_draws", lambda folder, experiment=None: before)
     way = tmp_path / "way.csv"

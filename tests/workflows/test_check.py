@@ -55,7 +55,8 @@ def test_check_says_what_was_understood(start, tmp_path, capsys):
         "Next: wirebayes fit",
     ):
         assert message in shown.out
-    assert max(map(len, shown.out.splitlines())) <= 120
+    *said, then = shown.out.splitlines()  # the last has the paths of files
+    assert max(map(len, said)) <= 120 and then.startswith("Next: ")
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert names == ["check.json", "complete.json", "configuration.json", "my-wire.svg"]
     stored = json.loads((tmp_path / "out" / "check.json").read_text())

@@ -116,8 +116,9 @@ def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
         return ""
     low, high = np.quantile(prior["k1"], [0.05, 0.95])
     return (
-        f"k1 = {middle:.3g} N is far outside its prior ({low:.3g} to {high:.3g} N): check that tension_N is in N and "
-        "that displacement_mm and length_mm are in mm; if they are, give this wire a prior of its own ([prior.k1])"
+        f"k1 = {middle:.3g} N is far outside its prior ({low:.3g} to {high:.3g} N, from the tensions and strains of "
+        "the test): check displacement_mm and length_mm, and whether the wire was taut; if they are right, give this "
+        "wire a prior of its own ([prior.k1])"
     )
 
 

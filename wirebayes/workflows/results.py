@@ -530,7 +530,7 @@ class Comparison(Result[ComparisonJson]):
     Examples
     --------
     >>> comparison
-    Comparison(wire: 2 models, best plain)
+    Comparison(wire: 2 models, best exponential)
     """
 
     _content: ClassVar[str] = "comparison.json"

@@ -126,7 +126,7 @@ def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
             points.append(f"With {name} the search did not converge: do not use its lengths.")
         if result["misfit"] is None:
             continue
-        fits = "explains" if result["p_joint"] >= SIGNIFICANT else "does not explain"
+        fits = "explains" if (result["p_joint"] or 0.0) >= SIGNIFICANT else "does not explain"
         points.append(
             f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
             f"{fits} readings and reference lengths (joint test, p = {number(result['p_joint'], 2)})."
