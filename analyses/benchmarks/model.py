@@ -120,7 +120,7 @@ def hold(xp, theta, d):
 
 
 def prior_terms(problem):
-    """(name, coordinate, location, scale) of every parameter, normal in its coordinate: itself, its logarithm or log odds.
+    """(name, coordinate, location, scale) of every parameter, normal in itself, its logarithm or log odds.
 
     A number in place of the coordinate's name is the largest value of a parameter whose log odds are normal.
     """

@@ -83,7 +83,7 @@ def metrics(geo: Geometry, units: Array, data: Array, remainder: bool = False) -
 
 
 def _remainders(geo: Geometry) -> Iterator[Array]:
-    """Factors (R, r) of covariances of smooth remainders, whitened, whose part that no parameter absorbs has length 1."""
+    """Whitened factors (R, r) of covariances of smooth remainders; what no parameter absorbs of them has length 1."""
     for kernel in gaussian_process(geo.rig, np.ones(len(geo.plain), dtype=bool)):
         inner = solve_triangular(geo.chol, solve_triangular(geo.chol, kernel, lower=True).T, lower=True)
         values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))

@@ -1,5 +1,6 @@
 """Plans of another measurement: what they are, which is proposed, and in which words."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -31,9 +32,9 @@ WHOLE = Protocol(
 
 def test_plans_are_what_their_words_say() -> None:
     unload, longer, both, finer = alternatives(WHOLE, True)
-    assert unload.displacement_mm.tolist() == both.displacement_mm.tolist() == [1.0, 2.0, 4.0, 2.0, 1.0]
-    assert longer.displacement_mm.tolist() == [1.0, 2.0, 4.0]
-    assert finer.displacement_mm.tolist() == [1.0, 1.5, 2.0, 3.0, 4.0]
+    assert unload.setting.tolist() == both.setting.tolist() == [1.0, 2.0, 4.0, 2.0, 1.0]
+    assert longer.setting.tolist() == [1.0, 2.0, 4.0]
+    assert finer.setting.tolist() == [1.0, 1.5, 2.0, 3.0, 4.0]
     assert unload.times_s.tolist() == finer.times_s.tolist() == TIMES.tolist()
     for plan in (longer, both):
         assert "200 s with 25 readings" in plan.words and len(plan.times_s) == 25
@@ -46,12 +47,19 @@ def test_plans_are_what_their_words_say() -> None:
     assert made.number.tolist() == [1, 2, 3, 4, 5] and made.duration_s.tolist() == [40.0] * 5
 
 
+def test_plans_under_weights_speak_of_weights_and_hang_them() -> None:
+    hung = replace(WHOLE, control="force")
+    unload, longer, *_ = alternatives(hung, True)
+    assert "the same weights back from 4 to 1 N" in unload.words and "weights 1 to 4 N" in longer.words
+    assert unload.protocol.control == "force" and unload.setting.tolist() == [1.0, 2.0, 4.0, 2.0, 1.0]
+
+
 def test_plans_hold_the_displacements_that_were_read_for_the_longest_series() -> None:
     unload = alternatives(PROTOCOL, True)[0]
-    assert unload.displacement_mm.tolist() == [1.0, 2.0, 1.0]
+    assert unload.setting.tolist() == [1.0, 2.0, 1.0]
     assert unload.times_s.tolist() == TIMES.tolist()
     one = PROTOCOL.__class__(1500.0, np.array([2.0]), TIMES[None], np.ones((1, 3), bool), np.array([40.0]), np.ones(1))
-    assert alternatives(one, True)[0].displacement_mm.tolist() == [2.0, 2.0]
+    assert alternatives(one, True)[0].setting.tolist() == [2.0, 2.0]
 
 
 def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
@@ -100,7 +108,7 @@ def test_the_plan_with_the_largest_value_wins_and_is_compared_with_the_present_t
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A plan's value is here the number of holds: unloading makes five of three, twice as many steps too."""
-    problem = SimpleNamespace(samples=[SimpleNamespace(protocol=WHOLE)], units=NATURAL)
+    problem = SimpleNamespace(units=NATURAL, samples=[SimpleNamespace(protocol=WHOLE)])
     monkeypatch.setattr(module, "_another_length", lambda problem: ("length", WHOLE))
     monkeypatch.setattr(module, "with_protocols", lambda problem, protocols, empty: protocols[0])
     monkeypatch.setattr(module, "replace_problem", lambda target, other: other)

@@ -216,7 +216,7 @@ def test_bins_of_a_stated_probability_with_their_95_percent_intervals():
 
 
 def test_kinds_can_count_as_the_prior_expects_them():
-    """As many single names as there are; one of them beside a remainder in half as many files; a remainder alone in one."""
+    """As many single names as there are, half as many beside a remainder, and one remainder alone."""
     n = len(EFFECTS)
     rows = [said("single", 0.05)] * 6 + [said("mixed", 0.05, ())] * 3 + [said("foreign", 0.05, ())] * 3
     weights = prior_weights(rows)

@@ -50,7 +50,7 @@ def test_what_a_plan_says_is_read(plan_file):
     assert is_plan(path)
     read = read_plan(path, EFFECTS)
     steps, other = read.tests
-    assert steps.displacements_mm == (0.5, 1.0, 1.5, 1.0, 0.5)
+    assert steps.settings == (0.5, 1.0, 1.5, 1.0, 0.5)
     assert steps.times_s == (0.0, 30.0, 60.0)
     assert (other.name, other.length_mm, other.times_s, other.temperatures_C) == (
         "protocol-2", 500.0, (0.0, 10.0, 30.0), (20.0, 25.0)

@@ -141,6 +141,36 @@ def test_scales_are_those_of_the_test():
     assert (weights.tension_N, weights.step_N, weights.hold_s) == (3.0, 1.5, 200.0)
 
 
+def shifted(experiment: Experiment, by_mm: float) -> Experiment:
+    """The same test under weights, read on a gauge with another zero."""
+    holds = [replace(hold, readings=hold.readings + by_mm) for hold in experiment.holds]
+    return replace(experiment, holds=tuple(holds))
+
+
+@pytest.mark.parametrize("by_mm", [520.0, -30.0])
+@pytest.mark.parametrize("holds", [1, 2, 5])
+def test_under_weights_the_zero_of_the_gauge_moves_the_preload_and_nothing_else(by_mm, holds):
+    experiment = under_weights(8)[0].first(holds)
+    one, other = build([experiment]), build([shifted(experiment, by_mm)])
+    assert other.units.length_mm == one.units.length_mm
+    np.testing.assert_allclose(other.scales.range_mm, one.scales.range_mm, rtol=1e-9)
+    theta = one.prior.rvs(200, np.random.default_rng(0))
+    moved = theta.copy()
+    moved[:, one.names.index("preload")] -= by_mm
+    np.testing.assert_allclose(other.prior.log_density()(moved), one.prior.log_density()(theta), rtol=1e-6)
+    np.testing.assert_allclose(other.log_likelihood(moved), one.log_likelihood(theta), rtol=1e-6)
+
+
+def test_under_weights_the_range_reaches_from_the_wire_without_tension():
+    holds, weights, x = [1] * 3 + [2] * 3, [4.0] * 3 + [8.0] * 3, [14.0, 14.0, 14.1, 18.0, 18.0, 18.1]
+    times = [0.0, 1.0, 2.0] * 2
+    tested = from_arrays(holds, x, times, weights, length_mm=1000.0, name="w", material="line", control="force")
+    found = scales_of([tested])
+    assert found.range_mm == pytest.approx(8.2) and found.zeros_mm["w"] == pytest.approx(9.9)
+    single = scales_of([tested.first(1)])  # creep of .1 mm is taken for a tenth of the stretch
+    assert single.range_mm == pytest.approx(1.0) == single.step_mm
+
+
 @pytest.mark.parametrize("factor", [2.0**-30, 2.0**7])
 def test_a_geometric_mean_is_multiplied_to_the_last_bit(factor):
     values = [0.3, 7.0, 11.3]

@@ -168,3 +168,39 @@ def test_files_that_cannot_be_planned_with_are_refused(plan_file, experiment_fil
         wb.plan(path)
     with pytest.raises(wb.InputError, match=r"found no posterior\.nc"):
         wb.plan(tmp_path)
+
+
+def test_tests_under_weights_are_simulated_and_planned(tmp_path):
+    hung = wb.simulate_tests(weights=[2, 4, 6], unload=1, times=[0, 60, 300], resolution=0.001, parameters=HUNG)
+    (test,) = hung.experiments
+    assert test.control == "force" and [hold.setting for hold in test.holds] == [2.0, 4.0, 6.0, 4.0]
+    assert test.resolution == 0.001
+    found = wb.plan(test, tests=10, output=tmp_path / "out").summary()
+    assert {p["name"] for p in found["protocols"]} == {"again", "unload", "dense", "unload-dense", "half-steps"}
+    assert found["protocols"][0]["creep"]["tension_N"] == 4.0
+    path = tmp_path / "plan.toml"
+    path.write_text(WEIGHTS)
+    (row,) = wb.plan(path, tests=10, output=tmp_path / "file").summary()["protocols"]
+    assert row["holds"] == 4 and row["parameters"]["k1"]["sd"] < 100.0
+
+
+HUNG = {"k1": 900.0, "B": 0.1, "U": 0.9, "k2": 0.05, "N": 0.8, "preload": 0.0, "sensor_sd": 0.003, "setting_sd": 0.01}
+WEIGHTS = """[guess]
+k1 = { distribution = "log-normal", median = 900.0, sd_log = 0.2 }
+[[protocol]]
+length_mm = 1000.0
+control = "force"
+step_N = 2.0
+holds = 3
+unload = 1
+hold_s = 600.0
+"""
+
+
+def test_a_plan_under_weights_refuses_what_only_steps_have(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(WEIGHTS.replace("step_N", "step_mm"))
+    with pytest.raises(wb.InputError, match="step_mm"):
+        wb.plan(path)
+    with pytest.raises(wb.InputError, match="--weights: found -1, expected more than 0 N"):
+        wb.simulate_tests(weights=[1, -1])

@@ -23,8 +23,14 @@ def simulate(
     displacements: Annotated[
         str, typer.Option("--displacements", metavar="MM,…", help="One displacement per hold.")
     ] = "1,2,3,4,5,6,7,8,9,10,11,12",
+    weights: Annotated[
+        str,
+        typer.Option(
+            "--weights", metavar="N,…", help="One weight per hold, in place of displacements, which are read then."
+        ),
+    ] = "",
     unload: Annotated[
-        int, typer.Option("--unload", min=0, metavar="K", help="Then K holds back down through the same displacements.")
+        int, typer.Option("--unload", min=0, metavar="K", help="Then K holds back down through the same settings.")
     ] = 0,
     times: Annotated[str, typer.Option("--times", metavar="S,…", help="Reading times of a hold.")] = "0,30,60,90,120",
     unrecorded: Annotated[
@@ -34,7 +40,8 @@ def simulate(
         str, typer.Option("--temperature", metavar="C,…", help="Temperatures at evenly spaced moments of the test.")
     ] = "",
     resolution: Annotated[
-        float, typer.Option("--resolution", min=0.0, metavar="N", help="Rounding of the tensions; 0: unrounded.")
+        float,
+        typer.Option("--resolution", min=0.0, metavar="N", help="Rounding of what is read, N or mm; 0: unrounded."),
     ] = 0.01,
     parameter: Annotated[
         list[str] | None,
@@ -63,7 +70,7 @@ def simulate(
         name, _, value = text.partition("=")
         chosen[name] = number(f"--parameter {text}", value)
     simulate_tests(
-        tests=tests, lengths=lengths, displacements=displacements, unload=unload, times=times,
+        tests=tests, lengths=lengths, displacements=displacements, weights=weights, unload=unload, times=times,
         unrecorded=unrecorded or (), temperature=temperature, resolution=resolution, parameters=chosen,
         effects=effect or (), own_effects=own_effects, elastic_law=elastic_law, history=history, seed=seed,
         output=Path("simulated") if output is None else output,

@@ -12,7 +12,8 @@ from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.typing import Array
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.control import SET_UNIT
+from wirebayes.wire.protocol import Control, Protocol
 
 _WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
 _TRIED = "unloading, longer holds, finer steps, another length"
@@ -20,17 +21,28 @@ _TRIED = "unloading, longer holds, finer steps, another length"
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """A measurement one could make next: in words, and as holds at displacements, each read at the same times."""
+    """A measurement one could make next: in words, and as holds, each read at the same times.
+
+    Attributes
+    ----------
+    words : str
+    setting : (H,) array
+        One a hold: displacements, or weights.
+    times_s : (R,) array
+    length_mm : float
+    control : {"displacement", "force"}
+    """
 
     words: str
-    displacement_mm: Array
+    setting: Array
     times_s: Array
     length_mm: float
+    control: Control
 
     @property
     def protocol(self) -> Protocol:
         """Its holds."""
-        return _holds(self.displacement_mm, self.times_s, self.length_mm)
+        return _holds(self.setting, self.times_s, self.length_mm, self.control)
 
 
 def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[MeasurementPlan]:
@@ -43,26 +55,27 @@ def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[Measu
     alone : bool
         Whether there is no other sample, whose displacements would differ.
     units : Units
-        In which the protocol is written; words are in mm and s.
+        In which the protocol is written; words are in mm or N, and s.
     """
     recorded = p.recorded
-    mm, second = units.length_mm, units.time_s
+    unit, settings = SET_UNIT[p.control], "weights" if p.control == "force" else "displacements"
+    one, second = units.of(unit), units.time_s
     x = p.setting[recorded]
     down = x[-2::-1] if len(x) > 1 else x
     times = _longest_series(p)
     long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
     log_times = np.concatenate([[0.0], np.geomspace(long / 300.0, long, 24)])
-    span = f"{mm * x.min():g} to {mm * x.max():g} mm" if alone else "each sample's displacements"
+    span = f"{one * x.min():g} to {one * x.max():g} {unit}" if alone else f"each sample's {settings}"
     dense = f"{second * long:g} s with 25 readings spaced evenly in the logarithm of time"
     there_and_back = np.concatenate([x, down])
     halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
-    last = f" from {mm * x.max():g} to {mm * x.min():g} mm" if alone else ", of every sample"
-    back = f"the same displacements back{last}, each held {second * times[-1]:g} s"
+    last = f" from {one * x.max():g} to {one * x.min():g} {unit}" if alone else ", of every sample"
+    back = f"the same {settings} back{last}, each held {second * times[-1]:g} s"
     return [
-        MeasurementPlan(words, displacements, moments, p.length_mm)
-        for words, displacements, moments in (
+        MeasurementPlan(words, holds, moments, p.length_mm, p.control)
+        for words, holds, moments in (
             (f"unload the wire after the last hold: {back}", there_and_back, times),
-            (f"hold each of the displacements {span} for {dense}", x, log_times),
+            (f"hold each of the {settings} {span} for {dense}", x, log_times),
             (f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
             (f"take twice as many, half as large steps over {span}", halved, times),
         )
@@ -78,24 +91,30 @@ def _longest_series(p: Protocol) -> Array:
     return p.time_s[int(np.argmax(counts))][: int(counts.max())]
 
 
-def _holds(displacement: Array, times: Array, length_mm: float) -> Protocol:
-    """Holds at these displacements, each read at these times."""
-    h = len(displacement)
+def _holds(setting: Array, times: Array, length_mm: float, control: Control) -> Protocol:
+    """Holds at these displacements or weights, each read at these times."""
+    h = len(setting)
     time, duration = np.tile(times, (h, 1)), np.full(h, times[-1])
-    return Protocol(length_mm, displacement, time, np.ones(time.shape, bool), duration, np.arange(1, h + 1))
+    number = np.arange(1, h + 1)
+    return Protocol(length_mm, setting, time, np.ones(time.shape, bool), duration, number, control=control)
 
 
 def _another_length(problem: Problem) -> tuple[str, Problem]:
-    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
+    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares.
+
+    Twice the length takes twice the displacements; weights stay.
+    """
     longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
     p, length = longest.protocol, 2.0 * longest.protocol.length_mm
-    protocol = _holds(2.0 * p.setting[p.recorded], _longest_series(p), length)
+    settings = p.setting[p.recorded] * (1.0 if p.control == "force" else 2.0)
+    protocol = _holds(settings, _longest_series(p), length, p.control)
     model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
     more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
     exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
     prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
     which = "a second" if len({s.protocol.length_mm for s in problem.samples}) == 1 else "another"
-    words = f"repeat the test at {which} length, {problem.units.length_mm * length:g} mm, with steps scaled alike"
+    alike = "the same weights" if p.control == "force" else "steps scaled alike"
+    words = f"repeat the test at {which} length, {problem.units.length_mm * length:g} mm, with {alike}"
     return words, replace(problem, samples=(*problem.samples, more), prior=prior)
 
 
@@ -132,7 +151,7 @@ def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakes
 
 
 def next_for_remainder(block: LaplaceFit) -> str:
-    """The plan in which a smooth remainder of the same size in newtons would stand out most."""
+    """The plan in which a smooth remainder of the same size would stand out most."""
     words, ratio = _best_plan(block, lambda target: _remainder_seen(target, block))
     if ratio < _WORTH:
         return f"None of the tests considered ({_TRIED}) would show more of what remains; repeat this one."
@@ -155,7 +174,7 @@ def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tup
 
 
 def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:
-    """Typical length, in standard deviations of a reading, of a smooth remainder of one newton after projection."""
+    """Typical length, in standard deviations of a reading, of a smooth remainder of one unit after projection."""
     x = expand(target, block.modes.z[:1], [])
     smooth = replace(x, signatures=x.flexible, one_sided=np.zeros(x.flexible.shape[2], bool))
     return float(np.sqrt((projected(smooth, float(x.ratio[0])) ** 2).sum()))

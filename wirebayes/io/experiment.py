@@ -351,7 +351,7 @@ def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
     largest = LARGEST["displacement_mm"]
     expected = f"a length above 0 mm, from {SHORTEST:.0e} to {largest:.0e} mm"
     length = keys.number("length_mm", expected, least=SHORTEST, most=largest)
-    control = _control(keys)
+    control = control_of(keys)
     resolution = _resolution(keys, control)
     priors = keys.priors()
     preload = _preload(keys, priors, length)
@@ -365,7 +365,7 @@ def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
     )
 
 
-def _control(keys: Keys) -> Control:
+def control_of(keys: Keys) -> Control:
     """What the experiment sets; the displacement where it does not say."""
     expected = '"displacement" (displacements are set, tensions are read) or "force" (the reverse)'
     match keys.table.get("control", "displacement"):

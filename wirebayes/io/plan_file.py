@@ -8,18 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.io.experiment import ENOUGH, LEAST_READINGS, SHORTEST
-from wirebayes.io.readings import LARGEST, STRETCH, shown
+from wirebayes.io.experiment import ENOUGH, LEAST_READINGS, SHORTEST, control_of
+from wirebayes.io.readings import LARGEST, READ, STRETCH, shown
 from wirebayes.io.toml_keys import Keys, read_toml
 from wirebayes.units import nearest
 from wirebayes.user_files import read_text
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.protocol import Control
 
 KIND = "protocol"
 GUESSED = ("k1", "B", "U", "k2", "N", "preload", "sensor_sd", "setting_sd")
 MOST_READINGS = 20_000  # of a protocol: a plan simulates it hundreds of times
 _TOP = ("material", "budget_min", "robot", "aim", "posterior", "guess", "prior", KIND)
-_KEYS = ("name", "length_mm", "resolution_N", "displacements_mm", "step_mm", "holds", "unload", "times_s", "hold_s",
-         "readings", "temperatures_C")  # fmt: skip
+_KEYS = ("name", "length_mm", "control", "holds", "unload", "times_s", "hold_s", "readings", "temperatures_C")
+_SET = {
+    "displacement": ("displacements_mm", "step_mm", "resolution_N"),
+    "force": ("weights_N", "step_N", "resolution_mm"),
+}
 
 
 @dataclass(frozen=True)
@@ -29,9 +34,12 @@ class PlannedTest:
     Attributes
     ----------
     name : str
-    length_mm, resolution_N : float
-    displacements_mm : tuple of float
-        One a hold, the way back included.
+    length_mm : float
+    control : {"displacement", "force"}
+    settings : tuple of float
+        One a hold, the way back included: displacements, mm, or weights, N.
+    resolution : float
+        Of what is read, N or mm.
     times_s : tuple of float
         Reading times of each hold.
     temperatures_C : tuple of float
@@ -40,8 +48,9 @@ class PlannedTest:
 
     name: str
     length_mm: float
-    resolution_N: float
-    displacements_mm: tuple[float, ...]
+    control: Control
+    settings: tuple[float, ...]
+    resolution: float
     times_s: tuple[float, ...]
     temperatures_C: tuple[float, ...] = ()
 
@@ -137,14 +146,17 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
 
 
 def _planned(keys: Keys, index: int) -> PlannedTest:
-    keys.only(_KEYS)
+    control = control_of(keys)
+    of_settings, step, of_resolution = _SET[control]
+    keys.only((*_KEYS, of_settings, step, of_resolution))
     name = keys.string("name", "a name") if "name" in keys.table else f"protocol-{index + 1}"
     expected = f"a length above 0 mm, from {SHORTEST:.0e} to {LARGEST['displacement_mm']:.0e} mm"
     length = keys.number("length_mm", expected, least=SHORTEST, most=LARGEST["displacement_mm"])
     resolution = 0.01
-    if "resolution_N" in keys.table:
-        resolution = keys.number("resolution_N", "a step of 0 N or more", least=0.0, most=LARGEST["tension_N"])
-    path = _displacements(keys, length)
+    if of_resolution in keys.table:
+        unit = READ_UNIT[control]
+        resolution = keys.number(of_resolution, f"a step of 0 {unit} or more", least=0.0, most=LARGEST[READ[control]])
+    path = _weights(keys) if control == "force" else _displacements(keys, length)
     if "unload" in keys.table:
         expected = f"a whole number of holds on the way back, 0 to {len(path) - 1}"
         back = _whole(keys, "unload", expected, 0, len(path) - 1)
@@ -164,25 +176,39 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
         warmth = _numbers(keys, "temperatures_C", "a list of temperatures above -273.15 °C")
         if not warmth or min(warmth) <= -273.15:
             raise keys.complain("temperatures_C", shown(warmth), "a list of temperatures above -273.15 °C")
-    return PlannedTest(name, length, resolution, tuple(path), tuple(times), tuple(warmth))
+    return PlannedTest(name, length, control, tuple(path), resolution, tuple(times), tuple(warmth))
 
 
 def _displacements(keys: Keys, length: float) -> list[float]:
     expected = f"displacements above -{length:g} mm, the wire's length, and of at most {STRETCH:g} times it"
-    if "displacements_mm" in keys.table:
-        for other in ("step_mm", "holds"):
-            if other in keys.table:
-                raise keys.complain(other, f"{other} beside displacements_mm", "one way to say it")
-        path, key = _numbers(keys, "displacements_mm", expected), "displacements_mm"
-    else:
-        step = keys.number("step_mm", "a step other than 0 mm, or displacements_mm")
-        if step == 0:
-            raise keys.complain("step_mm", "0", "a step other than 0 mm")
-        count = _whole(keys, "holds", "a whole number of holds, 1 or more", 1, MOST_READINGS)
-        path, key = [step * (i + 1) for i in range(count)], "step_mm"
+    path, key = _settings(keys, "displacement", expected)
     if not path or min(path) <= -length or max(path) > STRETCH * length:
         raise keys.complain(key, shown(keys.table[key]), expected)
     return path
+
+
+def _weights(keys: Keys) -> list[float]:
+    expected = f"weights above 0 N, of at most {LARGEST['tension_N']:.0e} N"
+    path, key = _settings(keys, "force", expected)
+    if not path or min(path) <= 0 or max(path) > LARGEST["tension_N"]:
+        raise keys.complain(key, shown(keys.table[key]), expected)
+    return path
+
+
+def _settings(keys: Keys, control: Control, expected: str) -> tuple[list[float], str]:
+    """What is set in each hold on the way up, listed or as steps, and the key that says it."""
+    of_settings, of_step, _ = _SET[control]
+    if of_settings in keys.table:
+        for other in (of_step, "holds"):
+            if other in keys.table:
+                raise keys.complain(other, f"{other} beside {of_settings}", "one way to say it")
+        return _numbers(keys, of_settings, expected), of_settings
+    unit = SET_UNIT[control]
+    step = keys.number(of_step, f"a step other than 0 {unit}, or {of_settings}")
+    if step == 0:
+        raise keys.complain(of_step, "0", f"a step other than 0 {unit}")
+    count = _whole(keys, "holds", "a whole number of holds, 1 or more", 1, MOST_READINGS)
+    return [step * (i + 1) for i in range(count)], of_step
 
 
 def _times(keys: Keys) -> list[float]:

@@ -23,7 +23,8 @@ setting_sd     0.004 to 0.16 steps, at most 0.5            a screw up to a hand-
 =============  ==========================================  ===========================================================
 
 Where the tension is set, ``setting_sd`` is as many steps of the weight and ``sensor_sd`` the same share of the range of
-displacements; the zero of the gauge is arbitrary, so that ``preload`` is as wide as that range.
+displacements; the zero of the gauge is arbitrary, so that ``preload`` is as wide as that range, about what the weights
+say of the wire without tension by proportion.
 """
 
 from collections.abc import Callable, Mapping
@@ -238,7 +239,9 @@ SENSOR, SENSOR_SD = 0.003, 1.5  # of the typical tension
 SETTING, SETTING_LOG_SD, SETTING_MOST = 0.03, 1.2, 0.5  # of the typical step
 
 
-def wire_defaults(length_mm: float, scales: Scales, control: Control = "displacement") -> dict[str, Any]:
+def wire_defaults(
+    length_mm: float, scales: Scales, control: Control = "displacement", zero_mm: float = 0.0
+) -> dict[str, Any]:
     """Distributions of the plain model's parameters, in the test's own units (see the module's table).
 
     Parameters
@@ -248,6 +251,8 @@ def wire_defaults(length_mm: float, scales: Scales, control: Control = "displace
     scales : Scales
     control : {"displacement", "force"}
         What is set in the test: its setting error is one of that, its sensor error one of what is read.
+    zero_mm : float
+        What the gauge of a test under weights shows of the wire without tension.
 
     Returns
     -------
@@ -257,7 +262,10 @@ def wire_defaults(length_mm: float, scales: Scales, control: Control = "displace
     lengths, steps = length_mm / scales.range_mm, scales.range_mm / scales.step_mm
     if control == "displacement":
         return dict(_wire_defaults(lengths, steps))
-    return _wire_defaults(lengths, steps) | _under_weights(steps, scales.step_N / scales.tension_N)
+    preload = stats.norm(-zero_mm / scales.step_mm, steps)
+    return (
+        _wire_defaults(lengths, steps) | _under_weights(steps, scales.step_N / scales.tension_N) | {"preload": preload}
+    )
 
 
 @cache  # scipy takes as long to make eight distributions as a hundred points take to be evaluated
@@ -277,7 +285,7 @@ def _wire_defaults(lengths: float, steps: float) -> dict[str, Any]:
 
 @cache
 def _under_weights(steps: float, weight_step: float) -> dict[str, Any]:
-    """What is different where the tension is set; the zero of a gauge is arbitrary.
+    """What is different of the errors where the tension is set.
 
     Parameters
     ----------
@@ -288,7 +296,6 @@ def _under_weights(steps: float, weight_step: float) -> dict[str, Any]:
     """
     most = SETTING_MOST * weight_step
     return {
-        "preload": stats.norm(0.0, steps),
         "sensor_sd": stats.lognorm(SENSOR_SD, scale=SENSOR * steps),
         "setting_sd": logit_normal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, loc=0.0, scale=most),
     }

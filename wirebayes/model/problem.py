@@ -21,7 +21,7 @@ from wirebayes.units import nearest
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Amplitude, Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.wire.protocol import Protocol
+from wirebayes.wire.protocol import Control, Protocol
 from wirebayes.wire.staircase import Linearised, Model, linearise, streamed, tension_reference
 
 Likelihood = Literal["chain", "hold"]
@@ -323,7 +323,8 @@ def build(
         samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], law, history)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
-        defaults = wire_defaults(experiment.length_mm, scales, experiment.control)
+        zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
+        defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
         wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
         distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
         distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(effects) if a.of_each_test}
@@ -344,7 +345,9 @@ def build(
     )
 
 
-def default_prior(length_mm: float, scales: Scales, instead: Mapping[str, Any]) -> Prior:
+def default_prior(
+    length_mm: float, scales: Scales, instead: Mapping[str, Any], control: Control = "displacement"
+) -> Prior:
     """The plain model's prior for a wire of this length, in mm, N and s.
 
     Parameters
@@ -354,10 +357,16 @@ def default_prior(length_mm: float, scales: Scales, instead: Mapping[str, Any]) 
         Of the test, which defaults refer to.
     instead : mapping of name to float or scipy frozen distribution
         What is stated in place of defaults, in natural units.
+    control : {"displacement", "force"}
+        What is set in the test.
     """
     units = scales.units
-    defaults = wire_defaults(length_mm, scales)
-    every = {name: scaled(d, units.of(unit_of_column(name, ()))) for name, d in defaults.items()} | dict(instead)
+    defaults = wire_defaults(length_mm, scales, control)
+    own = {name: unit_of_column(name, ()) for name in defaults} | {
+        "sensor_sd": READ_UNIT[control],
+        "setting_sd": SET_UNIT[control],
+    }
+    every = {name: scaled(d, units.of(own[name])) for name, d in defaults.items()} | dict(instead)
     fixed = {name: d for name, d in every.items() if isinstance(d, float)}
     free = {name: d for name, d in every.items() if name not in fixed}
     powers = _default_powers([name for name in free if name not in instead], fixed, units)

@@ -6,14 +6,15 @@ in them (`wirebayes.model.prior`). Natural units, mm, N and s, come back where r
 """
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.means import geometric_mean
 
+MOST_OF_SPAN = 10.0  # times what was seen: weights that hardly differ show little but creep, some tenth of the stretch
 _SMALLEST_STEP = 1e-3  # of the length: stands in where a test has no displacement at all
 TYPICAL_K1_N = 2000.0  # a light line, where nothing is said of a wire that is not tested yet
 _DIMENSIONS = {"mm": "length_mm", "N": "tension_N", "s": "time_s"}
@@ -64,7 +65,8 @@ class Scales:
     step_mm : float
         Median move between holds that differ; of a single hold its displacement.
     range_mm : float
-        From the least to the largest displacement, zero included.
+        From the least to the largest displacement, zero included. Under weights, where the zero of a gauge is
+        arbitrary, from the wire without tension to the largest displacement, by proportion of the weights.
     tension_N : float
         Median of the positive tensions.
     hold_s : float
@@ -72,6 +74,8 @@ class Scales:
     step_N : float
         Median change of the tension between holds that differ, where it is set; of a single hold its tension. As many
         typical tensions as `step_mm` is ranges where it is read.
+    zeros_mm : mapping of name to float
+        Of each test under weights: what the gauge shows of the wire without tension, by proportion of the weights.
     """
 
     step_mm: float
@@ -79,6 +83,7 @@ class Scales:
     tension_N: float
     hold_s: float
     step_N: float
+    zeros_mm: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def units(self) -> Units:
@@ -88,12 +93,20 @@ class Scales:
 
 def scales_of(experiments: Sequence[Experiment]) -> Scales:
     """The scales of one test, or the geometric means of several that are fitted together."""
-    each = [_scales(experiment) for experiment in experiments]
-    return Scales(*(geometric_mean(getattr(s, field.name) for s in each) for field in fields(Scales)))
+    each = [_under_weights(e) if e.control == "force" else _under_steps(e) for e in experiments]
+
+    def mean(name: str) -> float:
+        return geometric_mean(getattr(one, name) for one in each)
+
+    zeros = {name: zero for one in each for name, zero in one.zeros_mm.items()}
+    return Scales(mean("step_mm"), mean("range_mm"), mean("tension_N"), mean("hold_s"), mean("step_N"), zeros)
 
 
 def planned_scales(experiments: Sequence[Experiment], k1_N: float = TYPICAL_K1_N) -> Scales:
-    """Scales of tests that nobody has read yet: the tension is what half the range gives on a wire of this stiffness.
+    """Scales of tests that nobody has read yet, on a wire of this stiffness.
+
+    Where displacements are set, the tension is what half the range gives; where weights are, each stretches the wire as
+    if it did not creep.
 
     Parameters
     ----------
@@ -101,26 +114,52 @@ def planned_scales(experiments: Sequence[Experiment], k1_N: float = TYPICAL_K1_N
         Their readings do not count.
     k1_N : float
     """
-    found = scales_of(experiments)
+    found = scales_of([_stretched(e, k1_N) if e.control == "force" else e for e in experiments])
+    if all(e.control == "force" for e in experiments):
+        return found
     length_mm = geometric_mean(experiment.length_mm for experiment in experiments)
     tension = 0.5 * k1_N * found.range_mm / length_mm
     return replace(found, tension_N=tension, step_N=tension * found.step_mm / found.range_mm)
 
 
-def _scales(experiment: Experiment) -> Scales:
+def _stretched(experiment: Experiment, k1_N: float) -> Experiment:
+    """A test under weights with the readings of a wire that only stretches."""
+    holds = [
+        replace(hold, readings=np.full(hold.time_s.size, experiment.length_mm * hold.setting / k1_N))
+        for hold in experiment.holds
+    ]
+    return replace(experiment, holds=tuple(holds))
+
+
+def _under_steps(experiment: Experiment) -> Scales:
     recorded = experiment.recorded_holds
     settings = np.array([hold.setting for hold in experiment.holds])
-    readings = np.concatenate([hold.readings for hold in recorded]) if recorded else np.zeros(1)
-    under_weights = experiment.control == "force"
-    places = np.array([hold.readings[0] for hold in recorded]) if under_weights else settings
-    step = typical_step(places) or _SMALLEST_STEP * experiment.length_mm
-    moved = readings if under_weights else settings
-    reach = float(max(moved.max(), 0.0) - min(moved.min(), 0.0)) or step
-    tension = typical_tension(settings if under_weights else readings)
-    step_N = typical_step(settings) if under_weights else tension * step / reach
-    durations = np.array([hold.duration_s for hold in recorded or experiment.holds])
-    hold_s = float(np.median(durations)) or float(durations.max()) or 1.0
-    return Scales(step, reach, tension, hold_s, step_N)
+    step = typical_step(settings) or _SMALLEST_STEP * experiment.length_mm
+    reach = float(max(settings.max(), 0.0) - min(settings.min(), 0.0)) or step
+    tension = typical_tension(np.concatenate([hold.readings for hold in recorded]) if recorded else np.zeros(1))
+    return Scales(step, reach, tension, _typical_hold(experiment), tension * step / reach)
+
+
+def _under_weights(experiment: Experiment) -> Scales:
+    """The same where tensions are set: nothing of it depends on where the gauge stands at zero."""
+    recorded = experiment.recorded_holds
+    weights = np.array([hold.setting for hold in recorded])
+    first = np.array([hold.readings[0] for hold in recorded])
+    seen = float(np.ptp(np.concatenate([hold.readings for hold in recorded])))
+    seen = seen or _SMALLEST_STEP * experiment.length_mm
+    heaviest = float(weights.max())
+    reach = seen * min(MOST_OF_SPAN, heaviest / float(np.ptp(weights))) if np.ptp(weights) else MOST_OF_SPAN * seen
+    step = (typical_step(first) if len(first) > 1 else 0.0) or reach
+    lightest = int(weights.argmin())
+    zero = float(first[lightest] - reach * weights[lightest] / heaviest)
+    settings = [hold.setting for hold in experiment.holds]
+    hold_s = _typical_hold(experiment)
+    return Scales(step, reach, typical_tension(settings), hold_s, typical_step(settings), {experiment.name: zero})
+
+
+def _typical_hold(experiment: Experiment) -> float:
+    durations = np.array([hold.duration_s for hold in experiment.recorded_holds or experiment.holds])
+    return float(np.median(durations)) or float(durations.max()) or 1.0
 
 
 def typical_step(settings: Sequence[float] | np.ndarray) -> float:

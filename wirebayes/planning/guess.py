@@ -85,7 +85,7 @@ def from_tables(
     k1 = stated.get("k1", TYPICAL_K1_N)
     scales = planned_scales(tests, k1 if isinstance(k1, float) else float(k1.median()))
     length_mm = tests[0].length_mm
-    prior = default_prior(length_mm, scales, stated)
+    prior = default_prior(length_mm, scales, stated, tests[0].control)
     drawn = dict(zip(prior.names, prior.rvs(n, rng).T, strict=True))
     known = {name: np.full(n, value) for name, value in prior.fixed.items()}
     out = {name: (drawn | known)[name] for name in (*MATERIAL, *SAMPLE)}

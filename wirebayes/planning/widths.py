@@ -68,7 +68,7 @@ def central(guess: Guess) -> dict[str, float]:
 
 
 def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History) -> Experiment:
-    """The test with the readings that the guess's centre gives without errors.
+    """The test with the readings, tensions or displacements, that the guess's centre gives without errors.
 
     Parameters
     ----------
@@ -84,17 +84,17 @@ def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History)
     """
     problem = build([test], law=law, history=history)
     (sample,) = problem.samples
-    tension = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]
+    read = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]
     holds = [
         replace(hold, readings=frozen(row[mask].tolist())) if hold.recorded else hold
-        for hold, row, mask in zip(test.holds, tension, sample.protocol.mask, strict=True)
+        for hold, row, mask in zip(test.holds, read, sample.protocol.mask, strict=True)
     ]
     return replace(test, holds=tuple(holds))
 
 
 def typical_tension(test: Experiment) -> float:
     """The middle one of the tensions with which the holds of a test begin, N."""
-    return float(np.median([hold.tension_N[0] for hold in test.recorded_holds]))
+    return float(np.median([np.ravel(hold.tension_N)[0] for hold in test.recorded_holds]))
 
 
 def expected_widths(

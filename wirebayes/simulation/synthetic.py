@@ -83,6 +83,21 @@ class Bench:
         """Of what is read."""
         return self.resolution_mm if self.control == "force" else self.resolution_N
 
+    def setting(self, control: Control, settings: Sequence[float], resolution: float) -> "Bench":
+        """This bench with what is set in each hold.
+
+        Parameters
+        ----------
+        control : {"displacement", "force"}
+        settings : sequence of float
+            Displacements, mm, or weights, N.
+        resolution : float
+            Of what is read then.
+        """
+        if control == "force":
+            return replace(self, weights_N=settings, resolution_mm=resolution)
+        return replace(self, displacements_mm=settings, resolution_N=resolution)
+
     def experiment(self) -> Experiment:
         """The test with readings still at zero."""
         count = len(self.settings)

@@ -260,8 +260,9 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
 
 
 def _experiment(test: PlannedTest, file: PlanFile) -> Experiment:
-    bench = Bench(test.name, file.material, test.length_mm, test.resolution_N, test.displacements_mm, test.times_s,
-                  temperatures_C=test.temperatures_C)  # fmt: skip
+    bench = Bench(
+        test.name, file.material, test.length_mm, times_s=test.times_s, temperatures_C=test.temperatures_C
+    ).setting(test.control, test.settings, test.resolution)
     return replace(bench.experiment(), source=file.source, priors=file.priors, prior_lines=file.prior_lines)
 
 
@@ -270,8 +271,9 @@ def _like(measured: Experiment) -> list[tuple[Experiment, str]]:
     out = [(replace(measured, name=REPEAT), "repeat the test")]
     short = ("unload", "dense", "unload-dense", "half-steps")
     for name, other in zip(short, alternatives(measured.protocol(), alone=True), strict=True):
-        bench = Bench(name, measured.material, measured.length_mm, measured.resolution_N,
-                      tuple(other.displacement_mm.tolist()), tuple(other.times_s.tolist()))  # fmt: skip
+        bench = Bench(name, measured.material, measured.length_mm, times_s=tuple(other.times_s.tolist())).setting(
+            measured.control, tuple(other.setting.tolist()), measured.resolution
+        )
         out.append((replace(bench.experiment(), source=measured.source, priors=measured.priors), other.words))
     return out
 
@@ -282,13 +284,15 @@ def _measured(sample: Sample, folder: Path) -> Experiment:
     holds = []
     for i, mask in enumerate(p.mask):
         number = int(p.number[i]) if mask.any() else None
-        times, tension = p.time_s[i][mask].tolist(), sample.readings[i, :, 0][mask].tolist()
+        times, read = p.time_s[i][mask].tolist(), sample.readings[i, :, 0][mask].tolist()
         log = None
         if p.warming_K is not None and p.reference_C is not None and mask.any():
             log = frozen((p.warming_K[i][mask] + p.reference_C).tolist())
-        holds.append(Hold(number, float(p.setting[i]), float(p.duration_s[i]), frozen(times), frozen(tension),
-                          log, float(p.start_s[i])))  # fmt: skip
-    return Experiment(sample.name, sample.material, p.length_mm, sample.resolution, tuple(holds), folder)
+        holds.append(Hold(number, float(p.setting[i]), float(p.duration_s[i]), frozen(times), frozen(read),
+                          log, float(p.start_s[i]), p.control))  # fmt: skip
+    return Experiment(
+        sample.name, sample.material, p.length_mm, sample.resolution, tuple(holds), folder, control=p.control
+    )
 
 
 def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:

@@ -9,8 +9,10 @@ from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import check_run, open_run
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.protocol import Control
 from wirebayes.workflows.options import (
     Numbers,
     PathLike,
@@ -29,6 +31,7 @@ def simulate_tests(
     tests: int = 1,
     lengths: Numbers = (1000.0,),
     displacements: Numbers = tuple(range(1, 13)),
+    weights: Numbers = (),
     unload: int = 0,
     times: Numbers = (0.0, 30.0, 60.0, 90.0, 120.0),
     unrecorded: Sequence[int] = (),
@@ -52,8 +55,10 @@ def simulate_tests(
         Zero-tension lengths, mm; one sample of each line for each length.
     displacements : sequence of float
         One a hold, mm.
+    weights : sequence of float
+        One a hold, N, in place of displacements: tensions are set, and displacements are read.
     unload : int
-        Then so many holds back down through the same displacements.
+        Then so many holds back down through the same displacements or weights.
     times : sequence of float
         Reading times of a hold, s.
     unrecorded : sequence of int
@@ -61,7 +66,7 @@ def simulate_tests(
     temperature : sequence of float
         Temperatures at evenly spaced moments of the test, °C.
     resolution : float
-        Rounding of the tensions, N; 0 for none.
+        Rounding of the tensions, N, or of the displacements under weights, mm; 0 for none.
     parameters : mapping of name to value, optional
         Such as ``{"k1": 700}``; parameters not given are drawn from the prior.
     effects : mapping of ``NAME.p`` to value, or sequence of ``NAME.p=VALUE`` or ``NAME``
@@ -91,6 +96,9 @@ def simulate_tests(
     (3, 5)
     >>> made.summary()["experiments"]["wire"]["parameters"]["k1"]
     700.0
+    >>> hung = wb.simulate_tests(weights=[2, 4, 6], parameters={"k1": 700}, seed=1)
+    >>> hung.experiments[0]
+    Experiment(wire, 3 holds, 15 readings, tensions set)
     """
     check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
     check_choice("history", history, get_args(History))
@@ -100,20 +108,26 @@ def simulate_tests(
     chosen |= amplitudes
     tests = check_whole("--tests", tests, 1)
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
-    path = _path(displacements, unload)
+    control: Control = "force" if text_of(weights) else "displacement"
+    option, given = ("--weights", weights) if control == "force" else ("--displacements", displacements)
+    path = _path(option, given, unload)
     gaps = frozenset(unrecorded)
-    _check_protocol(path, sizes, moments, gaps)
+    _check_protocol(control, path, sizes, moments, gaps)
     warmth = _numbers("--temperature", temperature) if text_of(temperature) else []
     benches = [
-        Bench(_name(tests, sizes, i, length), f"line-{i + 1}", length, float(resolution), path, moments, gaps, warmth)
+        Bench(
+            _name(tests, sizes, i, length), f"line-{i + 1}", length,
+            times_s=moments, unrecorded=gaps, temperatures_C=warmth,
+        ).setting(control, path, float(resolution))
         for i in range(tests)
         for length in sizes
-    ]
+    ]  # fmt: skip
     truth = Truth(chosen, tuple(found.values()), elastic_law, history)
     configuration = {
         "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
-        "displacements_mm": path, "times_s": moments, "unrecorded": sorted(gaps), "temperatures_C": warmth,
-        "resolution_N": float(resolution), "parameters": chosen, "effects": list(found),
+        ("weights_N" if control == "force" else "displacements_mm"): path, "times_s": moments,
+        "unrecorded": sorted(gaps), "temperatures_C": warmth,
+        f"resolution_{READ_UNIT[control]}": float(resolution), "parameters": chosen, "effects": list(found),
         "own_effects": source_of(own),
         "elastic_law": elastic_law, "history": history,
     }  # fmt: skip
@@ -142,21 +156,27 @@ def _effects(
     return found, given
 
 
-def _path(displacements: Numbers, unload: int) -> list[float]:
-    """Displacements of all holds, mm: up as given, then so many back down."""
-    path = _numbers("--displacements", displacements)
+def _path(option: str, settings: Numbers, unload: int) -> list[float]:
+    """What is set in each hold, mm or N: up as given, then so many back down."""
+    path = _numbers(option, settings)
     if unload >= len(path):
-        raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} displacements")
+        raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} {option.removeprefix('--')}")
     return path + path[-2 : -2 - unload : -1]
 
 
 def _check_protocol(
-    path: Sequence[float], lengths: Sequence[float], times: Sequence[float], unrecorded: frozenset[int]
+    control: Control,
+    path: Sequence[float],
+    lengths: Sequence[float],
+    times: Sequence[float],
+    unrecorded: frozenset[int],
 ) -> None:
     """Refuse what no bench could do."""
     if min(lengths) <= 0 or len(set(lengths)) < len(lengths):
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
-    if min(path) <= -min(lengths):
+    if control == "force" and min(path) <= 0:
+        raise InputError(f"--weights: found {min(path):g}, expected more than 0 N")
+    if control == "displacement" and min(path) <= -min(lengths):
         raise InputError(f"--displacements: found {min(path):g}, expected more than -{min(lengths):g} mm, a length")
     if times[0] < 0 or any(b <= a for a, b in zip(times, times[1:], strict=False)):
         raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
