@@ -35,6 +35,7 @@ copybutton_prompt_is_regexp = True
 # classes that have a page of their own as public names are not repeated on the pages of their modules
 _CLASSES = [name for name in wirebayes.__all__ if inspect.isclass(getattr(wirebayes, name))]
 autosummary_context = {"public_classes": ", ".join(_CLASSES)}
+suppress_warnings = ["ref.python"]  # an attribute's name that two classes have leads to the first
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
