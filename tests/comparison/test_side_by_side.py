@@ -265,7 +265,8 @@ def test_exactly_four_and_exactly_two_standard_errors_mean_something(gains: list
 def test_models_come_by_score_then_those_scored_otherwise_then_failures() -> None:
     later = "later readings given each hold's first"
     models = [
-        {"name": "broken", "failed": "no", "scored": "all readings", "warnings": []}, row("low", [1.0, 1.0]), row(BASE, [2.0, 2.0]),
+        {"name": "broken", "failed": "no", "scored": "all readings", "warnings": []},
+        row("low", [1.0, 1.0]), row(BASE, [2.0, 2.0]),
         row("worse", [8.0, 7.0], scored=later), row("better", [9.0, 9.0], scored=later), row("high", [3.0, 3.0]),
         {"name": "also", "failed": "no", "scored": later, "warnings": []},
     ]  # fmt: skip
