@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # A process a core; the tests of a file share fits and stay together. More than four would wait for the longest file.
 SIDE_BY_SIDE := -n logical --maxprocesses 4 --dist loadfile
 
-.PHONY: mutants run test test-full lowest coverage lint calibration discover-benchmark benchmark docs dist clean
+.PHONY: mutants run test test-full lowest coverage lint calibration discover-benchmark benchmark outputs figures docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
@@ -58,6 +58,14 @@ benchmark: .venv/test.stamp
 	.venv-benchmark/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[benchmark]"
 	.venv-benchmark/bin/python -m analyses.benchmarks --output out/benchmarks
 
+# Outputs, pictures and figures of README and tutorial, as the commands give them now.
+outputs: .venv/run.stamp
+	$(BIN)/python docs/run_tutorial.py
+
+# The studies whose figures the README quotes (docs/results); outputs writes them into it.
+figures: .venv/test.stamp
+	$(BIN)/python docs/measure.py
+
 docs: .venv/docs.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
@@ -79,4 +87,4 @@ dist: .venv/release.stamp
 	touch $@
 
 clean:
-	rm -rf .venv out build dist docs/_build wirebayes.egg-info
+	rm -rf .venv out build dist docs/_build docs/api docs/commands wirebayes.egg-info

@@ -1,12 +1,14 @@
 """Forward kinematics against other programs and its own inverse, over random (robot, pose, wire) cases.
 
-    python analyses/robot_agreement.py [CASES_PER_ROBOT]
+    python analyses/robot_agreement.py [CASES_PER_ROBOT] [--output FILE.json]
 
 Lengths as commanded, and lengths wrong by a percent so that wires go slack. Laws (1)/(6) against MuJoCo's settled
 platform, law (3), and law (1) where MuJoCo's has not come to rest, against a general minimiser of an energy written
 anew; round trips for both.
 """
 
+import argparse
+import json
 import sys
 from pathlib import Path
 
@@ -68,7 +70,11 @@ def compare(robot, make, law, count, rng):
 
 
 def main():
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("count", type=int, nargs="?", default=40)
+    parser.add_argument("--output", type=Path)
+    options = parser.parse_args()
+    count = options.count
     rng = np.random.default_rng(2024)
     print("distances in m; 'blind' starts 2 cm off with no rotation known")
     print(f"{'robot':14s} {'law':8s} {'lengths':10s} cases solved  blind slack rested  median    largest   round trip")
@@ -94,6 +100,14 @@ def main():
         f"largest disagreement {worst:.1e} m "
         f"({over} above 1e-6), largest round-trip error {trips:.1e} m"
     )
+    if options.output:
+        found = {
+            "cases": total,
+            "with_slack_wires": int(slack),
+            "largest_m": float(worst),
+            "round_trip_m": float(trips),
+        }
+        options.output.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""Runs the tutorial's commands as they stand and keeps what they said, and the gallery's pictures, beside it.
+"""Runs the commands of the tutorial and of the README as they stand, and keeps what they said beside them.
 
-    python docs/run_tutorial.py
+    python docs/run_tutorial.py            (make outputs)
 
-A test runs the same commands and compares (`tests/test_docs.py`).
+writes the outputs and pictures of the tutorial and the gallery, and those of the README. Tests run the same commands
+and compare (`tests/test_docs.py`).
 """
 
 import csv
@@ -14,12 +15,18 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from wirebayes.report.blocks import save
-from wirebayes.report.figures import corner
-from wirebayes.results.store import load
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, corner
+from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
+from wirebayes.report.pictures.discover import left_over
+from wirebayes.results.store import Stored, load
 
 DOCS = Path(__file__).parent
+README = DOCS.parent / "README.md"
 CONTROLLERS = {
     "hooke_only": "ignores creep",
     "creep_aware": "compensates, by this fit",
@@ -34,6 +41,8 @@ PICTURES = {
     "error-budget": "out/pose/error-budget.svg",
     "workspace": "out/pose/workspace-drift.svg",
 }
+_CONSOLE = re.compile(r"```console\n(.*?)```", re.DOTALL)
+_PYTHON = re.compile(r"```python\n(.*?)```\n```text\n(.*?)```", re.DOTALL)
 
 
 def commands() -> list[list[str]]:
@@ -42,22 +51,30 @@ def commands() -> list[list[str]]:
     return [shlex.split(line) for line in re.findall(r"^    wirebayes (.*)", text, re.MULTILINE)][:-1]
 
 
+def start(folder: Path) -> None:
+    """Put the files that the commands read into an empty folder."""
+    for name in ("bench.csv", "next.csv"):
+        shutil.copy(DOCS / "example" / name, folder)
+
+
+def said_by(command: list[str], folder: Path) -> str:
+    """What a command prints in a folder, stdout before stderr."""
+    done = subprocess.run(
+        [sys.executable, "-m", "wirebayes", *command], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return "\n".join(filter(None, (done.stdout.rstrip(), done.stderr.rstrip()))) + "\n"
+
+
 def follow(folder: Path) -> dict[str, str]:
-    """Run them in a folder and return what each said, by its name; and two tables.
+    """Run the tutorial's commands and return what each said, by its name; and two tables.
 
     Parameters
     ----------
     folder : Path
         Empty; receives the example's files and all results.
     """
-    for name in ("bench.csv", "next.csv"):
-        shutil.copy(DOCS / "example" / name, folder)
-    outputs = {}
-    for command in commands():
-        done = subprocess.run(
-            [sys.executable, "-m", "wirebayes", *command], cwd=folder, capture_output=True, text=True, check=True
-        )
-        outputs[f"{command[0]}.txt"] = "\n".join(filter(None, (done.stdout.rstrip(), done.stderr.rstrip()))) + "\n"
+    start(folder)
+    outputs = {f"{command[0]}.txt": said_by(command, folder) for command in commands()}
     outputs["predicted.csv"] = _rounded((folder / "predicted.csv").read_text())
     outputs["pose-error.inc"] = _errors(json.loads((folder / "out/pose/pose.json").read_text()))
     return outputs
@@ -85,15 +102,90 @@ def _errors(pose: dict) -> str:
     return "\n".join(lines) + "\n"
 
 
-def main() -> None:
-    (DOCS / "tutorial").mkdir(exist_ok=True)
-    (DOCS / "gallery").mkdir(exist_ok=True)
-    with TemporaryDirectory() as folder:
-        for name, text in follow(Path(folder)).items():
-            (DOCS / "tutorial" / name).write_text(text, encoding="utf-8")
-        for name, file in PICTURES.items():
-            shutil.copy(Path(folder) / file, DOCS / "gallery" / f"{name}.svg")
-        pairs(Path(folder) / "out/discover/bench/final", DOCS / "gallery" / "corner.svg")
+def readme(text: str, folder: Path, known: dict[str, str]) -> str:
+    """The README with what its commands say.
+
+    Parameters
+    ----------
+    text : str
+    folder : Path
+        Where the tutorial has been followed.
+    known : dict
+        What its commands said there, as `follow` returns it.
+    """
+    tutorial = {shlex.join(command): known[f"{command[0]}.txt"] for command in commands()}
+    text = _CONSOLE.sub(lambda block: f"```console\n{_console(block[1], folder, tutorial)}```", text)
+    return _PYTHON.sub(lambda block: f"```python\n{block[1]}```\n```text\n{python(block[1], folder)}```", text)
+
+
+def _console(block: str, folder: Path, tutorial: dict[str, str]) -> str:
+    """Commands after ``$``, each with what it says; what the tutorial has run is not run again."""
+    lines = []
+    for prompt in re.findall(r"^\$ .*\n", block, re.MULTILINE):
+        lines.append(prompt)
+        program, *command = shlex.split(prompt[2:])
+        if program == "wirebayes":
+            known = tutorial.get(shlex.join(command))
+            lines.append(known if known is not None else said_by(command, folder))
+    return "".join(lines)
+
+
+def python(code: str, folder: Path) -> str:
+    """What a piece of Python prints in a folder."""
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def picture(plain: Stored, final: Stored) -> Figure:
+    """The readings with the final curve through them; beside it, what both models leave over.
+
+    Parameters
+    ----------
+    plain, final : Stored
+    """
+    figure = Figure(figsize=(9.6, 3.8), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=(1.1, 1.0))
+    axes = left.subplots()
+    found = curve(final)
+    draw_readings(axes, final, found)
+    draw_curve(axes, final, found, HOLD, "the curve through them, 90 % band")
+    axes.set_title("A tension test and the curve through it", loc="left", fontsize=10, color=INK)
+    axes.set_ylabel(f"{READ['displacement']}, N")
+    axes.legend(frameon=False, fontsize=8.5)
+    name_holds(axes, final)
+    rows = right.subplots(2, 1, sharex=True, sharey=True)
+    titles = ("measured − predicted, N: before discover", "after discover, to the same scale")
+    for axis, stored, colour, title in zip(rows, (plain, final), (HOLD, CHAIN), titles, strict=True):
+        _left_over(axis, stored, colour)
+        axis.set_title(title, loc="left", fontsize=10, color=INK)
+    name_holds(rows[1], final)
+    rows[1].set_xlabel("hold")
+    for axis in (axes, *rows):
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(labelsize=8.5)
+    return figure
+
+
+def _left_over(axis: Any, stored: Stored, colour: str) -> None:
+    """What a model leaves over, hold after hold."""
+    protocol = stored.sample.protocol
+    hold, reading = protocol.mask.nonzero()
+    place = hold + 0.1 + 0.8 * protocol.time_s[hold, reading] / protocol.duration_s[hold]
+    axis.axhline(0.0, color=QUIET, lw=0.8)
+    axis.plot(place, left_over(stored)[hold, reading], "o", color=colour, ms=3)
+
+
+def first_screen(page: Path, target: Path) -> None:
+    """A picture of the top of a page; nothing where no Chromium is installed."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    browser = next(filter(None, map(shutil.which, names)), None)
+    if browser is None:
+        print(f"{target}: left as it was, no browser is installed")
+        return
+    with TemporaryDirectory() as profile:
+        quiet = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run")
+        where = (f"--user-data-dir={profile}", f"--screenshot={target}", "--window-size=1000,760")
+        subprocess.run([browser, *quiet, *where, page.resolve().as_uri()], capture_output=True, check=True)
 
 
 def pairs(posterior: Path, target: Path) -> None:
@@ -102,6 +194,24 @@ def pairs(posterior: Path, target: Path) -> None:
     figure = corner(stored.draws, stored.sample.model.effects)
     assert figure is not None
     save(figure, target)
+
+
+def main() -> None:
+    (DOCS / "tutorial").mkdir(exist_ok=True)
+    (DOCS / "gallery").mkdir(exist_ok=True)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        outputs = follow(folder)
+        for file, text in outputs.items():
+            (DOCS / "tutorial" / file).write_text(text, encoding="utf-8")
+        for picture_name, file in PICTURES.items():
+            shutil.copy(folder / file, DOCS / "gallery" / f"{picture_name}.svg")
+        found = folder / "out/discover/bench"
+        pairs(found / "final", DOCS / "gallery" / "corner.svg")
+        drawn = picture(load(found / "plain"), load(found / "final"))
+        drawn.savefig(DOCS / "images" / "readings.png", dpi=110, metadata={"Software": None})
+        README.write_text(readme(README.read_text(encoding="utf-8"), folder, outputs), encoding="utf-8")
+        first_screen(folder / "my-wire-fit" / "report.html", DOCS / "images" / "page.png")
 
 
 if __name__ == "__main__":

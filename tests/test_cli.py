@@ -8,9 +8,10 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+import typer
 
 from wirebayes import __version__
-from wirebayes.cli import COMMANDS, Command, main
+from wirebayes.cli import COMMANDS, Command, _application, main
 from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 
@@ -26,13 +27,23 @@ def run(*arguments: str, **options) -> subprocess.CompletedProcess:
 def test_help_names_every_command_and_loads_nothing_heavy():
     code = (
         "import sys; from wirebayes.cli import main; main(['--help']);"
-        "sys.exit(', '.join(m for m in ('numpy', 'scipy', 'matplotlib', 'xarray') if m in sys.modules))"
+        "sys.exit(', '.join(m for m in ('typer', 'numpy', 'scipy', 'matplotlib', 'xarray') if m in sys.modules))"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert result.stderr.strip() == ""
     for name, command in COMMANDS.items():
         assert re.search(rf"^  {name} ", result.stdout, re.MULTILINE)
         assert command.summary.split()[0] in result.stdout
+
+
+@pytest.mark.parametrize("columns", [50, 80, 200])
+def test_help_is_what_typer_would_say(columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert main(["--help"]) == 0
+    ours = capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        typer.main.get_command(_application(None)).main(args=["--help"], prog_name="wirebayes")
+    assert ours == capsys.readouterr().out
 
 
 @pytest.mark.parametrize("command", [(), ("fit",)])

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from wirebayes.io.arrays import from_arrays as from_arrays
     from wirebayes.io.experiment import Experiment as Experiment
     from wirebayes.io.experiment import read_experiments as read_experiments
+    from wirebayes.prediction.table import Prediction as Prediction
     from wirebayes.robot.history.live import LiveEstimator as LiveEstimator
     from wirebayes.robot.history.live import LivePose as LivePose
     from wirebayes.robot.mechanics.description import Robot as Robot
@@ -80,6 +81,7 @@ _PLACES = {
     "Posterior": "wirebayes.workflows.results",
     "Posteriors": "wirebayes.workflows.results",
     "Batch": "wirebayes.workflows.results",
+    "Prediction": "wirebayes.prediction.table",
     "Findings": "wirebayes.workflows.results",
     "Plan": "wirebayes.workflows.results",
     "Comparison": "wirebayes.workflows.results",

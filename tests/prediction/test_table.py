@@ -169,3 +169,19 @@ def test_a_prediction_has_a_seed_of_its_own_and_zero_where_none_is_given() -> No
     assert table(request) == found[0] != found[1]  # type: ignore[arg-type]
     mixed = [(1.0, request)]
     assert mixture_table(mixed) == found[0] == mixture_table(mixed, 0)  # type: ignore[arg-type]
+
+
+def test_a_prediction_draws_the_median_and_band_of_each_hold():
+    rows = [["w", hold, 2.0, t, 3.0, 0.1, 2.8 + t, 3.0 + t, 3.2 + t] for hold in (7, 8) for t in (0.0, 1.0)]
+    axes = dataset(rows, {}).plot()
+    assert [line.get_label() for line in axes.get_lines()] == ["hold 7, 2 mm", "hold 8, 2 mm"]
+    assert axes.get_lines()[1].get_ydata().tolist() == [3.0, 4.0]
+    band = axes.collections[0].get_datalim(axes.transData)
+    assert (band.y0, band.y1) == pytest.approx((2.8, 4.2))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time in the hold, s", "tension, N")
+
+
+def test_a_prediction_under_weights_draws_displacements():
+    axes = dataset([["w", 7, 4.0, 0.0, 3.0, 0.1, 2.8, 3.0, 3.2]], {}, "force").plot()
+    assert axes.get_ylabel() == "displacement, mm"
+    assert axes.get_lines()[0].get_label() == "hold 7, 4 N"

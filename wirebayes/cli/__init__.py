@@ -6,7 +6,9 @@ Bad input ends with exit code 2 and plain lines on stderr; whatever else goes wr
 import atexit
 import gc
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -159,6 +161,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.unraisablehook = lambda unraisable: None
     arguments = list(arguments)
     called = next((word for word in _typed(arguments) if not word.startswith("-")), None)
+    if called is None and arguments in (["-h"], ["--help"]):
+        print(overview(shutil.get_terminal_size().columns))  # typer alone takes twice as long to load as all else
+        return 0
 
     import typer  # only now: Ctrl-C is welcome during imports, too
 
@@ -173,6 +178,42 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     return 0
+
+
+_ABOUT = "A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."
+_OPTIONS = {
+    "--version": "Print the version and stop.",
+    "--install-completion": "Install completion for the current shell.",
+    "--show-completion": "Show completion for the current shell, to copy it or customize the installation.",
+    "-h, --help": "Show this message and exit.",
+}
+_NARROWEST, _WIDEST = 50, 80  # columns: those of typer, too
+
+
+def overview(columns: int) -> str:
+    """What ``wirebayes --help`` says, word for word as typer would say it.
+
+    Parameters
+    ----------
+    columns : int
+        Of the terminal.
+    """
+    width = max(min(columns, _WIDEST) - 2, _NARROWEST)
+    options = _listed(_OPTIONS, width)
+    commands = _listed({name: command.summary for name, command in COMMANDS.items()}, width)
+    about = textwrap.wrap(_ABOUT, width, initial_indent="  ", subsequent_indent="  ")
+    usage = "Usage: wirebayes [OPTIONS] COMMAND [ARGS]..."
+    return "\n".join([usage, "", *about, "", "Options:", *options, "", "Commands:", *commands])
+
+
+def _listed(rows: dict[str, str], width: int) -> list[str]:
+    """Names with what they mean beside them, the meanings wrapped below each other."""
+    column = max(map(len, rows)) + 4
+    lines = []
+    for name, meaning in rows.items():
+        first = f"  {name}".ljust(column)
+        lines += textwrap.wrap(meaning, width, initial_indent=first, subsequent_indent=" " * column)
+    return lines
 
 
 def _typed(arguments: Sequence[str]) -> Sequence[str]:
@@ -199,9 +240,9 @@ def _application(called: str | None) -> "typer.Typer":
     shown = typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and stop.")
 
     def top(version: Annotated[bool, shown] = False) -> None:
-        """A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."""
+        pass
 
-    application.callback()(top)
+    application.callback(help=_ABOUT)(top)
     for name, command in COMMANDS.items():
         function: Callable[..., object] = _unloaded
         if name == called:

@@ -134,9 +134,56 @@ def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: i
     return np.concatenate(parts, axis=-1)
 
 
+class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __init_subclass__
+    """Predicted readings with their units: an `xarray.Dataset` that draws itself.
+
+    Examples
+    --------
+    >>> predicted = wb.predict(posterior, {"hold": [7, 7], "displacement_mm": [7, 7], "time_s": [0, 60]})
+    >>> predicted["mean_N"].attrs["units"], predicted.plot().get_ylabel()
+    ('N', 'tension, N')
+    """
+
+    __slots__ = ()
+
+    def plot(self, axes: Any = None) -> Any:  # type: ignore[override]  # xarray's own draws no bands
+        """Draw the median and the 90 % band against the time in the hold, a colour for each hold.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; new ones when left out.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        if axes is None:
+            import matplotlib.pyplot as plt  # only where it is needed
+
+            axes = plt.subplots()[1]
+        control: Control = "displacement" if "mean_N" in self else "force"
+        unit, setting = READ_UNIT[control], SET[control]
+        for hold in np.unique(self["hold"].values):
+            rows = self.isel(reading=np.flatnonzero(self["hold"].values == hold))
+            time = rows["time_s"].values
+            label = f"hold {hold}, {rows[setting].values[0]:g} {SET_UNIT[control]}"
+            (line,) = axes.plot(time, rows[f"q50_{unit}"].values, "o-", ms=3, label=label)
+            low, high = rows[f"q05_{unit}"].values, rows[f"q95_{unit}"].values
+            axes.fill_between(time, low, high, color=line.get_color(), alpha=0.25, lw=0)
+        axes.set_xlabel("time in the hold, s")
+        axes.set_ylabel(f"{_READ_WORD[control]}, {unit}")
+        axes.set_title(f"{self.attrs['experiment']}: predicted, 90 % band")
+        axes.legend(frameon=False)
+        return axes
+
+
+_READ_WORD = {"displacement": "tension", "force": "displacement"}
+
+
 def dataset(
     rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any], control: Control = "displacement"
-) -> xr.Dataset:
+) -> Prediction:
     """The rows of `table` with units, along the dimension ``reading``.
 
     Parameters
@@ -153,4 +200,4 @@ def dataset(
         name: ("reading", np.array(c), {"units": units.get(name, READ_UNIT[control])}) for name, c in columns.items()
     }
     coords = {name: variables.pop(name) for name in units}
-    return xr.Dataset(variables, coords, {"experiment": experiment, **attributes})
+    return Prediction(variables, coords, {"experiment": experiment, **attributes})

@@ -12,7 +12,14 @@ from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.notice import to_json
 from wirebayes.prediction.request import request_of
-from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, unlikely_readings
+from wirebayes.prediction.table import (
+    Prediction,
+    beyond_tested,
+    dataset,
+    header,
+    mixture_table,
+    unlikely_readings,
+)
 from wirebayes.results import store
 from wirebayes.results.mixture import members_of
 from wirebayes.results.store import Stored
@@ -33,7 +40,7 @@ def predict(
     own_effects: PathLike | None = None,
     seed: int = 0,
     output: PathLike | None = None,
-) -> "xr.Dataset":
+) -> Prediction:
     """Predict the readings of holds not measured yet.
 
     Holds of the training are predicted as replicates. Holds with later numbers continue the tested sample: they begin
@@ -60,12 +67,12 @@ def predict(
 
     Returns
     -------
-    xarray.Dataset
-        Dimension ``reading``, a row of the protocol each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``,
-        ``q95_N`` (``mean_mm`` … under weights) with units as attributes. The attribute ``prediction`` says which sample
-        was predicted, given what; ``warnings``, where there is one, what speaks against the posterior, what lies far
-        beyond the tested range, and which given readings are far from what was expected; ``warning_kinds`` has the kind
-        of each.
+    Prediction
+        An `xarray.Dataset` whose ``plot()`` draws medians and bands. Dimension ``reading``, a row of the protocol
+        each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``, ``q95_N`` (``mean_mm`` … under weights) with units
+        as attributes. The attribute ``prediction`` says which sample was predicted, given what; ``warnings``, where
+        there is one, what speaks against the posterior, what lies far beyond the tested range, and which given readings
+        are far from what was expected; ``warning_kinds`` has the kind of each.
 
     Raises
     ------

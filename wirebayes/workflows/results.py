@@ -388,6 +388,39 @@ class Findings(Result[DiscoveryJson]):
         both = [*self.plain.values(), *self.final.values()]
         return store.datatrees({posterior.within: posterior.folder for posterior in both})
 
+    def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
+        """Draw an experiment's readings with the curves of the plain and of the final model through them.
+
+        Parameters
+        ----------
+        experiment : str, optional
+            Needed where several were judged.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; new ones when left out.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            There are several experiments and none is named, or there is none of this name.
+
+        Examples
+        --------
+        >>> findings.plot().get_legend().get_texts()[-1].get_text()
+        'the plain model, 90 % band'
+        """
+        from wirebayes.report.pictures.curve import both_on_axes  # matplotlib only where it is needed
+
+        names = sorted(self.plain)
+        if experiment is None and len(names) == 1:
+            experiment = names[0]
+        if experiment not in names:
+            raise InputError(f"experiment: found {experiment!r}, expected one of {', '.join(names)}")
+        return both_on_axes(self.plain[experiment].stored(), self.final[experiment].stored(), axes)
+
     def _posteriors(self, model: str) -> dict[str, Posterior]:
         return {
             name: Posterior(self.place, self.own_effects, self.computed, name, f"{name}/{model}", alone=False)

@@ -27,7 +27,7 @@ _CAPTIONS = {
     "differences": "How much better (right) or worse (left) each model predicts left-out holds than the base, with two "
     "standard errors. Within the grey band the difference decides nothing.",
     "held-out-errors": "Typical error on the last holds, predicted from the first ones; farther left is better.",
-    "held-out-free": "The held-out readings under the base model, predicted from earlier holds alone. Dots should lie "
+    "held-out-free": "The held-out readings under the best model, predicted from earlier holds alone. Dots should lie "
     "in the bands as often as the bands say.",
     "held-out-given-first": "The same, each hold's first reading given.",
     "pit-free": "Whether the bands are right: the step should stay within the shaded region. On the left half, a step "

@@ -28,13 +28,20 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
         What `wirebayes.comparison.compare.judge` returned for each model.
     """
     save(differences(name, table), folder / "differences.svg")
-    base = next((m["held_out"] for m in models if m["name"] == table["base"] and m["failed"] is None), None)
-    if base is not None:
+    best = winner(table)
+    held_out = next((m["held_out"] for m in models if m["name"] == best), None)
+    if held_out is not None:
         save(held_out_errors(name, table), folder / "held-out-errors.svg")
         for way, words in WORDS.items():
-            if scores := base[way]:
-                save(bands(f"{name}: {words}", scores), folder / f"held-out-{way.replace('_', '-')}.svg")
-                save(pit(f"{name}: {words}", scores), folder / f"pit-{way.replace('_', '-')}.svg")
+            if scores := held_out[way]:
+                title = f"{name} under {best}:\n{words}"
+                save(bands(title, scores), folder / f"held-out-{way.replace('_', '-')}.svg")
+                save(pit(title, scores), folder / f"pit-{way.replace('_', '-')}.svg")
+
+
+def winner(table: ComparedModels) -> str | None:
+    """The best model that could be scored; the rows of a comparison stand best first."""
+    return next((row["name"] for row in table["models"] if row["failed"] is None), None)
 
 
 Way = Literal["free", "given_first"]

@@ -128,6 +128,25 @@ def on_axes(stored: Stored, axes: Any = None) -> Any:
     return axes
 
 
+def both_on_axes(plain: Stored, final: Stored, axes: Any = None) -> Any:
+    """The readings with the curves of two models through them, on axes of the user's.
+
+    Parameters
+    ----------
+    plain, final : Stored
+    axes : matplotlib.axes.Axes, optional
+        New ones when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    axes = on_axes(final, axes)
+    draw_curve(axes, plain, curve(plain), HOLD, "the plain model, 90 % band")
+    axes.legend(frameon=False)
+    return axes
+
+
 def draw_curve(axes: Any, stored: Stored, found: Curve, colour: str, label: str) -> None:
     """The median and the band of every recorded hold.
 

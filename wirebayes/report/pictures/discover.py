@@ -15,7 +15,7 @@ from wirebayes.model import likelihoods
 from wirebayes.report.blocks import save
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.store import Stored
-from wirebayes.typing import Array
+from wirebayes.typing import Array, Floats
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.staircase import Linearised, linearise
 
@@ -104,8 +104,7 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Pa
         Receives the pictures.
     """
     sample, mask = stored.sample, stored.sample.protocol.mask
-    line, _ = _walked(stored)
-    residual = np.where(mask, sample.readings[..., 0] - line.reading.mean(axis=2), 0.0)
+    residual = left_over(stored)
     level = residual.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
     for finding in verdict["where"]:
         x = np.broadcast_to(COVARIATES[finding["covariate"]](sample), mask.shape)[mask]
@@ -133,6 +132,18 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Pa
         axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
         axis.legend(fontsize=8, frameon=False)
         save(figure, folder / f"where-{finding['covariate'].replace(' ', '-')}.svg")
+
+
+def left_over(stored: Stored) -> Floats:
+    """What was read less what is expected of holds without setting errors, (H, R), 0 where nothing was read.
+
+    Parameters
+    ----------
+    stored : Stored
+    """
+    line, _ = _walked(stored)
+    left = stored.sample.readings[..., 0] - line.reading.mean(axis=2)
+    return np.where(stored.sample.protocol.mask, left, 0.0)
 
 
 def _walked(stored: Stored) -> tuple[Linearised, dict[str, Array]]:

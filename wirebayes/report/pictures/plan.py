@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.json_files.plan import ExpectedWidth, PlanJson
 from wirebayes.report.blocks import save
-from wirebayes.report.figures import verbatim
+from wirebayes.report.figures import logarithmic, verbatim
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#bab0ac")
 _MOST = 6  # tests that a picture can hold
@@ -45,16 +45,15 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
             shift = (i - (len(rows) - 1) / 2) * step
             right.plot(times, np.array(at) + shift, "o", color=_COLOURS[i], ms=4)
     left.set_yticks(range(len(names)), [_words(n) for n in names], fontsize=8)
-    left.set_xscale("log")
     left.axvline(1.0, color="0.6", lw=0.8)
     left.set_xlabel("sd after the test (median) / sd of the guess", fontsize=9)
     right.set_yticks(range(len(effects)), [_words(e) for e in effects], fontsize=8)
-    right.set_xscale("log")
     right.axvline(1.0, color="0.6", lw=0.8)
     right.set_xlabel("sd of its prior / amplitude seen in 80 % of tests", fontsize=9)
     right.set_title("effects: right of the line is seen", fontsize=9, loc="left")
     left.set_title("parameters: farther left is better known", fontsize=9, loc="left")
     for axis in (left, right):
+        logarithmic(axis)
         axis.invert_yaxis()
         axis.grid(axis="y", color="0.93", lw=6, zorder=0)
         axis.set_axisbelow(True)
