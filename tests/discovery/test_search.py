@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyses.hidden_effects.cases import SIZES, seal, specs
+from analyses.hidden_effects.cases import Spec, SIZES, seal, specs
 from wirebayes import cli, workers
 from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
 from wirebayes.discovery.search import discover, final_models, investigate
@@ -104,21 +104,19 @@ def test_two_effects_are_both_named_and_each_step_closes_some_of_the_gap(tmp_pat
     }
 
 
-def test_what_has_a_name_is_named_beside_what_has_none(tmp_path: Path) -> None:
+def test_a_remainder_that_predicts_nothing_is_said_beside_a_name_and_not_added(tmp_path: Path) -> None:
     """A line that straightens first, on a sensor with hysteresis, which is in no catalogue."""
-    wanted = ("toe", "sensor_hysteresis")
-    spec = next(s for s in specs(SIZES["small"], 94, ("mixed",)) if s.names == wanted)
+    spec = Spec("mixed", "dense", ("toe", "sensor_hysteresis"), 20.0, 0)
     assert seal(spec, tmp_path / "cases", tmp_path / "sealed")
     experiments = read_experiments(tmp_path / "cases" / spec.key / "experiment.toml")
     found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=FEW))
     report = found.report["experiments"][experiments[0].name]
     assert found.report["version"] == 3
-    assert report["verdict"] == "partial" and report["accepted"] == report["effects"] == ["toe"]
-    assert report["inclusion"]["toe"] > 0.9 and report["remainder"]["probability"] > 0.5
-    assert report["remainder"]["where"] and report["remainder"]["p"] < 0.03
-    assert report["next_measurement"].startswith("To learn more of what remains")
+    assert report["verdict"] == "named" and report["accepted"] == report["effects"] == ["toe"]
+    assert report["inclusion"]["toe"] > 0.9
+    assert report["remainder"]["probability"] > 0.5 and report["remainder"]["leave_one_hold_out"] < 4.0
     (final,) = final_models(found)
-    assert [e.name for e in final.effects] == ["toe", "discrepancy"]
+    assert [e.name for e in final.effects] == ["toe"]
 
 
 def test_findings_do_not_depend_on_how_many_processes_there_are(
