@@ -11,8 +11,9 @@ from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, session_file
-from wirebayes.robot.self_calibration.estimate import _joint_test, calibrate
+from wirebayes.robot.self_calibration.estimate import calibrate
 from wirebayes.robot.self_calibration.session import Prior, Session, predict
+from wirebayes.robot.self_calibration.trust import joint_test
 
 SPREAD = 1e-3  # from wire to wire: small, so that a session of eight stops is solved in a moment
 
@@ -76,7 +77,7 @@ def test_the_joint_test_keeps_its_level_and_sees_each_part():
         readings = truth @ J.T + noise
         mode = readings @ J @ spread
         cost = ((readings - mode @ J.T) ** 2).sum(1) + (mode**2).sum(1)
-        return _joint_test(cost, count, mode, np.broadcast_to(spread, (many, 9, 9)), legs)
+        return joint_test(cost, count, mode, np.broadcast_to(spread, (many, 9, 9)), legs)
 
     truth, noise = rng.standard_normal((many, 9)), rng.standard_normal((many, count))
     level = (p_of(truth, noise) < 0.01).mean()
