@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyses.hidden_effects.cases import Spec, SIZES, seal, specs
+from analyses.hidden_effects.cases import Spec, seal
 from wirebayes import cli, workers
 from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
 from wirebayes.discovery.search import discover, final_models, investigate
