@@ -58,7 +58,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     verdict, effects = report["verdict"], ", ".join(report["effects"])
     finding = _NAMED.get(verdict, f"{verdict}: {effects}")
     if verdict == "ambiguous":
-        finding = f"ambiguous: {undecided(report)}"
+        finding = f"ambiguous: {undecided(report) if families_said(report) else likely(report)}"
     if verdict == "partial":
         are = "are" if report["effects"][1:] else "is"
         finding = f"{effects} {are} missing, and something that is not in the catalogue"

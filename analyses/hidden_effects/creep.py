@@ -61,7 +61,7 @@ def remaining(grid_s: Array, k2: Array, exponent: Array, age_s: Array | None = N
     """
     grid = np.atleast_2d(grid_s)
     if age_s is not None:
-        grid = np.maximum(grid + age_s[:, None], 0.0)  # a search may step below zero
-    clock = grid ** exponent[:, None]
+        grid = grid + age_s[:, None]
+    clock = np.maximum(grid, 0.0) ** exponent[:, None]  # a search may step to a time before the start
     steps = radau(k2[:, None] * np.diff(clock, axis=1))
     return np.concatenate([np.ones((len(steps), 1)), np.cumprod(steps, axis=1)], axis=1)

@@ -148,7 +148,8 @@ def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]
     inside = float(prior.cdf(neutral + reach) - prior.cdf(neutral - reach))
 
     def log_density(amplitude: Array) -> Array:
-        density = prior.logpdf(amplitude) - np.log(max(inside, 1e-300))
+        with np.errstate(over="ignore"):  # an absurd amplitude has no density
+            density = prior.logpdf(amplitude) - np.log(max(inside, 1e-300))
         return np.where(np.abs(amplitude - neutral) <= reach * (1.0 + _ROUNDING), density, -np.inf)
 
     return log_density

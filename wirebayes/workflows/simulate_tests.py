@@ -98,7 +98,7 @@ def simulate_tests(
     700.0
     >>> hung = wb.simulate_tests(weights=[2, 4, 6], parameters={"k1": 700}, seed=1)
     >>> hung.experiments[0]
-    Experiment(wire, 3 holds, 15 readings, tensions set)
+    Experiment(wire: 1000 mm of line-1, 3 holds, 15 readings, tensions set)
     """
     check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
     check_choice("history", history, get_args(History))
