@@ -124,7 +124,7 @@ def prior_terms(problem):
 
     A number in place of the coordinate's name is the largest value of a parameter whose log odds are normal.
     """
-    out = []
+    out: list[tuple[str, str | float, float, float]] = []
     for name, dist in problem.prior.distributions.items():
         if dist.dist.name == "lognorm":
             out.append((name, "log", float(np.log(dist.kwds["scale"])), float(dist.args[0])))

@@ -155,7 +155,7 @@ def test_a_failing_experiment_says_so_in_its_row(tests, tmp_path, here, monkeypa
     assert [row["error"] for row in rows_of(tmp_path / "out")] == ["", "FloatingPointError: odd readings", ""]
     assert any("spool-1: FloatingPointError: odd readings" in message for message in many.messages)
     assert list(many.plain) == ["spool-0", "spool-2"]
-    assert "1 failed: spool-1." in wb.write_report(many).read_text()
+    assert "Not fitted: spool-1." in wb.write_report(many).read_text()
 
 
 def test_a_full_disk_is_nobodys_row(tests, tmp_path, here, monkeypatch):
