@@ -1,4 +1,4 @@
-"""Which share of the package's lines the tests have run, in all and by package, from the file that `make coverage` leaves.
+"""Which share of the lines of the package, and of each part, the tests have run, by the file that `make coverage` leaves.
 
 python -m analyses.lines_run
 """
