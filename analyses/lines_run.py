@@ -1,4 +1,4 @@
-"""Which share of the lines of the package, and of each part, the tests have run, by the file that `make coverage` leaves.
+"""Which share of the lines of each part of the package the tests have run, by the file of `make coverage`.
 
 python -m analyses.lines_run
 """
