@@ -135,6 +135,7 @@ def test_the_tables_say_what_the_fits_say(whole):
     assert published["preload_mm"] is None
 
 
+@pytest.mark.slow
 def test_a_killed_run_on_one_core_ends_with_the_same_bytes(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(jobs, "cores", lambda: 1)
     monkeypatch.setattr(workers, "cores", lambda: 1)

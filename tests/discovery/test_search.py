@@ -199,6 +199,7 @@ def test_a_gross_reading_is_struck_out_and_nothing_else_is_missing(tmp_path: Pat
     assert found["verdict"] == "nothing-missing"
 
 
+@pytest.mark.slow
 def test_a_user_finds_an_effect_of_their_own(tmp_path: Path) -> None:
     own = tmp_path / "own.py"
     own.write_text('''

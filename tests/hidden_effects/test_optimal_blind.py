@@ -84,6 +84,7 @@ def test_more_speaks_for_something_hidden_the_larger_it_is():
     assert (small < large).all()
 
 
+@pytest.mark.slow
 def test_a_single_effect_is_judged_where_it_is_seen(monkeypatch):
     case = build(Spec("single", "dense", ("grip_slip",), 3.0, 0))
     seen = judge(case, draws=120)["blind"]

@@ -29,6 +29,7 @@ def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     plain(content)
 
 
+@pytest.mark.slow
 def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     robot = schema.read("cogiro-desk")
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")

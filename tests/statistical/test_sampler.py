@@ -115,6 +115,7 @@ def test_a_sampler_that_forgets_the_proposal_s_density_fails(monkeypatch):
     assert t > LIMIT
 
 
+@pytest.mark.slow
 def test_adapting_while_draws_are_kept_would_be_noticed(monkeypatch):
     """Walkers set back to good places during the kept steps, which only burn-in may do, shrink the second moments."""
 
