@@ -19,13 +19,13 @@ from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import UNITS, Quantiles
 from wirebayes.sentences import (
-    beyond_said,
     families_said,
     likely,
     listed,
     number,
     p_in_words,
     quantity,
+    said_beside,
     span,
     undecided,
     unit_text,
@@ -65,8 +65,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     lines = [f"{name}: {finding} ({p_in_words(report['p_global'], report['p_simulations'])})"]
     if verdict == "unknown" and likely(report):
         lines.append(f"  beside it most likely {likely(report)}; none of these is established")
-    families = [] if verdict == "ambiguous" else families_said(report)
-    lines += [f"  {sentence}" for sentence in (*families, *beyond_said(report))]
+    lines += [f"  {sentence}" for sentence in said_beside(report)]
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
         unit = "" if size["unit"] == "-" else f" {size['unit']}"

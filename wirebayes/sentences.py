@@ -59,18 +59,19 @@ def undecided(found: Answer, spoken: Callable[[str], str] = str) -> str:
     return f"something is missing; these readings do not tell what: {likely(found, spoken)}"
 
 
-def beyond_said(found: Answer) -> list[str]:
-    """The sentence of a remainder that is likely beside what is named and does not count; empty where there is none.
+def said_beside(found: Answer) -> list[str]:
+    """What is said beside the verdict: families that it does not speak of itself, and a remainder that does not count.
 
     Parameters
     ----------
     found : dict
         Of one experiment, as in ``discovery.json``.
     """
+    out = [] if found["verdict"] == "ambiguous" else families_said(found)
     rest = found["remainder"]["probability"] if "remainder" in found else 0.0
-    if found["verdict"] not in ("named", "ambiguous") or rest <= 0.5:
-        return []
-    return [f"something beyond it is likely ({100 * rest:.0f} %), but predicts nothing better"]
+    if found["verdict"] in ("named", "ambiguous") and rest > 0.5:
+        out.append(f"something beyond it is likely ({100 * rest:.0f} %), but predicts nothing better")
+    return out
 
 
 def p_in_words(p: float, simulations: int) -> str:

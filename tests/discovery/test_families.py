@@ -12,7 +12,7 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import fitted
-from wirebayes.sentences import beyond_said, families_said, undecided
+from wirebayes.sentences import families_said, said_beside, undecided
 from wirebayes.simulation.synthetic import Bench, Truth
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
@@ -55,9 +55,9 @@ def test_only_established_families_of_several_are_said_and_a_remainder_that_does
     found: Any = {"verdict": "ambiguous", "families": families, "remainder": {"probability": 0.51}}
     assert families_said(found) == ["one of both"]
     assert undecided(found) == "one of both; these readings do not tell which"
-    assert beyond_said(found) == ["something beyond it is likely (51 %), but predicts nothing better"]
-    assert beyond_said(found | {"remainder": {"probability": 0.5}}) == []
-    assert beyond_said(found | {"verdict": "partial"}) == []
+    assert said_beside(found) == ["something beyond it is likely (51 %), but predicts nothing better"]
+    assert said_beside(found | {"remainder": {"probability": 0.5}}) == []
+    assert said_beside(found | {"verdict": "partial"}) == ["one of both"]
 
 
 def test_without_an_established_family_the_likely_names_are_said() -> None:

@@ -31,7 +31,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import SYMBOLS, meaning, spoken
 from wirebayes.report.pictures.discover import waterfall
-from wirebayes.sentences import beyond_said, families_said, listed, p_in_words
+from wirebayes.sentences import listed, p_in_words, said_beside
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -78,8 +78,8 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         blocks.append(Text(f"Measure next: {v['next_measurement']}"))
     blocks += _parameters(folder / name, v)
     where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS] or ["No pattern stands out."]
-    families = [f"{line[0].upper()}{line[1:]}." for line in (*families_said(v), *beyond_said(v))]
-    known = [*families, _held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
+    beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
+    known = [*beside, _held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
     columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in known if p])]
