@@ -26,7 +26,7 @@ from .rig import Array, Mask
 SETTING = np.logspace(-3.0, 3.0, 13)
 LARGEST_SET = 3
 EVALUATED_AT_ONCE = 30_000  # sets times data sets: what stays in the processor's cache
-NEGLIGIBLE = 1e-6  # share of the largest variance of a smooth remainder: of no size that a reading shows
+NEGLIGIBLE = 1e-9  # share of the largest variance of a smooth remainder: of no size that a reading shows
 
 
 @dataclass(frozen=True)

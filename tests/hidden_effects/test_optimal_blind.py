@@ -1,15 +1,18 @@
 """The ideal judge who has to estimate the noise: its integrals by quadrature, and cases with a known answer."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 from analyses.hidden_effects import optimal
+from analyses.hidden_effects.baselines import gaussian_process
 from analyses.hidden_effects.cases import Spec, build
 from analyses.hidden_effects.delta import derivatives
 from analyses.hidden_effects.optimal import judge
 from analyses.hidden_effects.optimal_blind import SETTING, Answers, Metric, answers, log_evidence, metrics
-from analyses.hidden_effects.optimal_sets import DELTA_RANGE, Directions, Sets
+from analyses.hidden_effects.optimal_sets import DELTA_RANGE, REMAINDER_SIZES, Directions, Sets
 
 UNITS = np.array([[1.0, 0, 0, 0, 0], [0.6, 0.8, 0, 0, 0]])
 TWO = Directions(UNITS, np.array([0, 1]), ["a", "b"])
@@ -60,6 +63,27 @@ def test_each_metric_is_that_of_the_dense_covariance():
         left = raw @ np.linalg.solve(noise, raw.T) - side.T @ np.linalg.solve(inner, side)
         assert pytest.approx(left, rel=1e-6) == metric.along.T
         assert metric.gram == pytest.approx(left, rel=1e-6) and metric.square == pytest.approx(np.diag(left), rel=1e-6)
+
+
+def test_each_metric_with_a_smooth_remainder_is_that_of_the_dense_covariance():
+    """Of the first process, the smallest setting error and the smallest and largest remainder."""
+    geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 6)).geo
+    rows = np.random.default_rng(0).normal(size=(3, len(geo.plain)))
+    (bench,), by_eta = geo.rig.benches, derivatives(geo.rig)[2]
+    true = geo.chol @ geo.chol.T
+    errors = (by_eta * bench.setting_sd**2) @ by_eta.T
+    kernel = next(iter(gaussian_process(geo.rig, np.ones(len(geo.plain), bool))))
+    absorbed = np.eye(len(true)) - geo.basis @ geo.basis.T
+    white = np.linalg.inv(geo.chol)
+    kernel = kernel / np.trace(absorbed @ white @ kernel @ white.T @ absorbed)
+    basis, raw = geo.chol @ geo.basis, rows @ geo.chol.T
+    found = list(islice(metrics(geo, rows, rows, remainder=True), REMAINDER_SIZES))
+    for metric, delta in zip((found[0], found[-1]), DELTA_RANGE, strict=True):
+        noise = true + (SETTING[0] - 1.0) * errors + delta**2 * kernel
+        side = basis.T @ np.linalg.solve(noise, raw.T)
+        inner = basis.T @ np.linalg.solve(noise, basis)
+        left = raw @ np.linalg.solve(noise, raw.T) - side.T @ np.linalg.solve(inner, side)
+        assert pytest.approx(left, rel=1e-4, abs=1e-4) == metric.along.T
 
 
 def test_what_counts_as_said():
