@@ -181,8 +181,8 @@ def _next(found: CalibrateJson) -> list[Block]:
         joints = f"Joint values that bring the platform to its home pose now, m: {values}."
     rows = [[f"{v:.3f}" for v in place] for place in found["next_positions_m"]]
     caption = "Positions whose readings would sharpen what is known most, the most useful first."
-    if found["joint_values_for_home_m"] is not None and not found["usable"]:
-        joints = "Set nothing in the controller: readings, robot and wires contradict each other."
+    if found["with_creep_model"]["converged"] and not found["usable"]:
+        joints = "Set nothing in the controller: the warnings say why."
     caption += _gain(found)
     return [
         Text(joints),

@@ -100,7 +100,7 @@ class Equations:
     rows : dict of str to slice
         Which of the k are ``loop``, ``balance``, ``tension``, ``pose`` and ``tilt``.
     known : (p, k) bool array
-        False where nothing was stated or read.
+        False where nothing was stated or read; of tensions, residuals there are those from what is usual.
     """
 
     residual: Floats
@@ -157,7 +157,7 @@ def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, cre
     out = Equations(residual, by_robot, by_hold, rows, known)
     _loops(out, unknowns, holds, noise, state, creep, since, shape, J)
     _balance(out, unknowns, noise, state, here, shape, J)
-    _tensions(rows["tension"], unknowns, holds, noise, state, residual, by_robot, by_hold)
+    _tensions(rows["tension"], unknowns, holds, noise, state, residual, by_robot, by_hold, known)
     _poses(rows["pose"], unknowns, holds, state, residual, by_hold, known)
     if holds.tilt is not None:
         _tilts(rows["tilt"], robot, holds, state, residual, by_hold, known)
@@ -280,6 +280,7 @@ def _tensions(
     residual: Floats,
     by_robot: Floats,
     by_hold: Floats,
+    known: NDArray[np.bool_],
 ) -> None:
     """Tensions that were read, and what is usual where none was."""
     robot, session = unknowns.robot, holds.session
@@ -290,6 +291,7 @@ def _tensions(
     pull, taut = pulled(state.pull_N, noise.soft_N)
     off = (pull + sign * parts.bias_N - holds.tension_N) / session.tension_sd_N
     usual = (state.pull_N - noise.usual_N) / noise.pull_N
+    known[:, rows] = read
     residual[:, rows] = np.where(read, off, usual)
     leg = np.arange(w)
     by_hold[:, rows.start + leg, d + leg] = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)

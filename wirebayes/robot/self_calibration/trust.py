@@ -14,7 +14,7 @@ SIGNIFICANT = 0.01
 _UNLEARNT = 1e-6  # of a prior's variance: of a length of which the readings say less, there is nothing to be tested
 
 
-def joint_test(cost: Floats, count: int, white: Floats, spread: Floats, count_alone: int) -> Floats:
+def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, count_alone: int) -> Floats:
     """Probability ``(m,)`` of readings and estimates that contradict model and priors at least as much.
 
     Under the model the least sum of squares, residuals and unknowns in units of their errors, is chi-squared with as
@@ -26,8 +26,8 @@ def joint_test(cost: Floats, count: int, white: Floats, spread: Floats, count_al
     ----------
     cost : (m,) array
         Sum of squares at the mode.
-    count : int
-        Number of readings.
+    count : float
+        Number of readings, less what unknowns without a prior take up.
     white : (m, d) array
         Mode in units of the prior, references first.
     spread : (m, d, d) array
@@ -48,6 +48,21 @@ def unlikely(p: float) -> Notice:
         "misfit",
         f"readings and model do not belong together (p = {p:.2g}): something that is taken as exact, or a stated "
         "error, is wrong; do not use these values",
+    )
+
+
+def unlearnt(prior_mm: float) -> Notice:
+    """What to say where readings determine nothing that was not known before.
+
+    Parameters
+    ----------
+    prior_mm : float
+        Standard deviation of a reference length before.
+    """
+    return Notice(
+        "prior",
+        f"the readings determine no combination of points and reference lengths beyond what was known before "
+        f"(references: {prior_mm:.3g} mm): there is nothing to set; read tensions, measured poses or more poses",
     )
 
 

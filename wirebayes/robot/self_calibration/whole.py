@@ -7,7 +7,6 @@ then ever smaller ones, lead from rough geometry to the mode.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from wirebayes.linear_algebra import inv, solve
@@ -37,7 +36,9 @@ _ROUNDS = 25  # of noise and creep
 _AHEAD = 1.7  # times the logarithmic step of a noise: alone it creeps towards where it ends
 _STEPS = 12  # of a descent: noise and creep change before more are worth it
 _EASINGS = 16  # quarterings that lead from a tenth of the span to a micrometre
-_ESTIMATED = ("joint_m", "balance", "pull_N")  # of the noise: no other part of it changes
+_ESTIMATED = ("joint_m", "balance")  # of the noise: no other part of it changes
+# Of the range that a robot's file allows: tensions that nobody read lie anywhere in it.
+_UNREAD = 0.5
 _LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of freedom
 
 
@@ -204,9 +205,13 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
     target = _FLOOR * robot.span_m if stated is None else max(stated, EXACT * robot.span_m)
     low, high = robot.rule.lowest_N, robot.rule.highest_N
     usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
-    noise = Noise(target, FRICTIONLESS, 0.25 * (high - low), usual, 0.03 * min(holds.session.tension_sd_N, low))
+    # Tensions that nobody read differ from what is usual as the geometry and the commands have it, alike in many holds:
+    # that does not average out. So their error grows with the number of such holds, and all of them together say no
+    # more of the lengths than one hold does.
+    unread = int((~np.isfinite(holds.tension_N)).any(1).sum())
+    pull = _UNREAD * (high - low) * np.sqrt(max(unread, 1))
+    noise = Noise(target, FRICTIONLESS, pull, usual, 0.03 * min(holds.session.tension_sd_N, low))
     since, creep = state, _creep(unknowns, holds, state)
-    unread = ~np.isfinite(holds.tension_N)
 
     state = _from_rough(unknowns, holds, noise, state, creep)
     noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
@@ -219,7 +224,7 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         last = inverse.lengths(robot, holds.session.joint_m[-1])[0]
         found = _posterior(unknowns, down, noise, creep, last)
         before = noise
-        noise, degrees = _estimated(found, unread, noise, high - low)
+        noise, degrees = _estimated(found, noise)
         found = replace(found, degrees=degrees)
         moved_on = np.abs(state.white - since.white).max() if len(state.white) else 0.0
         settled = max(abs(np.log(getattr(noise, name) / getattr(before, name))) for name in _ESTIMATED) < 0.02
@@ -273,36 +278,28 @@ def _leverage(found: Whole, rows: slice) -> Floats:
     return own + np.einsum("pri,ij,prj->pr", total, found.covariance, total)
 
 
-def _estimated(found: Whole, unread: NDArray[np.bool_], noise: Noise, span_N: float) -> tuple[Noise, float]:
+def _estimated(found: Whole, noise: Noise) -> tuple[Noise, float]:
     """Noise that the residuals show, and the degrees of freedom that the error of the loops rests on."""
     e, robot, stated = found.equations, found.unknowns.robot, found.unknowns.errors.joint_m
 
-    def shown(rows: str, which: NDArray[np.bool_], sd: float, usual: float) -> tuple[float, float]:
+    def shown(rows: str, sd: float, usual: float) -> tuple[float, float]:
         """Restricted maximum likelihood, with `usual` worth one degree of freedom."""
-        left = (1.0 - _leverage(found, e.rows[rows]))[which]
-        squares = float((e.residual[:, e.rows[rows]][which] ** 2).sum()) * sd**2
+        residual = e.residual[:, e.rows[rows]]
+        left = 1.0 - _leverage(found, e.rows[rows])
+        squares = float((residual**2).sum()) * sd**2
         free = float(np.maximum(left, 0.0).sum()) + _LEAST_DEGREES
         return float(np.sqrt((squares + _LEAST_DEGREES * usual**2) / free)), free
-
-    def all_of(rows: str) -> NDArray[np.bool_]:
-        return np.ones_like(e.residual[:, e.rows[rows]], bool)
-
-    floor = _FLOOR * robot.span_m
-    balance, _ = shown("balance", all_of("balance"), noise.balance, FRICTIONLESS)
-    joint, degrees = shown("loop", all_of("loop"), noise.joint_m, floor) if stated is None else (noise.joint_m, np.inf)
-    pull = noise.pull_N
-    if unread.any():
-        pull, free = shown("tension", unread, noise.pull_N, 0.25 * span_N)
-        degrees += free
 
     def ahead(old: float, new: float, low: float, high: float) -> float:
         return float(np.clip(old * (new / old) ** _AHEAD, low, high))
 
-    balance = ahead(noise.balance, balance, 1e-2 * FRICTIONLESS, 1e2)
-    if stated is None:
-        joint = ahead(noise.joint_m, joint, 1e-2 * floor, robot.span_m)
-    pull = ahead(noise.pull_N, pull, 1e-3 * span_N, span_N)
-    return replace(noise, joint_m=joint, balance=balance, pull_N=pull), degrees
+    balance, _ = shown("balance", noise.balance, FRICTIONLESS)
+    noise = replace(noise, balance=ahead(noise.balance, balance, 1e-2 * FRICTIONLESS, 1e2))
+    if stated is not None:
+        return noise, np.inf
+    floor = _FLOOR * robot.span_m
+    joint, degrees = shown("loop", noise.joint_m, floor)
+    return replace(noise, joint_m=ahead(noise.joint_m, joint, 1e-2 * floor, robot.span_m)), degrees
 
 
 def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> State:
@@ -405,14 +402,19 @@ def summarised(found: Whole) -> Summarised:
 def trust(found: Whole) -> float:
     """Probability of residuals and estimates this far from model and priors: `trust.joint_test`.
 
-    A hold's own unknowns have no prior, so each of them costs a degree of freedom. Geometry and references are tested
-    alone too.
+    A hold's own unknowns have no prior, so each of them costs a degree of freedom; a tension that nobody read costs
+    what its usual value leaves open, and is not tested itself. Geometry and references are tested alone too.
     """
     e, unknowns = found.equations, found.unknowns
-    count = int(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2]
+    d, rows = unknowns.robot.degrees, e.rows["tension"]
+    unread = ~e.known[:, rows]
+    alone = found.hold_covariance - found.by_robot @ found.covariance @ found.by_robot.swapaxes(1, 2)
+    open_ = np.einsum("pii->pi", alone)[:, d:][unread] / found.noise.pull_N**2
+    count = float(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2] + float(open_.sum())
+    cost = found.cost - float((e.residual[:, rows][unread] ** 2).sum())
     first = np.r_[0 : unknowns.slices["wires"].start, unknowns.references]
     white, spread = found.state.white[first], found.covariance[np.ix_(first, first)]
-    return float(joint_test(np.array([found.cost]), max(count, 1), white[None], spread[None], len(first))[0])
+    return float(joint_test(np.array([cost]), max(count, 1.0), white[None], spread[None], len(first))[0])
 
 
 def misfit(found: Whole) -> float:

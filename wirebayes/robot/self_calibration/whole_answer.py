@@ -25,7 +25,7 @@ from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.session import Prior, Session
-from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlikely
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.robot.self_calibration.whole import Summarised, Whole
 from wirebayes.typing import Floats
@@ -95,12 +95,19 @@ def answer(
     """
     unknowns, holds = Unknowns(robot, prior, errors), holds_of(robot, session, readings)
     rng = np.random.default_rng(seed)
-    found, holds, requested = _rather_requests(best(unknowns, holds, rng), holds, rng, requests)
+    found = best(unknowns, holds, rng)
+    found, holds, requested = _rather_requests(found, holds, rng, requests)
+    p = whole.trust(found)
+    inexact = errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
+    if inexact:  # how far from exact the joint values are tells more than that there is no answer
+        unknowns = replace(unknowns, errors=replace(errors, joint_m=None))
+        found = best(unknowns, holds, rng)
     plain = whole.estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
-    seen, p = identified(found), whole.trust(found)
+    seen = identified(found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
     s = whole.summarised(found)
-    usable = bool(found.converged and p >= SIGNIFICANT)
+    learnt = seen.determined > 0 or seen.of == 0
+    usable = bool(found.converged and p >= SIGNIFICANT and learnt and not inexact)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -128,14 +135,15 @@ def answer(
         },
         "next_positions_m": ahead.position_m,
         "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
-        "warnings": to_json([*_warnings(found, p, requested), *doubts(robot, prior.line)]),
+        "warnings": to_json([*_warnings(found, p, requested, learnt, inexact), *doubts(robot, prior.line)]),
     }
     return WholeAnswer(content, moved(robot, unknowns.parts(found.state.white)), _known(found, session))
 
 
 def _rather_requests(found: Whole, holds: Holds, rng: np.random.Generator, allowed: bool) -> tuple[Whole, Holds, bool]:
     """What is found without the poses, where they are commands or contradict the joint values: they were requests."""
-    if not (allowed and holds.placed.any() and found.unknowns.errors.pose_m == 0):
+    too_good = _too_good(found)
+    if not holds.placed.any() or not (too_good or (allowed and found.unknowns.errors.pose_m == 0)):
         return found, holds, False
     session = holds.session
     nowhere = replace(
@@ -147,7 +155,7 @@ def _rather_requests(found: Whole, holds: Holds, rng: np.random.Generator, allow
     state = replace(found.state, white=np.zeros_like(found.state.white))
     other = whole.estimate(found.unknowns, blind, state)
     clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and whole.trust(other) >= SIGNIFICANT
-    if _too_good(found) or (other.converged and clearer):
+    if too_good or (other.converged and clearer):
         return other, blind, True
     return found, holds, False
 
@@ -241,7 +249,7 @@ def _now(robot: Robot, found: Whole, s: Summarised, usable: bool) -> CalibratedP
     return out
 
 
-def _warnings(found: Whole, p: float, requested: bool) -> list[Notice]:
+def _warnings(found: Whole, p: float, requested: bool, learnt: bool, inexact: bool) -> list[Notice]:
     out = []
     if not found.converged:
         text = "not converged: do not use these values; read more poses, or check the readings and the stated errors"
@@ -252,8 +260,16 @@ def _warnings(found: Whole, p: float, requested: bool) -> list[Notice]:
             "taken for requests, and the poses as unknown; give --pose-sd if they were measured"
         )
         out.append(Notice("data", text))
-    if found.converged and p < SIGNIFICANT:
+    if found.converged and inexact:
+        text = (
+            f"geometry, taken as exact, and joint values agree to {1e3 * found.noise.joint_m:.2g} mm only: do not use "
+            "these values; give --anchor-sd, or --joint-sd if the joint values are that uncertain"
+        )
+        out.append(Notice("misfit", text))
+    elif found.converged and p < SIGNIFICANT:
         out.append(unlikely(p))
+    if found.converged and not learnt:
+        out.append(unlearnt(1e3 * found.unknowns.prior.reference_sd_m))
     if found.noise.balance > _UNEVEN:
         text = (
             f"the tensions leave {100 * found.noise.balance:.2g} % of the weight unbalanced: the platform was held by "
