@@ -2,10 +2,12 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from wirebayes.linear_algebra import solve
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved, scale
 from wirebayes.robot.self_calibration.strain import stretch
@@ -15,6 +17,7 @@ from wirebayes.robot.self_calibration.whole import Whole, estimate, trust
 from wirebayes.typing import Floats
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
+_SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides among those that carry alike
 _OTHERS = 2  # further starts, where the first does not explain the readings
 
 
@@ -40,7 +43,23 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: np.random.Generat
     if len(lost):
         ratio = stretch(unknowns, white, pull).ratio
         position[lost], turn[lost] = _located(unknowns, holds, white, ratio, lost, position, turn, rng)
-    return State(np.array(white), position, turn, np.array(pull, float).reshape(p, robot.legs))
+    pull = np.array(pull, float).reshape(p, robot.legs)
+    unread = ~np.isfinite(holds.tension_N)
+    for k in np.flatnonzero(unread.any(1)):
+        carried = _carrying(moved(robot, unknowns.parts(white)), position[k], turn[k])
+        pull[k, unread[k]] = carried[unread[k]]
+    return State(np.array(white), position, turn, pull)
+
+
+def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
+    """(w,) tensions above the lowest that carry the platform at a pose as nearly as they can, small ones rather."""
+    shape = statics.geometry(robot, position_m[:, None], turn[..., None])
+    unit = scale(robot)
+    structure = -statics.jacobian(robot, shape)[..., 0] * robot.lines * unit[:, None]
+    load = -statics.weight(robot, turn[..., None])[:, 0] * unit
+    lowest = robot.rule.lowest_N
+    left = np.concatenate([load - structure.sum(1) * lowest, np.zeros(robot.legs)])
+    return np.asarray(lowest + nnls(np.vstack([structure, _SMALL * np.eye(robot.legs)]), left)[0])
 
 
 def _located(

@@ -34,6 +34,7 @@ from wirebayes.typing import Floats
 _FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
 _ROUNDS = 25  # of noise and creep
 _AHEAD = 1.7  # times the logarithmic step of a noise: alone it creeps towards where it ends
+_REACH = 0.3  # rad, or of the platform's size: a larger step leaves what the slopes describe, for another equilibrium
 _STEPS = 12  # of a descent: noise and creep change before more are worth it
 _EASINGS = 16  # quarterings that lead from a tenth of the span to a micrometre
 _ESTIMATED = ("joint_m", "balance")  # of the noise: no other part of it changes
@@ -168,14 +169,16 @@ def descend(
     steps : int
         At most.
     """
-    damping = 1e-6
+    damping, d = 1e-6, unknowns.robot.degrees
     equations = linearised(unknowns, holds, noise, state, creep, since)
     cost = _cost(equations, state.white)
     for _ in range(steps):
         normal = _eliminated(equations, state.white, damping)
         change = -solve(normal.matrix, normal.slope[:, None])[:, 0]
         hold = normal.alone + normal.by_robot @ change
-        there = _stepped(unknowns.robot, state, change, hold)
+        moves = float(np.abs(hold[:, :d]).max())
+        share = min(1.0, _REACH * unknowns.robot.size_m / max(moves, 1e-300))
+        there = _stepped(unknowns.robot, state, share * change, share * hold)
         ahead = linearised(unknowns, holds, noise, there, creep, since)
         new = _cost(ahead, there.white)
         if new < cost:
