@@ -1,28 +1,41 @@
 """Calibration of whole robots drawn at random: do 90 % intervals hold the truth, and are anchors found from lengths?
 
-Exit points, reference lengths, wires and specimens are drawn from what the estimator is told; sessions come from the
-forward statics with creep (`session.predict`), which the estimator does not use.
+A robot stands at poses with tensions drawn anew for each; its anchors, reference lengths, wires and specimens are off
+from what the estimator is told, and its encoders read the true lengths with an error that it is not told. Sessions come
+from the forward statics with creep (`session.predict`), which the estimator does not use.
 
-    python analyses/robot_whole_calibration.py coverage 200
-    python analyses/robot_whole_calibration.py lengths 100
+    python -m analyses.robot_whole_calibration coverage 200 --output docs/results/robot_calibration.json
+    python -m analyses.robot_whole_calibration exact 60
+    python -m analyses.robot_whole_calibration lengths 100 --output docs/results/robot_lengths_alone.json
 """
 
 import argparse
+import json
+import subprocess
+import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tests.robot import drawn
-from wirebayes.robot.mechanics import draws, rotation
+from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.tensions import nearest
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import equations, session, whole
+from wirebayes.robot.self_calibration.identified import identified
 from wirebayes.robot.self_calibration.seeds import best
+from wirebayes.robot.self_calibration.summary import Moment, summarised
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 
 MODES = ("poses known", "poses roughly known", "poses unknown", "some poses")
 POINTS = ("point-4", "point-5")
+ENCODERS = (1e-5, 1e-4)  # error of a length over the span: .05 to .5 mm of 5 m
 
 
 @dataclass
@@ -37,23 +50,20 @@ class Case:
     position_m: np.ndarray
 
 
-def case(kind: str, mode: str, rng: np.random.Generator, stops: int = 20, tensions: bool = True) -> Case | None:
-    """One robot with its session; None where it does not hold its platform at enough poses."""
+def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: int, tensions: bool) -> Case | None:
+    """One robot whose anchors are off by a share of its span; None where nothing holds its platform often enough."""
     try:
         made = drawn.draw(kind, rng, 200, 0.03)
     except RuntimeError:
         return None
     robot, span = made.robot, made.robot.span_m
-    anchor = span * float(rng.choice([2e-3, 1e-2])) if tensions else 0.02 * span
-    reference = 2e-3 * span
-    true = replace(robot, exit_m=robot.exit_m + anchor * rng.normal(size=robot.exit_m.shape))
-    force = robot.rule.highest_N / 5.0
-    prior = session.Prior(made.line, reference)
-    log = _commanded(robot, made.line, rng, stops, force)
-    if log is None:
-        return None
+    true = replace(robot, exit_m=robot.exit_m + anchor * span * rng.normal(size=robot.exit_m.shape))
+    prior = session.Prior(made.line, 2e-3 * span)
     mean, cov = prior.moments(robot.legs)
     values = rng.multivariate_normal(mean, cov, 1)
+    log = _visited(true, prior, values, rng, stops)
+    if log is None:
+        return None
     with np.errstate(all="ignore"):
         real = session.predict(true, prior, log, values)
     if not real.solved[0] or not np.isfinite(real.readings).all():
@@ -68,95 +78,145 @@ def case(kind: str, mode: str, rng: np.random.Generator, stops: int = 20, tensio
     unknown = {"poses unknown": np.ones(stops, bool), "some poses": np.arange(stops) >= 5}.get(mode)
     if unknown is not None:
         position[unknown], turn[unknown] = np.nan, np.nan
-    told = Unknowns(robot, prior, StatedErrors(exit_m=anchor, pose_m=pose_sd))
-    log = replace(log, position_m=position, rotation=turn, read=np.full(stops, tensions))
+    told = Unknowns(robot, prior, StatedErrors(exit_m=anchor * span, pose_m=pose_sd))
+    read = log.joint_m + span * float(rng.choice(ENCODERS)) * rng.normal(size=log.joint_m.shape)
+    log = replace(log, position_m=position, rotation=turn, joint_m=read, read=np.full(stops, tensions))
     return Case(told, equations.Holds(log, tension), true.exit_m, values[0, : robot.legs], real.length_m[0],
                 real.position_m[0])  # fmt: skip
 
 
-def _commanded(
-    robot: Robot, line: draws.WireDraws, rng: np.random.Generator, stops: int, force: float
+def _visited(
+    robot: Robot, prior: session.Prior, values: np.ndarray, rng: np.random.Generator, stops: int
 ) -> session.Session | None:
-    wires = draws.for_robot(robot, line.centre())
+    """Poses of the true robot, each with tensions near others drawn from the range that its file allows."""
+    wires, error = prior.wires(robot, values)
     x = rng.uniform(robot.lower_m, robot.upper_m, (20 * stops, 3))
     R = rotation.matrix(0.1 * rng.normal(size=x.shape) * (robot.degrees == 6))
-    tau = inverse.tensions(robot, x, R)
+    lowest, half = robot.rule.lowest_N, 0.5 * robot.rule.highest_N
+
+    def varied(structure: np.ndarray, load: np.ndarray, low: float, high: float) -> np.ndarray | None:
+        return nearest(rng.uniform(lowest, half, robot.legs), structure, load, low, high)
+
+    tau = inverse.tensions(robot, x, R, varied)
     good = np.flatnonzero(np.isfinite(tau).all(1))[:stops]
     if len(good) < stops:
         return None
-    commands = inverse.commands(robot, wires, x[good], R[good], tau[good])
-    duration = np.full(stops, 30.0)
-    return session.Session(x[good], R[good], commands.joint_m, duration, np.ones(stops, bool), 0.003 * force)
+    each = wires.part(np.zeros(stops, int))
+    joint = inverse.commands(robot, each, x[good], R[good], tau[good], 0.0, error.T).joint_m
+    held = np.full(stops, 30.0)
+    return session.Session(x[good], R[good], joint, held, np.ones(stops, bool), 0.003 * half / 2.5)
 
 
-def _inside(mean: np.ndarray, sd: np.ndarray, truth: np.ndarray, half: float) -> np.ndarray:
-    return np.abs(mean - truth) <= half * sd
-
-
-def coverage(size: int, seed: int) -> None:
-    """Shares of 90 % intervals that hold the truth, by mode."""
-    rng = np.random.default_rng(seed)
-    rows, failed, took = [], 0, []
+def _cases(
+    size: int, rng: np.random.Generator, of: Callable[[int], tuple[str, str, float]], stops: int, tensions: bool
+) -> Iterator[tuple[str, str, float, Case]]:
     made = 0
     while made < size:
-        kind, mode = drawn.KINDS[made % len(drawn.KINDS)], MODES[(made // len(drawn.KINDS)) % len(MODES)]
-        one = case(kind, mode, rng)
-        if one is None:
-            continue
-        made += 1
+        kind, mode, anchor = of(made)
+        one = case(kind, mode, rng, anchor, stops, tensions)
+        if one is not None:
+            made += 1
+            yield kind, mode, anchor, one
+
+
+def _verdict(found: whole.Whole) -> bool:
+    seen = identified(found)
+    return found.converged and whole.trust(found) >= SIGNIFICANT and (seen.determined > 0 or seen.of == 0)
+
+
+def _inside(known: Moment, truth: np.ndarray, exact: float = 0.0) -> float:
+    """Share of the 90 % intervals that hold the truth."""
+    return float((np.abs(known.mean - truth) <= known.half * known.sd + exact).mean())
+
+
+def coverage(size: int, seed: int) -> dict[str, Any]:
+    """Shares of 90 % intervals that hold the truth, by kind of robot and by what is known of its poses."""
+    rng, rows, took = np.random.default_rng(seed), [], []
+
+    def of(made: int) -> tuple[str, str, float]:
+        kinds = len(drawn.KINDS)
+        return drawn.KINDS[made % kinds], MODES[(made // kinds) % len(MODES)], (2e-3, 1e-2)[made % 2]
+
+    for kind, mode, anchor, one in _cases(size, rng, of, 20, True):
         begun = time.perf_counter()
         with np.errstate(all="ignore"):
             found = best(one.told, one.holds, rng)
         took.append(time.perf_counter() - begun)
-        if not found.converged:
-            failed += 1
-            print("   not converged", kind, mode, found.noise, found.cost)
-            continue
-        s = whole.summarised(found)
-        half = found.quantile
-        inside = [
-            _inside(s.exit_m[0], s.exit_m[1], one.exit_m, half).mean(),
-            _inside(s.reference_m[0], s.reference_m[1], one.reference_m, half).mean(),
-            _inside(s.length_m[0], s.length_m[1], one.length_m, half).mean(),
-            _inside(s.position_m[0], s.position_m[1] + 1e-6 * one.told.robot.span_m, one.position_m, half).mean(),
-        ]
-        rows.append((kind, mode, *inside, whole.trust(found)))
-    print(f"{made} robots, {failed} not converged, {np.mean(took):.2f} s each")
-    for name, at in (("all", None), *((m, 1) for m in MODES), *((k, 0) for k in drawn.KINDS)):
-        some = [r for r in rows if at is None or r[at] == name]
-        if some:
-            shares = np.mean([r[2:6] for r in some], 0)
-            print(f"{name:22} exit {shares[0]:.3f}  reference {shares[1]:.3f}  length {shares[2]:.3f}  "
-                  f"pose {shares[3]:.3f}   usable {np.mean([r[6] >= 0.01 for r in some]):.3f}")  # fmt: skip
+        s = summarised(found)
+        row = {"kind": kind, "mode": mode, "anchor": anchor, "converged": found.converged, "usable": _verdict(found)}
+        if found.converged:
+            exact = 1e-6 * one.told.robot.span_m
+            row |= {
+                "exit_points": _inside(s.exit_m, one.exit_m),
+                "references": _inside(s.reference_m, one.reference_m),
+                "lengths": _inside(s.length_m, one.length_m),
+                "poses": _inside(s.position_m, one.position_m, exact),
+            }
+        else:
+            print("   not converged", kind, mode, anchor, found.noise, found.cost)
+        rows.append(row)
+    shares = {name: _shares([r for r in rows if name in (r["mode"], r["kind"], "all")])
+              for name in ("all", *MODES, *drawn.KINDS)}  # fmt: skip
+    return {"seconds_each": float(np.mean(took)), "shares": shares}
 
 
-def lengths(size: int, seed: int) -> None:
+def _shares(rows: list[dict[str, Any]]) -> dict[str, float]:
+    out: dict[str, float] = {"robots": len(rows)}
+    if rows:
+        out |= {name: float(np.mean([r[name] for r in rows])) for name in ("converged", "usable")}
+        for name in ("exit_points", "references", "lengths", "poses"):
+            out[name] = float(np.mean([r[name] for r in rows if r["converged"]] or [np.nan]))
+    return out
+
+
+def exact(size: int, seed: int) -> dict[str, Any]:
+    """How often anchors held exact are usable, where they are off by 1 % of the span, and where they are not."""
+    rng, out = np.random.default_rng(seed), {}
+    for anchor in (1e-2, 0.0):
+        usable = []
+
+        def of(made: int, anchor: float = anchor) -> tuple[str, str, float]:
+            return drawn.KINDS[made % len(drawn.KINDS)], MODES[made % 2], anchor
+
+        for _, _, _, one in _cases(size, rng, of, 20, True):
+            known = replace(one.told.errors, exit_m=0.0, joint_m=1e-4 * one.told.robot.span_m)
+            with np.errstate(all="ignore"):
+                usable.append(_verdict(best(replace(one.told, errors=known), one.holds, rng)))
+        out[f"usable with anchors off by {anchor:g} of the span"] = float(np.mean(usable))
+    return out
+
+
+def lengths(size: int, seed: int) -> dict[str, Any]:
     """Anchors from lengths alone, poses unknown: how often found, how often silently wrong."""
-    rng = np.random.default_rng(seed)
-    found_, wrong, said, made = 0, 0, 0, 0
-    while made < size:
-        kind = POINTS[made % 2]
-        one = case(kind, "poses unknown", rng, 24, tensions=False)
-        if one is None:
-            continue
-        made += 1
+    rng, rows = np.random.default_rng(seed), []
+
+    def of(made: int) -> tuple[str, str, float]:
+        return POINTS[made % 2], "poses unknown", 2e-2
+
+    for kind, _, _, one in _cases(size, rng, of, 24, False):
         with np.errstate(all="ignore"):
             found = best(one.told, one.holds, rng)
-        s = whole.summarised(found)
-        off = np.abs(s.exit_m[0] - one.exit_m) / s.exit_m[1]
-        ok = found.converged and whole.trust(found) >= 0.01
-        good = bool((off < 4).all())
-        before = one.told.errors.exit_m
-        print(kind, "ok" if ok else "refused", f"worst {off.max():.1f} sd; sd {np.median(s.exit_m[1]) / before:.2f} of "
-              f"before; error {np.sqrt(np.mean((s.exit_m[0] - one.exit_m) ** 2)) / before:.2f}; between anchors "
-              f"{_between(s.exit_m[0], one.exit_m) / before:.2f}", found.noise)  # fmt: skip
-        found_ += ok and good
-        wrong += ok and not good
-        said += not ok
-    print(f"{made} robots: found {found_}, silently wrong {wrong}, refused {said}")
+        s, before = summarised(found), one.told.errors.exit_m
+        ok = _verdict(found)
+        worst = float((np.abs(s.exit_m.mean - one.exit_m) / s.exit_m.sd).max())
+        after = {"anchors": _between(s.exit_m.mean, one.exit_m), "before": _between(one.told.robot.exit_m, one.exit_m)}
+        rows.append({"kind": kind, "ok": ok, "good": worst < 4, "sharper": after["anchors"] / after["before"]})
+        print(kind, "ok" if ok else "refused", f"worst {worst:.1f} sd; sd {np.median(s.exit_m.sd) / before:.2f} of "
+              f"before; between anchors {after['anchors'] / before:.2f} of {after['before'] / before:.2f}; "
+              f"converged {found.converged} p {whole.trust(found):.2g} {identified(found).determined}")  # fmt: skip
+    accepted = np.array([r["ok"] for r in rows])
+    good = np.array([r["good"] for r in rows])
+    return {
+        "found": float((accepted & good).mean()),
+        "silently_wrong": float((accepted & ~good).mean()),
+        "refused": float((~accepted).mean()),
+        "distance_error_over_before": float(np.median([r["sharper"] for r in rows if r["ok"]] or [np.nan])),
+    }
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> float:
+    """Root mean square by which distances between anchors differ: free of where the whole robot stands."""
+
     def apart(x: np.ndarray) -> np.ndarray:
         return np.linalg.norm(x[:, None] - x, axis=-1)[np.triu_indices(len(x), 1)]
 
@@ -165,8 +225,19 @@ def _between(a: np.ndarray, b: np.ndarray) -> float:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("what", choices=["coverage", "lengths"])
+    parser.add_argument("what", choices=["coverage", "exact", "lengths"])
     parser.add_argument("size", type=int, default=200, nargs="?")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--output", type=Path)
     given = parser.parse_args()
-    {"coverage": coverage, "lengths": lengths}[given.what](given.size, given.seed)
+    answer = {"coverage": coverage, "exact": exact, "lengths": lengths}[given.what](given.size, given.seed)
+    commit = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    origin = {
+        "command": "python -m analyses.robot_whole_calibration " + " ".join(sys.argv[1:]),
+        "commit": commit,
+        "date": time.strftime("%Y-%m-%d", time.gmtime()),
+    }
+    text = json.dumps(origin | {"robots": given.size} | answer, indent=2) + "\n"
+    print(text)
+    if given.output:
+        given.output.write_text(text)

@@ -168,6 +168,11 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     found = json.loads((done / "calibration.json").read_text())
     found["with_creep_model"]["converged"] = False
     (astray / "calibration.json").write_text(json.dumps(found))
+    unusable = tmp_path / "unusable"
+    shutil.copytree(done, unusable)
+    found["with_creep_model"]["converged"] = True
+    doubted = found | {"usable": False, "warnings": [{"kind": "misfit", "text": "…"}]}
+    (unusable / "calibration.json").write_text(json.dumps(doubted))
     other = tmp_path / "other"
     other.mkdir()
     (other / "posterior.nc").write_bytes(b"another")
@@ -182,6 +187,7 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
         ([*begin, *joint, "--calibration", str(done), "--reference-sd", "2"], "--reference-sd: found beside"),
         ([*begin, *joint, "--calibration", str(tmp_path / "no")], "found no calibration.json in"),
         ([*begin, *joint, "--calibration", str(astray)], "found one that has not converged in"),
+        ([*begin, *joint, "--calibration", str(unusable)], f"not usable in {unusable} (warnings: misfit), expected"),
         ([*begin, *joint, "--calibration", str(damaged)], "unknowns.json: cannot be used"),
         (["pose", "linear-6", *wires, *joint, "--calibration", str(done)], "found one of linear-7 in"),
         (["pose", str(heavier), *wires, *joint, "--calibration", str(done)], "found one of another linear-7 in"),

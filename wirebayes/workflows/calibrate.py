@@ -171,9 +171,10 @@ def calibrate(
                     requests = pose_sd is None
                     whole = whole_answer.answer(machine, prior, errors, session, values, seed, requests, next_poses)
                     found, known = whole.content, whole.known
-                    calibrated = _write_robot(run.directory / ROBOT, robot, whole.robot)
+                    path = run.directory / ROBOT
+                    calibrated = _write_robot(path, robot, whole.robot) if found["usable"] else whole.robot
             write_json(run.directory / "calibration.json", found)
-            if found["with_creep_model"]["converged"]:
+            if found["usable"]:
                 unknowns: UnknownsJson = {**_belongs_to(calibrated, wires, experiment), **to_dict(known)}
                 write_json(run.directory / UNKNOWNS, unknowns)
             _write_scene(run.directory / "scene.json", calibrated, found)
@@ -246,7 +247,7 @@ def calibrated_of(
     Raises
     ------
     InputError
-        It has not converged, is of another robot or line, or is no calibration.
+        It has not converged, is not usable, is of another robot or line, or is no calibration.
     """
     folder = calibration.folder if isinstance(calibration, Calibration) else Path(calibration)
     expected = f"expected a calibration of {robot.name} that has converged"
@@ -254,10 +255,17 @@ def calibrated_of(
     found: CalibrateJson = read_json(summary, f"--calibration: found no calibration.json in {folder}, {expected}")
     with stored_results(summary):
         name, converged = str(found["robot"]), bool(found["with_creep_model"]["converged"])
+        usable, kinds = bool(found["usable"]), sorted({one["kind"] for one in found["warnings"]})
     if name != robot.name:
         raise InputError(f"--calibration: found one of {name} in {folder}, {expected}")
     if not converged:
         raise InputError(f"--calibration: found one that has not converged in {folder}, {expected}")
+    if not usable:
+        reasons = f" (warnings: {', '.join(kinds)})" if kinds else ""
+        raise InputError(
+            f"--calibration: found one that says it is not usable in {folder}{reasons}, "
+            f"expected a calibration of {name} that may be set in a controller"
+        )
     path = folder / UNKNOWNS
     absent = f"{path}: found no such file, expected what calibrate writes; run it again in a new folder"
     stored: UnknownsJson = read_json(path, absent)

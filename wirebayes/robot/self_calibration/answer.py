@@ -105,11 +105,11 @@ def _named(robot: Robot, prior: Prior, session: Session, known: Calibration) -> 
     open_ = [f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
              f"{1e3 * sd[i]:.2g} mm now" for i in np.flatnonzero(~(sd < 0.5 * prior.reference_sd_m))]  # fmt: skip
     return {
-        "exit_points_m": interval((robot.exit_m, zero), half),
-        "platform_points_m": interval((robot.platform_m, zero), half),
-        "zero_tension_lengths_m": interval((known.length_m[0], known.length_sd_m[0]), half),
-        "references_m": interval((known.unknowns[0, : robot.legs], sd), half),
-        "poses": {"hold": np.asarray(numbers, float).tolist(), **interval((pose, known.ended_sd[0]), half)},
+        "exit_points_m": interval(robot.exit_m, zero, half),
+        "platform_points_m": interval(robot.platform_m, zero, half),
+        "zero_tension_lengths_m": interval(known.length_m[0], known.length_sd_m[0], half),
+        "references_m": interval(known.unknowns[0, : robot.legs], sd, half),
+        "poses": {"hold": np.asarray(numbers, float).tolist(), **interval(pose, known.ended_sd[0], half)},
         "identified": {"determined": determined, "of": robot.legs, "combinations": [], "not_determined": open_},
     }
 

@@ -66,14 +66,12 @@ def unlearnt(prior_mm: float) -> Notice:
     )
 
 
-def interval(moment: tuple[Floats, Floats], half: float) -> Interval:
+def interval(mean: Floats, sd: Floats, half: Floats | float) -> Interval:
     """Mean, standard deviation and an interval of `half` standard deviations to either side.
 
     Parameters
     ----------
-    moment : pair of arrays
-        Mean and standard deviation.
-    half : float
+    mean, sd : arrays
+    half : array or float
     """
-    mean, sd = moment
     return {"mean": mean, "sd": sd, "q05": mean - half * sd, "q95": mean + half * sd}

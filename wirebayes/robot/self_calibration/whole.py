@@ -7,7 +7,6 @@ then ever smaller ones, lead from rough geometry to the mode.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from wirebayes.linear_algebra import inv, solve
 from wirebayes.robot.mechanics import rotation as turns
@@ -83,11 +82,6 @@ class Whole:
     converged: bool
     cost: float
     last_m: Floats
-
-    @property
-    def quantile(self) -> float:
-        """Half width of a 90 % interval in standard deviations."""
-        return float(student.ppf(0.95, self.degrees))
 
     @property
     def evidence(self) -> float:
@@ -272,6 +266,25 @@ def _posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, la
     return Whole(unknowns, state, covariance, by_robot, hold, e, noise, np.inf, creep, good, cost, last_m)
 
 
+def at_joint_error(found: Whole, factor: float) -> Whole:
+    """The posterior about the same mode with the error of the loops larger by a factor.
+
+    Parameters
+    ----------
+    found : Whole
+    factor : float
+    """
+    e = found.equations
+    unit = np.ones(e.residual.shape[1])
+    unit[e.rows["loop"]] /= factor
+    there = replace(
+        e, residual=e.residual * unit, by_robot=e.by_robot * unit[:, None], by_hold=e.by_hold * unit[:, None]
+    )
+    down = Descent(found.state, there, _cost(there, found.state.white), found.converged)
+    noise = replace(found.noise, joint_m=found.noise.joint_m * factor)
+    return replace(_posterior(found.unknowns, down, noise, found.creep, found.last_m), degrees=found.degrees)
+
+
 def _leverage(found: Whole, rows: slice) -> Floats:
     """(p, r) share of each residual's variance that the unknowns take up."""
     z, g = found.equations.by_hold[:, rows], found.equations.by_robot[:, rows]
@@ -330,76 +343,6 @@ def _shown(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: 
     unit = noise.joint_m if rows == "loop" else noise.balance
     size = float(np.sqrt(np.mean(e.residual[:, e.rows[rows]] ** 2))) * unit
     return max(size, unit) if np.isfinite(size) else 1e3 * unit
-
-
-Moment = tuple[Floats, Floats]  # mean and standard deviation
-
-
-@dataclass(frozen=True)
-class Summarised:
-    """Means and standard deviations of what a robot's owner asks for.
-
-    Attributes
-    ----------
-    exit_m, platform_m : pairs of (w, 3) arrays
-    reference_m, length_m, drum, bias_N : pairs of (w,) arrays
-        `length_m`: zero-tension lengths after the last hold, creep included.
-    position_m, turn_rad : pairs of (p, 3) arrays
-        `turn_rad`: rotation vectors; their errors are small turns about the world's axes.
-    pull_N : pair of (p, w) arrays
-    strain : (w,) array
-        Creep after the last hold.
-    """
-
-    exit_m: Moment
-    platform_m: Moment
-    reference_m: Moment
-    length_m: Moment
-    drum: Moment
-    bias_N: Moment
-    position_m: Moment
-    turn_rad: Moment
-    pull_N: Moment
-    strain: Floats
-
-
-def summarised(found: Whole) -> Summarised:
-    """What the posterior says of everything by name."""
-    unknowns, state, robot = found.unknowns, found.state, found.unknowns.robot
-    parts, w, d = unknowns.parts(state.white), robot.legs, robot.degrees
-    sd = np.sqrt(np.diag(found.covariance))
-
-    def points(name: str, values: Floats, error: float) -> Moment:
-        own = sd[unknowns.slices[name]]
-        return values, error * own.reshape(values.shape) if len(own) else np.zeros_like(values)
-
-    prior, at = unknowns.prior, unknowns.slices["wires"]
-    hold = np.sqrt(np.maximum(np.einsum("pii->pi", found.hold_covariance), 0.0))
-    turn = hold[:, 3:d] / robot.size_m if d == 6 else np.zeros_like(state.position_m)
-    bias = prior.bias_sd_N * sd[-w:] if prior.bias_sd_N > 0 else np.zeros(w)
-    # the last zero-tension lengths: references, drums and the strain, with all that it depends on
-    joint = found.last_m
-    bare = joint + parts.reference_m
-    strain = found.creep.strain[-1]
-    slope = np.zeros((w, unknowns.count))
-    slope[:, at] = bare[:, None] * found.creep.by_wires[-1]
-    leg = np.arange(w)
-    slope[leg, unknowns.references.start + leg] += (1 + strain) * prior.reference_sd_m
-    if unknowns.errors.drum > 0:
-        slope[leg, unknowns.slices["drum"].start + leg] = unknowns.errors.drum * joint * ~robot.is_linear
-    length_sd = np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope))
-    return Summarised(
-        points("exit", parts.exit_m, unknowns.errors.exit_m),
-        points("platform", parts.platform_m, unknowns.errors.platform_m),
-        (parts.reference_m, prior.reference_sd_m * sd[unknowns.references]),
-        (bare * (1 + strain), length_sd),
-        points("drum", parts.drum, unknowns.errors.drum),
-        (parts.bias_N, bias),
-        (state.position_m, hold[:, :3]),
-        (turns.vector(state.rotation), turn),
-        (np.maximum(state.pull_N, 0.0), hold[:, d:]),
-        strain,
-    )  # fmt: skip
 
 
 def trust(found: Whole) -> float:

@@ -25,9 +25,10 @@ from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole import Summarised, Whole
+from wirebayes.robot.self_calibration.whole import Whole
 from wirebayes.typing import Floats
 
 _RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
@@ -105,7 +106,7 @@ def answer(
     plain = whole.estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
     seen = identified(found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
-    s = whole.summarised(found)
+    s = summarised(found)
     learnt = seen.determined > 0 or seen.of == 0
     usable = bool(found.converged and p >= SIGNIFICANT and learnt and not inexact)
     content: CalibrateJson = {
@@ -114,18 +115,18 @@ def answer(
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
         "prior": _prior(robot, prior, errors, session),
-        "exit_points_m": interval(s.exit_m, found.quantile),
-        "platform_points_m": interval(s.platform_m, found.quantile),
-        "zero_tension_lengths_m": interval(s.length_m, found.quantile),
-        "references_m": interval(s.reference_m, found.quantile),
-        "poses": _poses(s, found, session),
+        "exit_points_m": interval(*s.exit_m),
+        "platform_points_m": interval(*s.platform_m),
+        "zero_tension_lengths_m": interval(*s.length_m),
+        "references_m": interval(*s.reference_m),
+        "poses": _poses(s, session),
         "misfit": whole.misfit(found),
         "length_rms_mm": _length_rms(found),
         "joint_sd_mm": 1e3 * found.noise.joint_m,
         "identified": _identified(seen),
         "usable": usable,
         "with_creep_model": _lengths(found, s),
-        "by_hooke_alone": _lengths(plain, whole.summarised(plain)),
+        "by_hooke_alone": _lengths(plain, summarised(plain)),
         **_now(robot, found, s, usable),
         "observability": {
             "rank": seen.determined,
@@ -188,11 +189,10 @@ def _prior(robot: Robot, prior: Prior, errors: StatedErrors, session: Session) -
     return given
 
 
-def _poses(s: Summarised, found: Whole, session: Session) -> EstimatedPoses:
+def _poses(s: Summary, session: Session) -> EstimatedPoses:
     numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
-    pose = tuple(np.hstack([place, turn]) for place, turn in zip(s.position_m, s.turn_rad, strict=True))
-    return {"hold": np.asarray(numbers, float).tolist(),
-            **interval((pose[0], pose[1]), found.quantile)}  # fmt: skip
+    mean, sd, half = (np.hstack([place, turn]) for place, turn in zip(s.position_m, s.turn_rad, strict=True))
+    return {"hold": np.asarray(numbers, float).tolist(), **interval(mean, sd, half)}
 
 
 def _length_rms(found: Whole) -> float:
@@ -202,17 +202,17 @@ def _length_rms(found: Whole) -> float:
     return 1e3 * float(np.sqrt(np.mean(left**2)))
 
 
-def _lengths(found: Whole, s: Summarised) -> EstimatedLengths:
+def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
     out: EstimatedLengths = {
         "converged": found.converged,
         "misfit": whole.misfit(found),
         "p_joint": whole.trust(found),
-        "length_m": interval(s.length_m, found.quantile),
+        "length_m": interval(*s.length_m),
         "creep_strain": s.strain,
-        "reference_error_mm": {"mean": 1e3 * s.reference_m[0], "sd": 1e3 * s.reference_m[1]},
+        "reference_error_mm": {"mean": 1e3 * s.reference_m.mean, "sd": 1e3 * s.reference_m.sd},
     }
     if found.unknowns.prior.bias_sd_N > 0:
-        out["tension_bias_N"] = {"mean": s.bias_N[0], "sd": s.bias_N[1]}
+        out["tension_bias_N"] = {"mean": s.bias_N.mean, "sd": s.bias_N.sd}
     return out
 
 
@@ -228,12 +228,12 @@ def _identified(seen: Identified) -> IdentifiedJson:
     }
 
 
-def _now(robot: Robot, found: Whole, s: Summarised, usable: bool) -> CalibratedPoses:
+def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPoses:
     """Where the platform is after the last hold; joint values of the home pose where they can be used."""
     if not found.converged:
         return {"pose_now": None, "joint_values_for_home_m": None}
     out: CalibratedPoses = {
-        "pose_now": {"position_m": s.position_m[0][-1], "rotation_vector_rad": s.turn_rad[0][-1]},
+        "pose_now": {"position_m": s.position_m.mean[-1], "rotation_vector_rad": s.turn_rad.mean[-1]},
         "joint_values_for_home_m": None,
     }
     unknowns = found.unknowns

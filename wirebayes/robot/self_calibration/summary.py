@@ -1,0 +1,123 @@
+"""What the posterior of a whole robot says of everything by name: means, standard deviations and 90 % intervals.
+
+Where the error of the joint values is estimated, it is itself uncertain: a quantity's standard deviation then rests on
+as many degrees of freedom as that error's, times the square of how strongly it follows it (Satterthwaite).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.self_calibration.whole import Whole, at_joint_error
+from wirebayes.typing import Floats
+
+_FACTOR = 1.05  # of the error of the joint values: a step for slopes of logarithms, which are smooth
+_MANY = 1e6  # degrees of freedom: more make no difference
+
+
+class Moment(NamedTuple):
+    """Mean, standard deviation, and half the width of a 90 % interval in standard deviations."""
+
+    mean: Floats
+    sd: Floats
+    half: Floats
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a robot's owner asks for.
+
+    Attributes
+    ----------
+    exit_m, platform_m : of (w, 3) arrays
+    reference_m, length_m, drum, bias_N : of (w,) arrays
+        `length_m`: zero-tension lengths after the last hold, creep included.
+    position_m, turn_rad : of (p, 3) arrays
+        `turn_rad`: rotation vectors; their errors are small turns about the world's axes.
+    pull_N : of (p, w) arrays
+    strain : (w,) array
+        Creep after the last hold.
+    """
+
+    exit_m: Moment
+    platform_m: Moment
+    reference_m: Moment
+    length_m: Moment
+    drum: Moment
+    bias_N: Moment
+    position_m: Moment
+    turn_rad: Moment
+    pull_N: Moment
+    strain: Floats
+
+
+def summarised(found: Whole) -> Summary:
+    """Means, standard deviations and half widths of 90 % intervals.
+
+    Parameters
+    ----------
+    found : Whole
+    """
+    state, parts = found.state, found.unknowns.parts(found.state.white)
+    strain = found.creep.strain[-1]
+    means = {
+        "exit_m": parts.exit_m,
+        "platform_m": parts.platform_m,
+        "reference_m": parts.reference_m,
+        "length_m": (found.last_m + parts.reference_m) * (1 + strain),
+        "drum": parts.drum,
+        "bias_N": parts.bias_N,
+        "position_m": state.position_m,
+        "turn_rad": turns.vector(state.rotation),
+        "pull_N": np.maximum(state.pull_N, 0.0),
+    }
+    sds = _standard_deviations(found)
+    halves = {name: np.full(np.shape(sd), norm.ppf(0.95)) for name, sd in sds.items()}
+    if np.isfinite(found.degrees):
+        wider = _standard_deviations(at_joint_error(found, _FACTOR))
+        halves = {name: _half(sd, wider[name], found.degrees) for name, sd in sds.items()}
+    return Summary(**{name: Moment(mean, sds[name], halves[name]) for name, mean in means.items()}, strain=strain)
+
+
+def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
+    """Quantiles of Student's t; `wider` are the standard deviations with an error of the joint values larger."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        follows = np.nan_to_num(np.log(wider / sd) / np.log(_FACTOR))  # what is exact follows nothing
+        own = np.minimum(degrees / follows**2, _MANY)
+    return np.asarray(student.ppf(0.95, own))
+
+
+def _standard_deviations(found: Whole) -> dict[str, Floats]:
+    unknowns, robot, prior, at = found.unknowns, found.unknowns.robot, found.unknowns.prior, found.unknowns.slices
+    w, d = robot.legs, robot.degrees
+    sd = np.sqrt(np.diag(found.covariance))
+    hold = np.sqrt(np.maximum(np.einsum("pii->pi", found.hold_covariance), 0.0))
+
+    def unknown(name: str, error: float, shape: tuple[int, ...]) -> Floats:
+        own = sd[at[name]]
+        return np.asarray(error * own.reshape(shape) if len(own) else np.zeros(shape))
+
+    # the last zero-tension lengths: references, drums and the strain, with all that it depends on
+    joint, strain = found.last_m, found.creep.strain[-1]
+    bare = joint + unknowns.parts(found.state.white).reference_m
+    slope = np.zeros((w, unknowns.count))
+    slope[:, at["wires"]] = bare[:, None] * found.creep.by_wires[-1]
+    leg = np.arange(w)
+    slope[leg, unknowns.references.start + leg] += (1 + strain) * prior.reference_sd_m
+    if unknowns.errors.drum > 0:
+        slope[leg, at["drum"].start + leg] = unknowns.errors.drum * joint * ~robot.is_linear
+    return {
+        "exit_m": unknown("exit", unknowns.errors.exit_m, (w, 3)),
+        "platform_m": unknown("platform", unknowns.errors.platform_m, (w, 3)),
+        "reference_m": prior.reference_sd_m * sd[unknowns.references],
+        "length_m": np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope)),
+        "drum": unknown("drum", unknowns.errors.drum, (w,)),
+        "bias_N": prior.bias_sd_N * sd[-w:] if prior.bias_sd_N > 0 else np.zeros(w),
+        "position_m": hold[:, :3],
+        "turn_rad": hold[:, 3:d] / robot.size_m if d == 6 else np.zeros((len(hold), 3)),
+        "pull_N": hold[:, d:],
+    }
