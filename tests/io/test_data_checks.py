@@ -8,6 +8,7 @@ import pytest
 from analyses.hidden_effects.noise import measure
 from analyses.hidden_effects.truth import PROTOCOLS, draw_rig
 from wirebayes.io import data_checks, paper
+from wirebayes.io.arrays import from_arrays
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.protocol import Protocol
 
@@ -132,3 +133,11 @@ def _padded(bench, readings):
     tension[mask] = readings
     moved, lasted = bench.displacements_mm, np.array([hold.duration_s for hold in bench.holds])
     return Protocol(bench.length_mm, moved, times, mask, lasted, np.array([h.number for h in bench.holds])), tension
+
+
+def test_one_hold_leaves_k1_and_preload_open_unless_one_is_stated():
+    options = {"length_mm": 1000.0, "name": "one", "material": "line"}
+    one = from_arrays([1] * 4, [2.0] * 4, [0.0, 1.0, 5.0, 20.0], [2.0, 1.9, 1.8, 1.75], **options)
+    assert [(n.kind, n.text) for n in data_checks.of_experiment(one)] == [("prior", data_checks.ONE_HOLD)]
+    known = replace(one, priors={"preload": {"fixed": 0.0}})
+    assert data_checks.of_experiment(known) == []

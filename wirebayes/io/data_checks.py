@@ -4,7 +4,7 @@ What is certainly wrong is refused where the file is read (`wirebayes.io.reading
 a warning here.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,11 @@ GROSS = 0.2  # of the range of all other tensions; smaller ones are the model ch
 RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that rise, rise in noise levels: not by chance
 COPIED = 3  # different readings that agree one by one at two displacements: not by chance
 OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
+
+ONE_HOLD = (
+    "one hold does not tell k1 and the preload apart: the priors decide both; state what is known, as preload_mm (0 "
+    "where displacements count from the zero-tension length), [prior.preload] or [prior.k1]"
+)
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,22 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
 
 def of_experiment(experiment: Experiment) -> list[Notice]:
     """The warnings of one test."""
-    return warnings(experiment.protocol(), experiment.readings(), experiment.resolution)
+    found = warnings(experiment.protocol(), experiment.readings(), experiment.resolution)
+    return [*found, *one_hold(experiment.protocol(), set(experiment.priors))]
+
+
+def one_hold(protocol: Protocol, stated: Set[str]) -> list[Notice]:
+    """What a single hold leaves open: the stiffness or the preload, unless one of them is stated.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    stated : set of str
+        Parameters with a prior of the user's own.
+    """
+    if int(protocol.recorded.sum()) != 1 or stated & {"k1", "preload"}:
+        return []
+    return [Notice("prior", ONE_HOLD)]
 
 
 def run_on_times(readings: Readings) -> str:
@@ -146,14 +166,14 @@ def falls(setting: Floats, readings: Floats) -> bool:
 def response(readings: Readings) -> str:
     """Tension that does not follow the displacement, or follows it the wrong way."""
     means, place = readings.means, readings.setting
-    if np.ptp(place) == 0:
+    if np.ptp(place) == 0 and len(place) > 1:
         return "all holds have the same displacement_mm: without a step the stiffness cannot be known"
     if max(row.max() for row in readings.each) <= FLAT * readings.noise:
         return (
             f"no reading stands out from the scatter within the holds ({readings.noise:.2g} N): the wire was slack "
             "throughout, or rows of other tests are mixed in"
         )
-    if np.ptp(means) <= FLAT * readings.noise:
+    if len(means) > 1 and np.ptp(means) <= FLAT * readings.noise:
         return (
             f"tension stays at {means.mean():.4g} N while the displacement changes by {np.ptp(place):g} mm: "
             "check that tension_N is this wire's, and the wire's clamps"
@@ -168,11 +188,11 @@ def response(readings: Readings) -> str:
 def elongation(readings: Readings) -> str:
     """Displacements that do not follow the weights, or follow them the wrong way."""
     means, weights = readings.means, readings.setting
-    if np.ptp(weights) == 0:
+    if np.ptp(weights) == 0 and len(weights) > 1:
         return "all holds have the same tension_N: without another weight the stiffness cannot be known"
     if falls(weights, means):
         return "the displacement falls as the weight rises: check the sign of displacement_mm"
-    if np.ptp(means) <= FLAT * readings.noise:
+    if len(means) > 1 and np.ptp(means) <= FLAT * readings.noise:
         return (
             f"the displacement stays at {means.mean():.4g} mm while the weight changes by {np.ptp(weights):g} N: "
             "check that displacement_mm is this wire's, and the gauge"

@@ -41,6 +41,9 @@ def warnings(fit: Fit, sample: Sample) -> list[Notice]:
     prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
     readings = sample.readings[..., 0]
     of_readings = data_checks.warnings(sample.protocol, readings, sample.resolution)
+    if fit.problem.likelihood == "chain":
+        stated = {name for name in ("k1", "preload") if fit.problem.column(name, sample) in fit.problem.stated}
+        of_readings += data_checks.one_hold(sample.protocol, stated)
     first = sample is fit.problem.samples[0]
     columns = [name for name in fit.problem.names if _belongs(name, sample, shared=first)]
     return [*of_readings, *of_posterior(own, prior, sample), *leaning(fit.problem.prior, theta, columns)]

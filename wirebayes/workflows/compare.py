@@ -172,7 +172,10 @@ def plan(
         recorded = len(one.recorded_holds)
         one.first(recorded if train_holds is None else train_holds)  # complains where there are not so many
         if recorded < 3:
-            found = f"found {recorded} recorded holds, expected 3 or more"
+            holds = f"{recorded} recorded hold{'s' * (recorded != 1)}"
+            found = (
+                f"found {holds}, expected 3 or more: some are held out, and the others have to tell the models apart"
+            )
             raise InputError(f"{one.source}, experiment {one.name}: {found}")
         problem_of(base, one, [])  # checks the file's priors
         chosen = candidates(one, base, known, names or None)
