@@ -39,6 +39,9 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
         "b: nothing is missing (p = 0.4)",
     ]
     assert answer.next_step(found) == "a: Unload. b: Hold longer."
+    few = {"warnings": [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]}
+    two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"b": CLEAN | few}})
+    assert two.lines() == ["b: nothing stands out (p = 0.4)"]
 
 
 @pytest.mark.parametrize(
@@ -65,9 +68,9 @@ def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp
     alone = open_ | {"set": ["unknown"], "probabilities": {"toe": 0.04, "unknown": 0.96}}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": likely, "b": alone}})
     assert found.lines() == [
-        "a: something is missing that is not in the catalogue (p < 0.001)",
+        "a: something is missing that no effect in the catalogue explains (p < 0.001)",
         "  beside it most likely toe (89 %) or nothing known (8 %); none of these is established",
-        "b: something is missing that is not in the catalogue (p < 0.001)",
+        "b: something is missing that no effect in the catalogue explains (p < 0.001)",
     ]
 
 

@@ -19,6 +19,7 @@ from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import UNITS, Quantiles
 from wirebayes.sentences import (
+    counted,
     families_said,
     likely,
     listed,
@@ -31,7 +32,19 @@ from wirebayes.sentences import (
     unit_text,
 )
 
-_NAMED = {"nothing-missing": "nothing is missing", "unknown": "something is missing that is not in the catalogue"}
+_NAMED = {
+    "nothing-missing": "nothing is missing",
+    "unknown": "something is missing that no effect in the catalogue explains",
+}
+
+# with fewer than three holds, where no effect of the catalogue can be established or ruled out
+_FEW_HOLDS = {"nothing-missing": "nothing stands out", "unknown": "something is missing; so few holds do not say what"}
+
+
+def _verdict_in_words(report: ExperimentFindings) -> str | None:
+    """Of a verdict without names; None for the others."""
+    few = any(warning["kind"] == "few-holds" for warning in report.get("warnings", []))
+    return (_FEW_HOLDS if few else _NAMED).get(report["verdict"])
 
 
 def of_fit(summary: SummaryJson) -> list[str]:
@@ -56,7 +69,7 @@ def _effects(summary: SummaryJson) -> list[str]:
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Of one experiment that something may be missing in: what, how large, and what it is worth."""
     verdict, effects = report["verdict"], ", ".join(report["effects"])
-    finding = _NAMED.get(verdict, f"{verdict}: {effects}")
+    finding = _verdict_in_words(report) or f"{verdict}: {effects}"
     if verdict == "ambiguous":
         finding = f"ambiguous: {undecided(report) if families_said(report) else likely(report)}"
     if verdict == "partial":
@@ -84,7 +97,7 @@ def of_import(name: str, test: ImportedExperiment) -> list[str]:
     """Of a raw file: what was found in it and what was done."""
     sample = f"{test['length_mm']:g} mm of {test['material']}"
     return [
-        f"{name}: {test['holds']} holds, {test['readings']} readings, {sample}",
+        f"{name}: {counted(test['holds'], 'hold')}, {counted(test['readings'], 'reading')}, {sample}",
         *(f"  {note}" for note in test["notes"]),
     ]
 
@@ -124,7 +137,8 @@ _MOST_LINES = 10  # of outliers, on a terminal
 
 def of_check(name: str, test: CheckedExperiment) -> list[str]:
     """Of a test that is not fitted yet: its holds, and what it can determine."""
-    recorded = f"{test['recorded_holds']} holds, {test['readings']} readings in {test['duration_s'] / 60.0:.3g} min"
+    many = f"{counted(test['recorded_holds'], 'hold')}, {counted(test['readings'], 'reading')}"
+    recorded = f"{many} in {test['duration_s'] / 60.0:.3g} min"
     unit = unit_read(test, "resolution")
     step = read(test, "resolution")
     steps = f", written in steps of {step:g} {unit}" if step else ""
@@ -151,7 +165,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
         effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
         lines += _wrapped(words, [_size(e, found) for e, found in effects])
     count = len(test["warnings"])
-    lines.append(f"  {count} warning{'s' * (count > 1)}, on standard error" if count else "  nothing suspicious")
+    lines.append(f"  {counted(count, 'warning')}, on standard error" if count else "  nothing suspicious")
     return lines
 
 
@@ -280,8 +294,8 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     are = "are" if effects[1:] else "is"
     candidates = likely(report, lambda effect: effect.replace("_", " "))
     what = {
-        "nothing-missing": "nothing is missing: the plain model and its noise explain these readings",
-        "unknown": "something is missing that no effect in the catalogue explains"
+        "nothing-missing": f"{_verdict_in_words(report)}: the plain model and its noise explain these readings",
+        "unknown": f"{_verdict_in_words(report)}"
         + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
         "ambiguous": undecided(report, lambda effect: effect.replace("_", " ")),
         "named": f"{listed(effects)} {are} missing",
@@ -413,5 +427,5 @@ def calibration_in_a_sentence(found: CalibrateJson) -> str:
     sd = [1e3 * value for value in known["length_m"]["sd"]]
     return (
         f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {span(min(sd), max(sd), 2)} mm "
-        f"(standard errors), from {found['read']} of {found['holds']} holds."
+        f"(standard errors), from {found['read']} of {counted(found['holds'], 'hold')}."
     )

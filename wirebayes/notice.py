@@ -46,6 +46,7 @@ KINDS = {
     "gross-error": Kind("A single reading looks wrong, and was set aside where it would have decided.", True),
     "data": Kind("Readings are not what a bench gives: their order, units, signs or noise.", True),
     "prior": Kind("The prior decides the answer, or contradicts the readings.", True),
+    "few-holds": Kind("There are fewer than three holds: no effect can be established.", True),
     "extrapolation": Kind("The answer goes beyond the tensions, times or lengths that were tested.", False),
     "left-out": Kind("Something that is known of wire or robot has no place in the answer.", False),
     "geometry": Kind("What is asked does not fit the robot, as more wire than a drum holds.", False),

@@ -14,6 +14,11 @@ def listed(words: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
+def counted(count: int, what: str) -> str:
+    """How many there are of something, in words: 1 hold, 2 holds."""
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def likely(found: Answer, spoken: Callable[[str], str] = str) -> str:
     """Names of the set among which the largest share lies, each with its probability; empty where there is no name.
 

@@ -60,6 +60,8 @@ def test_plans_hold_the_displacements_that_were_read_for_the_longest_series() ->
     assert unload.times_s.tolist() == TIMES.tolist()
     one = PROTOCOL.__class__(1500.0, np.array([2.0]), TIMES[None], np.ones((1, 3), bool), np.array([40.0]), np.ones(1))
     assert alternatives(one, True)[0].setting.tolist() == [2.0, 2.0]
+    assert alternatives(one, True)[3].setting.tolist() == [0.5, 1.0, 1.5, 2.0]
+    assert alternatives(one, True)[3].words == "go to 2 mm in four steps, each held 40 s"
 
 
 def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
@@ -85,6 +87,8 @@ def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
         (np.inf, True, "at present they do not"),
         (1.05, False, "reveal a smaller"),
         (2.04, False, "Its signature would be 2.0 times as large as now"),
+        (1100.0, False, "To detect toe, which this test does not show: load it twice."),
+        (np.inf, False, "To detect toe, which this test does not show: load it twice."),
     ],
 )
 def test_a_measurement_is_proposed_where_it_tells_more(
@@ -98,6 +102,7 @@ def test_a_measurement_is_proposed_where_it_tells_more(
     assert ("toe from superposition" in found) == pair
     remainder = module.next_for_remainder(None)  # type: ignore[arg-type]
     assert ("load it twice" in remainder) == (ratio >= 1.1)
+    assert ("times as much" in remainder) == (1.1 <= ratio < 1000.0)
 
 
 def test_without_a_candidate_nothing_is_to_be_distinguished() -> None:

@@ -46,6 +46,16 @@ def test_nothing_is_missing_from_clean_data(tmp_path: Path) -> None:
     assert any(line.startswith("lost_motion") for line in found["not_identifiable"])
 
 
+@pytest.mark.parametrize("holds", [2, 3])
+def test_fewer_than_three_holds_establish_nothing_and_say_so(tmp_path: Path, holds: int) -> None:
+    (test,) = made(tmp_path, [Bench(resolution_N=0.01)], {}, [])
+    found = discover([test.first(holds)], simulations=19)["experiments"][test.name]
+    few = [w["text"] for w in found["warnings"] if w["kind"] == "few-holds"]
+    assert found["held_out"]["holds"] == ([] if holds == 2 else [3])
+    assert found["effects"] == [] and found["verdict"] in ("nothing-missing", "unknown")
+    assert [text.split(":")[0] for text in few] == (["2 holds"] if holds == 2 else [])
+
+
 @pytest.mark.statistical
 def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
     """p-values of clean data are uniform: of 24, more than five below 0.08 has a chance of one in 300."""

@@ -237,6 +237,7 @@ def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_p
     assert "grows without end" in words and "stiffness there, N per unit strain" in words
 
 
+FEW = [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]
 DISCOVERY = {
     "warnings": [],
     "verdict": "named",
@@ -282,6 +283,10 @@ DISCOVERY = {
         (
             {"verdict": "unknown", "effects": [], "probabilities": {"unknown": 0.2, "strain_stiffening": 0.8}},
             "explains; beside it most likely strain stiffening (80 %), none of them established",
+        ),
+        (
+            {"verdict": "unknown", "effects": [], "probabilities": {}, "warnings": FEW},
+            "wire-a: something is missing; so few holds do not say what",
         ),
         ({"verdict": "partial"}, "strain stiffening is missing, and something else that no effect"),
         ({"verdict": "partial", "effects": ["toe", "ageing"]}, "toe and ageing are missing, and something else"),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from wirebayes.discovery.settings import LEAST_HOLDS
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
@@ -61,7 +62,7 @@ class HeldOut:
 def last_third(experiment: Experiment) -> int:
     """Number of recorded holds to train on when the last third is held out (0: too few holds to hold any out)."""
     holds = len(experiment.recorded_holds)
-    return holds - max(1, round(holds / 3)) if holds >= 4 else 0
+    return holds - round(holds / 3) if holds >= LEAST_HOLDS else 0
 
 
 def predicted(

@@ -16,6 +16,7 @@ from wirebayes.wire.control import SET_UNIT
 from wirebayes.wire.protocol import Control, Protocol
 
 _WORTH = 1.1  # times as far apart as now, for a measurement to be proposed
+_RATIO_LIMIT = 1e3  # times: beyond, what it is compared with is nothing, or rounding
 _TRIED = "unloading, longer holds, finer steps, another length"
 
 
@@ -65,10 +66,15 @@ def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[Measu
     times = _longest_series(p)
     long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
     log_times = np.concatenate([[0.0], np.geomspace(long / 300.0, long, 24)])
-    span = f"{one * x.min():g} to {one * x.max():g} {unit}" if alone else f"each sample's {settings}"
+    ends = list(dict.fromkeys(f"{one * end:g}" for end in (x.min(), x.max())))
+    span = f"{' to '.join(ends)} {unit}" if alone else f"each sample's {settings}"
     dense = f"{second * long:g} s with 25 readings spaced evenly in the logarithm of time"
     there_and_back = np.concatenate([x, down])
     halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
+    finer = f"take twice as many, half as large steps over {span}"
+    if len(x) == 1:  # nothing between holds to halve: the way to the only one
+        halved = x * np.linspace(0.25, 1.0, 4)
+        finer = f"go to {span} in four steps, each held {second * times[-1]:g} s"
     last = f" from {one * x.max():g} to {one * x.min():g} {unit}" if alone else ", of every sample"
     back = f"the same {settings} back{last}, each held {second * times[-1]:g} s"
     return [
@@ -77,7 +83,7 @@ def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[Measu
             (f"unload the wire after the last hold: {back}", there_and_back, times),
             (f"hold each of the {settings} {span} for {dense}", x, log_times),
             (f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
-            (f"take twice as many, half as large steps over {span}", halved, times),
+            (finer, halved, times),
         )
     ]
 
@@ -143,10 +149,12 @@ def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakes
     if ratio < _WORTH:
         aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"
         return f"None of the tests considered ({_TRIED}) would {aim} independently."
+    known = ratio < _RATIO_LIMIT
     if pair:
-        known = np.isfinite(ratio) and ratio < 1e3
         gain = f" {ratio:.1f} times as much as now" if known else "; at present they do not"
         return f"To distinguish {names}: {words}. Their signatures would then differ{gain}."
+    if not known:
+        return f"To detect {names}, which this test does not show: {words}."
     return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
 
 
@@ -155,7 +163,8 @@ def next_for_remainder(block: LaplaceFit) -> str:
     words, ratio = _best_plan(block, lambda target: _remainder_seen(target, block))
     if ratio < _WORTH:
         return f"None of the tests considered ({_TRIED}) would show more of what remains; repeat this one."
-    return f"To learn more of what remains: {words}. It would stand out {ratio:.1f} times as much as now."
+    gain = f" It would stand out {ratio:.1f} times as much as now." if ratio < _RATIO_LIMIT else ""
+    return f"To learn more of what remains: {words}.{gain}"
 
 
 def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tuple[str, float]:

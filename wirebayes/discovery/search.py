@@ -22,7 +22,7 @@ from wirebayes.discovery.linear_scan import Expansion
 from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.name_evidence import NameEvidence, reaches, weigh_names
 from wirebayes.discovery.screening import GlobalTest
-from wirebayes.discovery.settings import ALPHA, REMAINS, Settings
+from wirebayes.discovery.settings import ALPHA, LEAST_HOLDS, REMAINS, Settings
 from wirebayes.discovery.stepwise import Accepted, Explored, Fits, explore
 from wirebayes.discovery.verdict import (
     Alternative,
@@ -52,7 +52,8 @@ from wirebayes.json_files.discovery import (
 )
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.scales import scales_of
-from wirebayes.notice import named, to_json
+from wirebayes.notice import Notice, named, to_json
+from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.workers import ParallelMap
@@ -249,10 +250,22 @@ def _own_reports(
             "held_out": check.held_out,
             "residual_rms_N": shrinking.left_over(block, e.name),
             "gross_errors": struck,
-            "warnings": to_json(map(gross_errors.in_words, struck)),
+            "warnings": to_json([*map(gross_errors.in_words, struck), *_few_holds(e)]),
         }
         reports[e.name] = in_unit(own, READ_UNIT[e.control])
     return reports
+
+
+def _few_holds(e: Experiment) -> list[Notice]:
+    """What a test of few holds leaves open: nothing is left out, so nothing shows whether an effect predicts."""
+    holds = len(e.recorded_holds)
+    if holds >= LEAST_HOLDS:
+        return []
+    text = (
+        f"{counted(holds, 'hold')}: no effect can be established, and no hold is held out to be predicted; both need "
+        f"{LEAST_HOLDS} recorded holds"
+    )
+    return [Notice("few-holds", text)]
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ P_SLOPE = 0.8  # below it the odds grow as p to the power -0.8, the density of p
 
 # What may be called established.
 KEEP_ELPD = 4.0  # gain of leaving out one hold at a time that an effect must bring
-LEAST_HOLDS = 3  # of a test, below which leaving one out says nothing
+LEAST_HOLDS = 3  # of a test, below which leaving one out, or predicting the last from the others, says nothing
 INCLUSION = 0.9  # probability that one of a family is missing
 REMAINS = 0.5  # probability of a remainder from which the verdict says so
 IN_FAMILY = 0.9  # of a family's probability, that one of its members must have to be its name

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.io.readings import LARGEST, SET, STRETCH, Hold, Table, frozen, readings_of, readings_table, shown
 from wirebayes.io.toml_keys import Keys, read_toml
+from wirebayes.sentences import counted
 from wirebayes.units import nearest
 from wirebayes.user_files import read_text
 from wirebayes.wire.protocol import Control, Protocol
@@ -79,8 +80,8 @@ class Experiment:
     def __repr__(self) -> str:
         holds, readings = len(self.recorded_holds), sum(hold.time_s.size for hold in self.recorded_holds)
         set_ = "" if self.control == "displacement" else ", tensions set"
-        what = f"{self.length_mm:g} mm of {self.material}, {holds} holds, {readings} readings{set_}"
-        return f"Experiment({self.name}: {what})"
+        many = f"{counted(holds, 'hold')}, {counted(readings, 'reading')}"
+        return f"Experiment({self.name}: {self.length_mm:g} mm of {self.material}, {many}{set_})"
 
     @property
     def resolution_N(self) -> float:
@@ -172,8 +173,8 @@ class Experiment:
         trained = self.train(holds)
         if not enough(trained.recorded_holds):
             raise InputError(
-                f"{self.source}, experiment {self.name}: found {counted(trained.recorded_holds)} in the first {holds} "
-                f"of {len(self.recorded_holds)} recorded holds, expected {ENOUGH}"
+                f"{self.source}, experiment {self.name}: found {holds_and_readings(trained.recorded_holds)} in the "
+                f"first {holds} of {counted(len(self.recorded_holds), 'recorded hold')}, expected {ENOUGH}"
             )
         return trained
 
@@ -199,11 +200,10 @@ def enough(holds: Sequence[Hold]) -> bool:
     return sum(hold.time_s.size for hold in holds) >= LEAST_READINGS
 
 
-def counted(holds: Sequence[Hold]) -> str:
+def holds_and_readings(holds: Sequence[Hold]) -> str:
     """How many holds and readings there are, in words."""
     recorded = [hold.time_s.size for hold in holds if hold.recorded]
-    many = [f"{n} {word}{'s' * (n != 1)}" for n, word in ((len(recorded), "hold"), (sum(recorded), "reading"))]
-    return " with ".join(many)
+    return f"{counted(len(recorded), 'hold')} with {counted(sum(recorded), 'reading')}"
 
 
 def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | None = None) -> Protocol:
@@ -358,7 +358,7 @@ def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
     table = readings()
     recorded = readings_of(table, length, control)
     if not enough(recorded):
-        raise keys.complain("readings", f"{counted(recorded)} in {table.path.name}", ENOUGH)
+        raise keys.complain("readings", f"{holds_and_readings(recorded)} in {table.path.name}", ENOUGH)
     holds = _with_unrecorded(keys, recorded, length, control)
     return Experiment(
         name, material, length, resolution, holds, keys.source, priors, control=control, preload_mm=preload

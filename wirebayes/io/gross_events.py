@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold, frozen
-from wirebayes.sentences import listed
+from wirebayes.sentences import counted, listed
 from wirebayes.typing import Floats
 from wirebayes.wire.protocol import Protocol
 
@@ -221,7 +221,7 @@ def _fall(test: _Test, begin: int, end: int) -> Event:
         return Event("break", text, np.arange(begin, end))
     if read[end] >= STAYED * read[begin - 1]:
         count = end - begin
-        times = f"{count} reading{'s' * (count != 1)}"
+        times = counted(count, "reading")
         text = f"tension falls to 0 in {place} for {times} and comes back: did the sensor drop out? leave them out"
         return Event("dropout", text, np.arange(begin, end))
     text = (

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.sentences import counted
 from wirebayes.units import nearest
 from wirebayes.user_files import read_text
 from wirebayes.wire.protocol import Control
@@ -181,7 +182,7 @@ def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) ->
     for number, line in enumerate(lines[1:], start=2):
         fields = [field.strip() for field in line.split(",")]
         if len(fields) != len(header):
-            found = f"{len(fields)} field{'s' * (len(fields) != 1)}" if line.strip() else "a blank line"
+            found = counted(len(fields), "field") if line.strip() else "a blank line"
             column = min(len(fields), len(header))
             expected = f"{len(header)} fields ({','.join(header)})"
             raise InputError(f"{path}, line {number}, column {column}: found {found}, expected {expected}")

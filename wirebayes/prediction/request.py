@@ -13,6 +13,7 @@ from wirebayes.io.experiment import protocol_of
 from wirebayes.io.readings import READ, SET, Hold, Table, protocol_holds, protocol_table, shown
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.store import Stored
+from wirebayes.sentences import counted
 from wirebayes.typing import Floats
 from wirebayes.wire.effect import EventEffect
 from wirebayes.wire.protocol import Protocol
@@ -201,7 +202,7 @@ class _File:
                 times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
             for k in range(max(len(times), len(hold.time_s))):
                 if k >= len(hold.time_s):
-                    found = f"{k} reading{'s' * (k != 1)} of hold {number}"
+                    found = f"{counted(k, 'reading')} of hold {number}"
                     raise self.complain(i, k - 1, "time_s", found, f"{len(times)}, as it was trained on")
                 if k >= len(times) or hold.time_s[k] != times[k]:
                     listed = ", ".join(f"{t:g}" for t in times)

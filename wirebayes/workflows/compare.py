@@ -17,6 +17,7 @@ from wirebayes.io.run_folder import open_run, read_json, stored_results, write_j
 from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.problem import Likelihood
 from wirebayes.notice import Notice, named
+from wirebayes.sentences import counted
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.workers import computing
 from wirebayes.workflows.options import (
@@ -172,10 +173,8 @@ def plan(
         recorded = len(one.recorded_holds)
         one.first(recorded if train_holds is None else train_holds)  # complains where there are not so many
         if recorded < 3:
-            holds = f"{recorded} recorded hold{'s' * (recorded != 1)}"
-            found = (
-                f"found {holds}, expected 3 or more: some are held out, and the others have to tell the models apart"
-            )
+            holds = counted(recorded, "recorded hold")
+            found = f"found {holds}, expected 3 or more: some are held out, and the others tell the models apart"
             raise InputError(f"{one.source}, experiment {one.name}: {found}")
         problem_of(base, one, [])  # checks the file's priors
         chosen = candidates(one, base, known, names or None)

@@ -9,7 +9,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io import gross_events
-from wirebayes.io.experiment import ENOUGH, Experiment, counted, enough, read_experiments, select
+from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, read_experiments, select
 from wirebayes.units import nearest
 
 PathLike = str | os.PathLike[str]
@@ -70,7 +70,7 @@ def without_breaks(experiment: Experiment) -> Experiment:
     """
     kept = gross_events.without(experiment, gross_events.of_experiment(experiment))
     if not enough(kept.holds):
-        found = f"{counted(kept.holds)} beside breaks, limits and dropouts"
+        found = f"{holds_and_readings(kept.holds)} beside breaks, limits and dropouts"
         raise InputError(f"{experiment.source}, experiment {experiment.name}: found {found}, expected {ENOUGH}")
     return kept
 

@@ -32,7 +32,7 @@ from wirebayes.notice import Notice, Warned, from_json
 from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics.draws import specimens_in_words
-from wirebayes.sentences import unit_text
+from wirebayes.sentences import counted, unit_text
 from wirebayes.typing import Floats
 from wirebayes.workflows.options import PathLike
 
@@ -734,7 +734,10 @@ class ImportedTests(Result[ImportJson]):
 
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [f"{name}: {each['holds']} holds, {each['readings']} readings" for name, each in found.items()]
+        return [
+            f"{name}: {counted(each['holds'], 'hold')}, {counted(each['readings'], 'reading')}"
+            for name, each in found.items()
+        ]
 
     def _repr_html_(self) -> str:
         rows = [[name, note] for name, each in self.summary()["experiments"].items() for note in each["notes"]]
@@ -759,7 +762,10 @@ class Check(Result[CheckJson]):
 
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [f"{name}: {test['recorded_holds']} holds, {test['readings']} readings" for name, test in found.items()]
+        return [
+            f"{name}: {counted(test['recorded_holds'], 'hold')}, {counted(test['readings'], 'reading')}"
+            for name, test in found.items()
+        ]
 
     def _repr_html_(self) -> str:
         rows = [

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
+from wirebayes.sentences import counted
 from wirebayes.typing import Floats
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
@@ -46,7 +47,7 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
     moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
     rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
     noise = noise_of(x, readings.step)
-    holds = f"{len(rows)} hold{'s' * (len(rows) != 1)}"
+    holds = counted(len(rows), "hold")
     notes = [
         *resets,
         f"a continuous recording of {len(x)} readings: {holds} where the {readings.role} stays within "
@@ -92,7 +93,7 @@ def _too_few(readings: Readings, found_holds: Sequence[Plateau], kept: int) -> I
             expected += "; if those are a hold, number the holds in a column, without the readings of the move"
             return readings.complain(row, role, found, expected)
     share = f"{100.0 * kept / rows:.0f} % of the readings"
-    found = f"a {role} that stays in {share}, {len(found_holds)} time{'s' * (len(found_holds) != 1)}"
+    found = f"a {role} that stays in {share}, {counted(len(found_holds), 'time')}"
     row = found_holds[0].end if found_holds and found_holds[0].end < rows else 0
     return readings.complain(row, role, found, f"{expected} (or a column of hold numbers)")
 

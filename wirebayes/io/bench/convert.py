@@ -31,7 +31,7 @@ from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment, experiment_of
 from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
 from wirebayes.io.toml_keys import Keys
-from wirebayes.sentences import listed
+from wirebayes.sentences import counted, listed
 from wirebayes.typing import Floats
 from wirebayes.wire.protocol import Control
 
@@ -141,7 +141,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     control = choices.control or _control(recorded)
     holds = cut(recorded.readings(control), choices.time_since)
     holds, thin = _thin(holds)
-    notes += _what_was_set(control) + numbering + holds.notes + thin + _missing_holds(holds) + _one_hold(holds)
+    notes += _what_was_set(control) + numbering + holds.notes + thin + _missing_holds(holds)
     resolution = _resolution(columns[READS[control]], texts[READS[control]])
     if resolution:
         read, unit = READS[control], UNITS[READS[control]]
@@ -227,15 +227,6 @@ def _what_was_set(control: Control) -> list[str]:
     return ["a test under weights or force control: tensions stay within holds while displacements drift"]
 
 
-def _one_hold(holds: Cut) -> list[str]:
-    if len(holds.rows) > 1:
-        return []
-    return [
-        "one hold: its readings do not tell the stiffness from the stretch at displacement zero; if that is known, say "
-        "preload_mm in the TOML file (0 where displacements count from the zero-tension length)"
-    ]
-
-
 def _rows(holds: Cut, values: Mapping[Any, Floats], control: Control) -> tuple[list[list[Any]], list[int]]:
     """Rows of the readings' CSV, and the row of the table that each comes from.
 
@@ -298,7 +289,7 @@ def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, l
     below = len(table.rows) - len(rows)
     rows = [row for row in rows if any(row.cell(i) for i in indices)]
     if below:
-        notes.append(f"{below} line{'s' * (below != 1)} under the readings left out")
+        notes.append(f"{counted(below, 'line')} under the readings left out")
     filled = []
     last = dict.fromkeys(indices, "")
     for row in rows:

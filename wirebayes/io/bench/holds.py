@@ -30,7 +30,7 @@ from wirebayes.io.bench.recorded import (
 from wirebayes.io.bench.resets import joined
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
-from wirebayes.sentences import listed
+from wirebayes.sentences import counted, listed
 from wirebayes.typing import Floats
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
@@ -155,7 +155,7 @@ def _ingroups_between(
         notes.append(_scatter(readings, groups))
     number = [int(readings.hold[rows[0]]) if readings.hold is not None else i + 1 for i, rows in enumerate(groups)]
     if readings.hold is None:
-        count = f"{len(groups)} hold{'s' * (len(groups) != 1)}"
+        count = counted(len(groups), "hold")
         notes.append(f"{count}: a new one wherever the {readings.role} changes or the time starts again")
     return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s)
 

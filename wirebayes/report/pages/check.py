@@ -25,6 +25,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning, spoken
+from wirebayes.sentences import counted
 
 _FILES = (
     ("import.json", "what was decided, as JSON"),
@@ -56,7 +57,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
 def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
     about = [
         f"From {e['raw']}.",
-        f"{e['holds']} holds, {e['readings']} readings.",
+        f"{counted(e['holds'], 'hold')}, {counted(e['readings'], 'reading')}.",
         f"Length {number(e['length_mm'])} mm.",
     ]
     notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
@@ -67,7 +68,8 @@ def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
 def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
     about = [
         f"{e['material']}, {number(e['length_mm'])} mm.",
-        f"{e['recorded_holds']} recorded holds, {e['unrecorded_holds']} unrecorded, {e['readings']} readings.",
+        f"{counted(e['recorded_holds'], 'recorded hold')}, {e['unrecorded_holds']} unrecorded, "
+        f"{counted(e['readings'], 'reading')}.",
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
     hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]

@@ -196,6 +196,8 @@ def _held_out(v: ExperimentFindings) -> str:
     held = v.get("held_out") or {}
     if not held.get("plain") or not held.get("final"):
         return ""
+    if not held["holds"]:
+        return "No hold was held out: that needs three recorded holds of every test."
     plain, final = (number(read(held[model], "rmse"), 2) for model in ("plain", "final"))
     holds = listed([str(h) for h in held["holds"]])
     text = f"On the unused holds {holds} the rms error goes from {plain} to {final} {unit_read(held['plain'])}"

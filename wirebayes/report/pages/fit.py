@@ -33,7 +33,7 @@ from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.curve import through_the_readings
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.store import Stored, load_with_priors, unit_of
-from wirebayes.sentences import listed
+from wirebayes.sentences import counted, listed
 from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
@@ -198,7 +198,8 @@ def _measured(stored: Stored) -> Points:
     unrecorded = len(protocol.recorded) - holds
     points = [
         f"{stored.sample.material}, {protocol.length_mm:g} mm.",
-        f"{holds} holds{f' and {unrecorded} not recorded' if unrecorded else ''}, {len(read)} readings.",
+        f"{counted(holds, 'hold')}{f' and {unrecorded} not recorded' if unrecorded else ''}, "
+        f"{counted(len(read), 'reading')}.",
         f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
     ]

@@ -28,6 +28,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
+from wirebayes.sentences import counted
 
 _AIMS = {
     "parameters": "how much they say about the material",
@@ -119,8 +120,8 @@ def _ranking(found: PlanJson) -> Table:
 def _protocol(row: JudgedProtocol) -> list[Block]:
     blocks: list[Block] = [
         Text(
-            f"{row['holds']} holds with {row['readings']} readings, {number(row['duration_min'])} min"
-            + (f": {row['words']}." if row["words"] else ".")
+            f"{counted(row['holds'], 'hold')} with {counted(row['readings'], 'reading')}, "
+            f"{number(row['duration_min'])} min" + (f": {row['words']}." if row["words"] else ".")
         )
     ]
     quantities = row["parameters"] | {
