@@ -44,7 +44,8 @@ def explored(
     monkeypatch.setattr(stepwise, "_fit", fit)
     known = {name: np.array([value]) for name, value in (credits or {}).items()}
     monkeypatch.setattr(stepwise, "_credits", lambda expansions, trials: known)
-    monkeypatch.setattr(stepwise, "_scanned", lambda block, trials: SimpleNamespace(flexible=np.array([smooth])))
+    monkeypatch.setattr(stepwise, "reference_of", lambda block: None)
+    monkeypatch.setattr(stepwise, "remainder_evidence", lambda block, reference: smooth)
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
     found = stepwise.explore(
         [None], evidence(singles), [], [], families, settings, np.random.default_rng(0), map  # type: ignore[list-item]
@@ -231,13 +232,14 @@ class Fits:
         monkeypatch.setattr(stepwise, "fitted", fitted)
         monkeypatch.setattr(stepwise, "informed", informed)
         monkeypatch.setattr(stepwise, "weigh_names", weighed)
-        seen = lambda block, trials: SimpleNamespace(flexible=np.array([remainders[block.target]]))  # noqa: E731
-        monkeypatch.setattr(stepwise, "_scanned", seen)
+        monkeypatch.setattr(stepwise, "remainder_evidence", lambda block, reference: remainders[block.target])
+        monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: None)
+        monkeypatch.setattr(stepwise, "scan", lambda x: None)
         monkeypatch.setattr(stepwise.screening, "candidate_probes", lambda blocks, kinds: (["probe"], ["candidate"]))
         monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
 
     def fit(self) -> stepwise.FittedSet:
-        return stepwise._fit(self.parent, "b", self.settings, np.random.default_rng(0))
+        return stepwise._fit(self.parent, "b", [[], []], self.settings, np.random.default_rng(0))
 
 
 def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 
 from wirebayes.discovery import smooth_reference
 from wirebayes.discovery.linear_scan import expand, scan
-from wirebayes.discovery.stepwise import _scanned
+from wirebayes.discovery.remainder_evidence import reference_of, remainder_evidence
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment import read_experiments
@@ -99,5 +99,6 @@ def disturbed(folder: Path, size_N: float) -> LaplaceFit:
 def test_a_local_deviation_is_a_remainder_that_one_global_process_does_not_see(tmp_path: Path) -> None:
     block = disturbed(tmp_path / "off", 0.12)
     alone = scan(expand(block.target, block.modes.z[:1], [])).flexible[0]
-    assert alone < 1.0 < 8.0 < _scanned(block, []).flexible[0]
-    assert _scanned(disturbed(tmp_path / "clean", 0.0), []).flexible[0] < 0.0
+    assert alone < 1.0 < 8.0 < remainder_evidence(block, reference_of(block))
+    clean = disturbed(tmp_path / "clean", 0.0)
+    assert remainder_evidence(clean, reference_of(clean)) < 0.0

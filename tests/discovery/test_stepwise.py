@@ -8,6 +8,7 @@ from wirebayes.discovery import screening, stepwise
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet
 from wirebayes.discovery.name_evidence import reaches, weigh_names
+from wirebayes.discovery.remainder_evidence import reference_of
 from wirebayes.discovery.settings import Settings
 from wirebayes.discovery.smooth_credit import beside_smooth
 from wirebayes.effects import CATALOGUE, named
@@ -37,10 +38,11 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
     trials, candidates = screening.candidate_probes(plain, settings.kinds)
     data = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]
     found = weigh_names(plain, trials, candidates, data, reach=reaches(plain, trials, candidates))
+    references = [reference_of(block) for block in plain]
     root = stepwise.FittedSet(EffectSet((), 0.0, {}, None), plain, (), found, ([], []))
     values = []
     for one, other in ((first, second), (second, first)):
-        added = stepwise._fit(root, one, settings, np.random.default_rng(1))
+        added = stepwise._fit(root, one, references, settings, np.random.default_rng(1))
         blocks, (probes, further) = added.blocks, added.probed
         scans = [scan(expand(b.target, b.modes.z[:1], probes)) for b in blocks]
         beside = weigh_names(blocks, probes, further, scans, reach=found.reach)

@@ -468,16 +468,16 @@ class _Projected:
         Of the residual with itself, the prior's square included.
     along, square : (n, k, m)
         Of each signature with the residual and with itself; infinite where the parameters take all of a signature.
-    smooth_along, smooth_square : (n, k, q) and (n, k, q, q)
-        Of the smooth functions with the residual and with each other.
+    smooth_along, smooth_square : (n, k, q) and (n, k, q, q) for each process
+        Of its smooth functions with the residual and with each other.
     """
 
     shared: Array
     rss: Array
     along: Array
     square: Array
-    smooth_along: Array
-    smooth_square: Array
+    smooth_along: list[Array]
+    smooth_square: list[Array]
 
 
 def _project(x: Expansion) -> _Projected:
@@ -511,18 +511,34 @@ def _project(x: Expansion) -> _Projected:
     mr = whitened((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
     mm = whitened(square, levels_m, levels_m)
     c = mm - np.einsum("nkpm,nkpm->nkm", signatures, signatures)
-    ff = (np.swapaxes(x.flexible, 1, 2) @ x.flexible)[:, None] - np.swapaxes(flexible, 2, 3) @ flexible
-    ff -= (np.swapaxes(levels_f, 1, 2)[:, None] * shrink[:, :, None]) @ levels_f[:, None]
     fr = whitened((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
+    each = _slices(x.processes)
+    ff = [_within(x.flexible[..., own], flexible[..., own], levels_f[..., own], shrink) for own in each]
     shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
     return _Projected(
         shared=np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf),
         rss=rr - (residual**2).sum(axis=2) + x.prior_square[:, None],
         along=mr - (residual[:, :, None] @ signatures)[:, :, 0],
         square=np.where(c > ABSORBED * square[:, None], c, np.inf),
-        smooth_along=fr,
+        smooth_along=[fr[..., own] for own in each],
         smooth_square=ff,
     )
+
+
+def _slices(processes: Sequence[int]) -> list[slice]:
+    """Where the functions of each process stand."""
+    ends = np.cumsum(processes)
+    return [slice(last - count, last) for last, count in zip(ends, processes, strict=True)]
+
+
+def _within(functions: Array, taken: Array, levels: Array, shrink: Array) -> Array:
+    """(n, k, q, q) products of one process's functions (n, N, q) with each other, as `_project` has them.
+
+    `taken` (n, k, p, q) is the parameters' part of them, `levels` (n, H, q) the setting errors'.
+    """
+    plain = (np.swapaxes(functions, 1, 2) @ functions)[:, None]
+    whole_holds = (np.swapaxes(levels, 1, 2)[:, None] * shrink[:, :, None]) @ levels[:, None]
+    return np.asarray(plain - np.swapaxes(taken, 2, 3) @ taken - whole_holds)
 
 
 def _scan_few(x: Expansion) -> Scan:
@@ -530,19 +546,12 @@ def _scan_few(x: Expansion) -> Scan:
     found, degrees, least = _project(x), x.degrees, x.least[:, None]
     shared, rss, b, c = found.shared, found.rss, found.along, found.square
     positive = np.where(x.one_sided, np.maximum(b, 0.0), b)
-    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
     left = np.maximum(rss[..., None] - positive**2 / c, least[..., None])
     effects = shared[..., None] - 0.5 * degrees * np.log(left)
-    loose, ends = [], np.cumsum(x.processes)
-    for own in (slice(last - count, last) for last, count in zip(ends, x.processes, strict=True)):
-        log_volume, less = _taken_by(found.smooth_square[..., own, own], found.smooth_along[..., own])
-        # The process is measured in units of the noise that is left beside it.
-        left_beside = np.maximum(rss[..., None] - less, least[..., None])
-        loose.append(shared[..., None] - log_volume - 0.5 * degrees * np.log(left_beside))
+    plain, every = _without_and_with(x, found)
     reference = log_sum(plain, axis=1)
     seen = np.isfinite(reference)
     reference = np.where(seen, reference, 0.0)
-    every = np.concatenate(loose, axis=2)
     flexible_value = log_sum(every.reshape(len(every), -1), axis=1) - np.log(every.shape[2]) - reference
     best = np.argmax(effects, axis=1)[:, None]
     amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
@@ -555,6 +564,27 @@ def _scan_few(x: Expansion) -> Scan:
         norm,
         Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, x.least, x.one_sided),
     )
+
+
+def evidences(x: Expansion) -> tuple[Array, Array]:
+    """(n, k) and (n, k, s) log evidence at each ratio, without a remainder and with one of each process and size.
+
+    Parameters and the scale of the noise are integrated out; the prior has its top at one.
+    """
+    x = _without_tangent(x)
+    return _without_and_with(x, _project(x))
+
+
+def _without_and_with(x: Expansion, found: _Projected) -> tuple[Array, Array]:
+    shared, rss, degrees, least = found.shared, found.rss, x.degrees, x.least[:, None]
+    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
+    loose = []
+    for square, along in zip(found.smooth_square, found.smooth_along, strict=True):
+        log_volume, less = _taken_by(square, along)
+        # The process is measured in units of the noise that is left beside it.
+        left_beside = np.maximum(rss[..., None] - less, least[..., None])
+        loose.append(shared[..., None] - log_volume - 0.5 * degrees * np.log(left_beside))
+    return plain, np.concatenate(loose, axis=2)
 
 
 def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:

@@ -13,12 +13,13 @@ from itertools import repeat
 
 import numpy as np
 
-from wirebayes.discovery import screening, smooth_reference
+from wirebayes.discovery import screening
 from wirebayes.discovery.families import Family
-from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, scan
+from wirebayes.discovery.linear_scan import Expansion, Probe, expand, scan
 from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
 from wirebayes.discovery.refit import Refit, occam
+from wirebayes.discovery.remainder_evidence import Reference, reference_of, remainder_evidence
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import (
     FIRST_LOOK,
@@ -280,7 +281,8 @@ def explore(
     parallel_map : function
         The built-in `map`, or one over processes; the sets are the same.
     """
-    smooth = np.array([float(_scanned(block, []).flexible[0]) for block in plain])
+    references = [reference_of(block) for block in plain]
+    smooth = np.array([remainder_evidence(b, r) for b, r in zip(plain, references, strict=True)])
     root = EffectSet((), 0.0, {}, smooth)
     frontier = _Frontier(len(settings.kinds), families)
     credits = _credits(expansions, trials)
@@ -295,7 +297,7 @@ def explore(
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]
         names = [frontier.parents[k][1] for k in wave]
-        fitted_sets = parallel_map(_fit, parents, names, repeat(settings), rng.spawn(len(wave)))
+        fitted_sets = parallel_map(_fit, parents, names, repeat(references), repeat(settings), rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
             known = frontier.known[key]
             beside = float(np.maximum(new.effects.remainder, 0.0).sum())
@@ -357,12 +359,14 @@ def added(
     return blocks, effects
 
 
-def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator) -> FittedSet:
+def _fit(
+    parent: FittedSet, name: str, references: Sequence[Reference], settings: Settings, rng: np.random.Generator
+) -> FittedSet:
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
     assert parent.further is not None
     blocks, effects = added(parent, name, settings, rng)
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
-    scans = [_scanned(block, trials) for block in blocks]
+    scans = [scan(expand(block.target, block.modes.z[:1], trials)) for block in blocks]
     further = None
     if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
         further = weigh_names(
@@ -370,15 +374,9 @@ def _fit(parent: FittedSet, name: str, settings: Settings, rng: np.random.Genera
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
             further = None
-    remainder = np.array([float(s.flexible[0]) for s in scans])
+    remainder = np.array([remainder_evidence(b, r) for b, r in zip(blocks, references, strict=True)])
     accepted = (*parent.accepted, Accepted(name, tuple(effects), effects))
     return FittedSet(
         EffectSet((*parent.effects.names, name), 0.0, {}, remainder), blocks, accepted, further,
         (trials, candidates),
     )  # fmt: skip
-
-
-def _scanned(block: LaplaceFit, trials: Sequence[Probe]) -> Scan:
-    """What further effects, and something smooth but unknown, local or global, would explain beside a block's."""
-    family = [smooth_reference.family(sample.protocol) for sample in block.target.problem.samples]
-    return scan(expand(block.target, block.modes.z[:1], trials, reference=family))

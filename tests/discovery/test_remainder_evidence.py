@@ -1,0 +1,93 @@
+"""A remainder's evidence, the parameters refitted beside it, against an integral over them by importance sampling."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import logsumexp
+
+from analyses.hidden_effects.cases import Spec, seal
+from tests.simulated import simulated_tests
+from wirebayes.discovery.linear_scan import RATIOS, SIZES, expand, moving_columns, residuals, scan
+from wirebayes.discovery.remainder_evidence import Reference, _refitted, reference_of, remainder_evidence
+from wirebayes.effects import named
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.io.experiment import read_experiments
+from wirebayes.simulation.synthetic import Bench, Truth
+
+WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
+DRAWS = 10_000
+
+
+def integral(fit: LaplaceFit, centre: np.ndarray, reference: Reference | None) -> float:
+    """Log of the integral over parameters and the noise's scale, summed over noise ratios, a mean over remainders.
+
+    A remainder is so large that its part which the parameters leave has the length δ, for each of `SIZES`. Readings are
+    measured in the errors of the fit. Where draws come from does not matter to what they say, only to how many count.
+    """
+    columns = moving_columns(fit.target.problem)
+    middle = fit.modes.z[:1].copy()
+    middle[:, columns] = centre[:, columns]
+    x = expand(fit.target, middle, [], reference=reference)
+    k, jac, shared = x.left[0] * x.singular[0], x.parameters[0], x.prior_precision[0]
+    n, ends = len(jac), np.cumsum(x.processes)
+    functions = [x.flexible[0][:, end - count : end] for end, count in zip(ends, x.processes, strict=True)]
+    covariances = []
+    for ratio in RATIOS:
+        noise = np.eye(n) + ratio * k @ k.T
+        inverse = np.linalg.inv(noise)
+        left = inverse - inverse @ jac @ np.linalg.solve(jac.T @ inverse @ jac + shared, jac.T @ inverse)
+        traces = [np.trace(f.T @ left @ f) for f in functions]
+        larger = [size**2 / t * f @ f.T for f, t in zip(functions, traces, strict=True) for size in SIZES]
+        covariances += [noise + remainder for remainder in larger] if reference else [noise]
+    volumes = np.array([-0.5 * np.linalg.slogdet(c)[1] for c in covariances])
+    inverses = [np.linalg.inv(c) for c in covariances]
+
+    def height(steps: np.ndarray) -> np.ndarray:
+        z = np.repeat(middle, len(steps), axis=0)
+        z[:, columns] += steps
+        r, prior = residuals(fit.target, z)
+        r = np.where(np.isfinite(r), r, 1e50)
+        squares = np.array([((r @ inverse) * r).sum(axis=1) for inverse in inverses])
+        value = logsumexp(volumes[:, None] - 0.5 * n * np.log(squares), axis=0) + prior
+        return np.where(np.isfinite(value), value, -np.inf)
+
+    middle_residual, _ = residuals(fit.target, middle)
+    squares = np.array([(middle_residual @ inverse @ middle_residual.T).item() for inverse in inverses])
+    best = inverses[int(np.argmax(volumes - 0.5 * n * np.log(squares)))]
+    spread = 1.5 * np.linalg.inv(jac.T @ best @ jac + shared)
+    proposal = stats.multivariate_t(np.zeros(len(columns)), spread, df=5, seed=np.random.default_rng(0))
+    steps = proposal.rvs(DRAWS)
+    logs = height(steps) - proposal.logpdf(steps)
+    share = np.exp(logs - logsumexp(logs))
+    assert 1.0 / (share**2).sum() > 40.0
+    return float(logsumexp(logs) - np.log(len(covariances) / len(RATIOS)))
+
+
+def weighed(fit: LaplaceFit) -> tuple[float, float, float]:
+    """Log Bayes factor of a remainder: by the fit without it, refitted, and by the integral."""
+    reference = reference_of(fit)
+    plain = expand(fit.target, fit.modes.z[:1], [], reference=reference)
+    beside, _ = _refitted(fit.target, fit.modes.z[:1], plain, reference)
+    exact = integral(fit, beside, reference) - integral(fit, fit.modes.z[:1], None)
+    return float(scan(plain).flexible[0]), remainder_evidence(fit, reference), exact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", [{"strain_stiffening.c": 6.0}, {"toe.w": 1.0}, {"sensor_drift.a": 5e-4}])
+def test_a_remainder_has_the_evidence_of_an_integral(hidden: dict[str, float]) -> None:
+    effects = [named(name.split(".")[0]) for name in hidden]
+    experiments = simulated_tests([Bench()], Truth(WIRE | hidden, effects), seed=3)
+    _, found, exact = weighed(fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0)))
+    assert found == pytest.approx(exact, abs=1.0)
+
+
+def test_what_bends_the_parameters_is_weighed_beside_others(tmp_path: Path) -> None:
+    """By the fit without it, a remainder in place of this drift has lost a third of its evidence."""
+    spec = Spec("single", "paper", ("sensor_drift",), 10.0, 0, 777)
+    assert seal(spec, tmp_path / "cases", tmp_path / "sealed")
+    experiments = read_experiments(tmp_path / "cases" / spec.key / "experiment.toml")
+    by_fit, found, exact = weighed(fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0)))
+    assert found == pytest.approx(exact, rel=0.06)
+    assert by_fit < 0.7 * exact
