@@ -19,7 +19,7 @@ run: .venv/run.stamp
 test: lint
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not slow and not browser"
 
-test-full: lint
+test-full: lint .venv/app.stamp
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 # The tests of make test with the lowest versions that pyproject.toml allows, in an environment of their own.

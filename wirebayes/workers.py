@@ -13,6 +13,7 @@ from wirebayes.interrupt import held_back, watch_silently
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
+    from multiprocessing.process import BaseProcess
 
 ParallelMap = Callable[..., Iterable[Any]]  # as the built-in `map`
 _PATIENCE_S = 10.0  # for a scheduler and its first worker to answer: a cluster's network takes a second at most
@@ -142,6 +143,30 @@ def processes(most: int | None = None, prepare: Callable[[], object] | None = No
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
+
+
+def start_apart(function: Callable[..., object], *arguments: Any) -> "BaseProcess":
+    """Start a function in a process of its own, which may start others, is ended by SIGTERM, and ends with this one.
+
+    Parameters
+    ----------
+    function : function that can be pickled
+    arguments
+        Of the function.
+    """
+    from multiprocessing import get_context
+
+    _prepared([])
+    context = get_context("forkserver" if _FORKS else "spawn")
+    process = context.Process(target=_apart, args=(function, arguments))  # type: ignore[attr-defined]
+    with held_back():
+        process.start()
+    return process
+
+
+def _apart(function: Callable[..., object], arguments: tuple[Any, ...]) -> None:
+    _prepare(None)
+    function(*arguments)
 
 
 @contextmanager

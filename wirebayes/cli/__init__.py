@@ -127,6 +127,12 @@ COMMANDS = {
         "Export a robot with its wires: firmware settings, creep table, MuJoCo model.",
         "wirebayes export hangprinter-4 --wires out/fit/roc-line-1m --output out/export",
     ),
+    "app": Command(
+        "wirebayes.cli.app",
+        "app",
+        "Do the same in a browser on this machine: drop a file, see the answer.",
+        "wirebayes app --port 8137",
+    ),
     "report": Command(
         "wirebayes.cli.report",
         "report",

@@ -106,6 +106,7 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
     mapped = _mapped(table, mapping)
     taken = {index for index, _, _ in mapped}
     roles: dict[Role, Column] = {}
+    open_questions: dict[Role, Undecided] = {}
     for index, role, unit in mapped:
         if role == IGNORE:
             continue
@@ -113,23 +114,25 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
         if known in roles:
             found = f"{roles[known].header} and {table.header[index]} both as {known}"
             raise InputError(f"--map: found {found}, expected one column for it")
-        roles[known] = _column(table, index, known, unit)
+        try:
+            roles[known] = _column(table, index, known, unit)
+        except Undecided as question:
+            open_questions[known] = question
     free = [i for i, name in enumerate(table.header) if name and i not in taken]
-    open_questions: list[Undecided] = []
-    for role in ROLES:
-        likely = [i for i in free if _may_be(table, i, role)] if role not in roles else []
+    for role in [role for role in ROLES if role not in roles and role not in open_questions]:
+        likely = [i for i in free if _may_be(table, i, role)]
         try:
             if likely:
                 roles[role] = _one(table, likely, role)
         except Undecided as question:
-            open_questions.append(question)
+            open_questions[role] = question
     if open_questions:
-        first, *others = open_questions
-        path = f"{table.sheet.path}, "
-        raise Undecided(first.found, first.question, first.answers, [q.found.removeprefix(path) for q in others])
-    for role in _NEEDED:
-        if role not in roles:
-            raise _missing(table, free, role)
+        first, *others = open_questions.values()
+        raise Undecided(first.found, first.question, first.answers, others)
+    missing = [role for role in _NEEDED if role not in roles]
+    if missing:
+        unread = [i for i in free if i not in [column.index for column in roles.values()]]
+        raise _missing(table, free, unread, missing)
     return roles
 
 
@@ -354,7 +357,9 @@ def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") 
     )
 
 
-def _missing(table: RawTable, free: Sequence[int], role: Role) -> InputError:
+def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missing: Sequence[Role]) -> Undecided:
+    """The question which column is the first of the missing quantities, with the same question for the others."""
+    role, *more = missing
     for index in free:
         if _best(table.header[index]) == role:
             _column(table, index, role, None)  # its unit is another quantity's, which is said
@@ -364,7 +369,11 @@ def _missing(table: RawTable, free: Sequence[int], role: Role) -> InputError:
     hint = ""
     if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
         hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
-    return InputError(
-        f"{table.sheet.path}, line {table.header_line}: found no column of {role} among {', '.join(names)}, expected "
+    place = f"{table.sheet.path}, line {table.header_line}: found no column of {role}"
+    message = (
+        f"{place} among {', '.join(names)}, expected "
         f'one; say which with --map "HEADER={role}" (or "HEADER={role} [{unit}]" where the header has no unit){hint}'
     )
+    answers = {f"--map {table.header[i]}={role}": table.header[i] for i in unread}
+    others = [_missing(table, free, unread, more)] if more else []
+    return Undecided(f"{place}", f"which column is the {role}", answers, others, message)

@@ -59,15 +59,28 @@ class Undecided(InputError):
         What is to be decided, in the words of a person who asks.
     answers : mapping of str to str
         What each answer means, by the option that says so.
-    more : sequence of str
+    others : sequence of Undecided
         What will have to be decided besides, so that all can be said at once.
+    message : str, optional
+        What the error says instead of listing the answers.
     """
 
-    def __init__(self, found: str, question: str, answers: Mapping[str, str], more: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        found: str,
+        question: str,
+        answers: Mapping[str, str],
+        others: Sequence["Undecided"] = (),
+        message: str | None = None,
+    ) -> None:
         options = listed([quoted(option) for option in answers], "or")
-        besides = f"; besides, undecided: {'; '.join(more)}" if more else ""
-        super().__init__(f"{found}; expected {options} to say {question}{besides}")
-        self.found, self.question, self.answers = found, question, dict(answers)
+        path = found.partition(", ")[0] + ", "
+        more = "; ".join(other.found.removeprefix(path) for other in others)
+        besides = f"; besides, undecided: {more}" if more else ""
+        super().__init__(message or f"{found}; expected {options} to say {question}{besides}")
+        self.found: str = found
+        self.question, self.answers = question, dict(answers)
+        self.others: tuple[Undecided, ...] = tuple(others)
 
 
 def quoted(option: str) -> str:

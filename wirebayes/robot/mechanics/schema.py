@@ -12,17 +12,12 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics.description import Drums, GivenWire, Plane, Pulleys, Robot, TensionRule
+from wirebayes.robot.mechanics.shipped import shipped as shipped
 from wirebayes.robot.mechanics.tensions import CHOICES
 from wirebayes.typing import Floats
 from wirebayes.user_files import read_text
 
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
-
-
-def shipped() -> list[str]:
-    """Names of the robots inside the package."""
-    folder = resources.files("wirebayes") / "data" / "robots"
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def read(name_or_file: str | Path) -> Robot:

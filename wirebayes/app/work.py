@@ -1,0 +1,125 @@
+"""What a process of the app does: one step with one test, by the public functions, and a record of it for the page."""
+
+import shutil
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import wirebayes
+from wirebayes.app.folders import RAW, READ, STEPS, Test, write
+from wirebayes.errors import InputError
+
+Progress = Callable[[str, float, float], None]
+
+
+def do(send: Connection, folder: Path, step: str, options: dict[str, Any]) -> None:
+    """Do a step and say how it goes: ``progress``, and at the end ``done``, ``undecided``, ``refused`` or ``broken``.
+
+    Parameters
+    ----------
+    send : Connection
+    folder : Path
+        Of the test.
+    step : str
+        ``read``, ``check``, ``fit``, ``discover`` or ``pose-ROBOT``.
+    options : dict
+        Of the step's function.
+    """
+    from wirebayes.io.bench.undecided import Undecided
+
+    test = Test(folder)
+    try:
+        run = _read if step == READ else _ask if step in STEPS else _pose
+        record = run(test, step, options, lambda *report: send.send(("progress", report)))
+        write(folder / f"{step}.json", record)
+        send.send(("done", None))
+    except Undecided as question:
+        asked = [question, *question.others]
+        questions = [{"question": q.question, "found": _bare(q.found, test), "answers": q.answers} for q in asked]
+        send.send(("undecided", questions))
+    except InputError as error:
+        send.send(("refused", _bare(str(error), test)))
+    except Exception as error:  # a bug: its traceback for the terminal, its name for the page
+        traceback.print_exc()
+        send.send(("broken", f"{type(error).__name__}: {error}"))
+
+
+def _read(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
+    """Turn what was dropped into an experiment file, or take the one that was dropped, and draw what was understood."""
+    for name in test.steps():  # of an earlier reading
+        (test.folder / f"{name}.json").unlink(missing_ok=True)
+        shutil.rmtree(test.folder / name, ignore_errors=True)
+    target = test.folder / READ
+    shutil.rmtree(target, ignore_errors=True)
+    if test.is_experiment_file:
+        return _read_experiment_file(test, target)
+    given: dict[str, Any] = {key: options[key] or None for key in ("length_mm", "material", "area_mm2")}
+    imported = wirebayes.import_bench(test.raw, output=target, **given, **_choices(options))
+    names = list(imported.summary()["experiments"])
+    record = {"lines": imported.lines(), "warnings": [notice.text for notice in imported.warnings]}
+    return record | _understood(f"{names[0] if len(names) == 1 else 'experiments'}.toml", names)
+
+
+def _ask(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
+    """Check, fit or discover."""
+    from wirebayes.workers import load_early
+
+    load_early()
+    record = test.record(READ) or {}
+    run = getattr(wirebayes, step)
+    return _with_page(run(test.folder / record["file"], output=test.folder / step, progress=progress, **options))
+
+
+def _pose(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
+    """The drift of a robot on this wire: on the final model of `discover` where it was run, else on the fit."""
+    experiment, robot = options["experiment"], step.removeprefix("pose-")
+    discovered = test.folder / "discover" / experiment / "final"
+    wires = discovered if "discover" in test.steps() else test.folder / "fit" / experiment
+    shutil.rmtree(test.folder / step, ignore_errors=True)  # perhaps of the fit, before there was a discovery
+    found = wirebayes.pose(robot, wires, output=test.folder / step, progress=progress, seed=options["seed"])
+    return _with_page(found)
+
+
+def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
+    from wirebayes.io import data_checks
+    from wirebayes.report.pictures.bench import understood
+
+    files = [path for path in test.raw if path.suffix.lower() == ".toml"]
+    if len(files) > 1:
+        raise InputError(f"found {files[0].name} and {files[1].name}, expected one experiment file at a time")
+    experiments = wirebayes.read_experiments(files[0])
+    shutil.copytree(files[0].parent, target)
+    for experiment in experiments:
+        understood(experiment, target / f"{experiment.name}.svg")
+    warnings = [notice.of(e.name).text for e in experiments for notice in data_checks.of_experiment(e)]
+    names = [experiment.name for experiment in experiments]
+    record = {"lines": [repr(e) for e in experiments], "warnings": warnings}
+    return record | _understood(files[0].name, names)
+
+
+def _understood(file: str, names: list[str]) -> dict[str, Any]:
+    return {"file": f"{READ}/{file}", "experiments": names, "pictures": [f"{READ}/{name}.svg" for name in names]}
+
+
+def _choices(options: dict[str, Any]) -> dict[str, Any]:
+    """What the user chose, as arguments of `import_bench`."""
+    from wirebayes.io.bench.undecided import Choices
+
+    choices = Choices(control=options.get("control") or None)
+    for option in options.get("options", ()):
+        choices = choices.with_option(option)
+    return vars(choices)
+
+
+def _with_page(found: Any) -> dict[str, Any]:
+    """The result's own page says all; that the record is there says that the step is done."""
+    return {"page": str(wirebayes.write_report(found).name)}
+
+
+def _bare(text: str, test: Test) -> str:
+    """A message without the app's own folders before the names of files."""
+    for folder in (test.folder / RAW, test.folder / READ, test.folder):
+        text = text.replace(f"{folder}/", "")
+    return text
