@@ -17,9 +17,10 @@ from .rig import Array, Rig
 from .truth import PROTOCOLS, draw_rig
 
 GENERATION = 1  # raised with every change that makes other data of the same specification: old answers then lapse
-KINDS = ("clean", "single", "pair", "without", "foreign", "gross", "two", "three", "mixed", "some")
-TOGETHER = ("two", "three", "mixed")  # kinds whose delta is conditional on the other effects
+KINDS = ("clean", "single", "pair", "without", "foreign", "gross", "two", "three", "mixed", "periodic", "some")
+TOGETHER = ("two", "three", "mixed", "periodic")  # kinds whose delta is conditional on the other effects
 LONG = ("unloading", "dense", "uneven")  # protocols that tell more than the paper's
+ELASTIC = ("strain_stiffening", "toe", "power_strain", "sensor_nonlinearity")  # what bends the elastic curve
 DELTAS = (3.0, 5.0, 10.0, 20.0)
 ATTEMPTS = 60  # rigs tried before an effect counts as out of reach of a protocol
 
@@ -75,7 +76,7 @@ class Plan:
     foreign_deltas: tuple[float, ...]
     foreign_protocols: int
     gross: int
-    together: int  # of each of two, three, and one known beside one foreign
+    together: int  # of each of two, three, one known beside one foreign, and a periodic one beside an elastic curve
     some: int  # several wires, an effect of the material in one, two or all three of them, each with its own amplitude
 
 
@@ -130,6 +131,8 @@ def specs(
             protocol = LONG[i // 2 % 3] if i % 2 else "paper"
             options = [name for name in EFFECTS if able(name, protocol)]
             drawn = [options[k] for k in rng.choice(len(options), 3 if kind == "three" else 2, replace=False)]
+            if kind == "periodic":
+                drawn = [ELASTIC[int(rng.integers(len(ELASTIC)))], "screw_error"]
             if kind == "mixed":
                 drawn[1] = list(FOREIGN)[int(rng.integers(len(FOREIGN)))]
             found.append(Spec(kind, protocol, tuple(drawn), 10.0, i, seed))

@@ -170,8 +170,9 @@ def _with_directions(
         seen = said.above(float(np.quantile(answers(geo, directions, 0.0 * z, rng, few).odds, 1 - ALPHA)))
         return {"blind": seen.rates(groups)} if seen.names else {}
     result: dict[str, Any] = {"blind": said.rates(groups)}
-    if case.spec.kind in ("two", "three"):
-        return result | {f"optimal_{case.spec.kind}": optimal_names(geo, directions, z, groups, rng, draws)}
+    if case.spec.kind in ("two", "three", "periodic"):
+        number = "three" if case.spec.kind == "three" else "two"
+        return result | {f"optimal_{number}": optimal_names(geo, directions, z, groups, rng, draws)}
     if case.spec.kind == "mixed":
         exact = directions
         for one in case.hidden:

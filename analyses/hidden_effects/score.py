@@ -306,7 +306,7 @@ def prior_weights(rows: list[Row]) -> dict[str, float]:
     n = len(EFFECTS)
     expected = {
         ("single",): 1.0 * n,
-        ("pair", "two"): MORE * n,
+        ("pair", "two", "periodic"): MORE * n,
         ("three",): MORE**2 * n,
         ("mixed",): MORE * n,
         ("without", "foreign"): UNKNOWN_WEIGHT,

@@ -75,9 +75,9 @@ def _several(rows: list[Row]) -> list[Target]:
     """Several effects at once, one of them perhaps foreign, and what is said too much."""
     from .score import accepted_of_group, false_names, visible_beside
 
-    kinds = {kind: [r for r in rows if r["kind"] == kind] for kind in ("single", "two", "three", "mixed")}
+    kinds = {kind: [r for r in rows if r["kind"] == kind] for kind in ("single", "two", "three", "mixed", "periodic")}
     more = [r for kind in ("foreign", *TOGETHER) for r in rows if r["kind"] == kind]
-    apart = {kind: [r for r in kinds[kind] if all(visible_beside(r))] for kind in ("two", "three")}
+    apart = {kind: [r for r in kinds[kind] if all(visible_beside(r))] for kind in ("two", "three", "periodic")}
     first = [r for r in kinds["two"] if r["accepted"]]
     known = [r for r in kinds["mixed"] if visible_beside(r)[0]]
     table = [
@@ -97,6 +97,18 @@ def _several(rows: list[Row]) -> list[Target]:
         ),
         _row("three effects: all accepted", "in %", rate(all(accepted_of_group(r)) for r in apart["three"]), None),
         _no_more(f"{BLIND}: all three", [r["blind"].get("all") for r in apart["three"]]),
+        _at_least(
+            "a periodic error beside an elastic curve: both accepted, relative to optimal",
+            _relative(kinds["periodic"], "optimal_two"),
+            0.90,
+        ),
+        _row(
+            "a periodic error beside an elastic curve: both accepted",
+            "in %",
+            rate(all(accepted_of_group(r)) for r in apart["periodic"]),
+            None,
+        ),
+        _no_more(f"{BLIND}: both of these", [r["blind"].get("all") for r in apart["periodic"]]),
         _at_least("beside a foreign effect: the known one accepted", rate(accepted_of_group(r)[0] for r in known), 0.8),
         _no_more("an ideal judge would accept it", [r["optimal_mixed"].get("known") for r in known]),
         _no_more(f"{BLIND} would accept it", [r["blind"].get("known") for r in known]),
