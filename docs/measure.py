@@ -21,6 +21,8 @@ ROOT = DOCS.parent
 RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
 STUDIES = {
+    "any_scale": ("-m analyses.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
+    "weights": ("-m analyses.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
     "coverage": ("-m analyses.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robot_agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "real_wires": ("analyses/discover_real_wires.py --output {folder}/wires.json", "wires.json"),
@@ -42,7 +44,7 @@ def measure(name: str) -> None:
         subprocess.run([sys.executable, *command.format(folder=folder).split()], cwd=ROOT, check=True)
         result = json.loads((Path(folder) / file).read_text(encoding="utf-8"))
     kept = {
-        "command": "python " + command.partition(" --output")[0],
+        "command": "python " + re.sub(r" --(rows|output) \S+", "", command),
         "commit": commit.strip(),
         "date": datetime.now(UTC).date().isoformat(),
         "result": result,
@@ -57,6 +59,8 @@ def texts() -> dict[Path, str]:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     return {
         ROOT / "README.md": _BLOCK.sub(lambda block: block[1] + _four_figures(kept) + block[2], readme),
+        DOCS / "any-scale.inc": _any_scale(kept["any_scale"]),
+        DOCS / "weights.inc": _weights(kept["weights"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
     }
@@ -78,6 +82,42 @@ def _four_figures(kept: dict[str, Any]) -> str:
         f"  from {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N with what `discover` named.\n"
         f"- [Robots](docs/robot-study.rst): {robots['cases']} equilibria of drawn poses and wires agree with MuJoCo, "
         f"or with a\n  minimiser of the energy, within {robots['largest_m']:.0e} m.\n"
+    )
+
+
+def _any_scale(kept: dict[str, Any]) -> str:
+    """A table of intervals from thread to mooring rope, under steps and under weights."""
+    found = kept["result"]
+    kinds = {"all": "all tests", "steps": "steps", "weights": "weights", "rests": "with recorded rests"}
+    names = [name for name in found["all"] if name != "tests"]
+    lines = [
+        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}); {found['not_converged']} of "
+        f"{found['tests']} did not converge. Shares of 90 % intervals that hold the truth, in %:",
+        "",
+        ".. list-table::",
+        "   :header-rows: 1",
+        "",
+        "   * - tests",
+        "     - number",
+        *(f"     - {name}" for name in names),
+    ]
+    for kind, words in kinds.items():
+        lines += [f"   * - {words}", f"     - {found[kind]['tests']}"]
+        lines += [f"     - {100 * found[kind][name]:.0f}" for name in names]
+    return "\n".join(lines) + "\n"
+
+
+def _weights(kept: dict[str, Any]) -> str:
+    """A paragraph on one wire under steps and under weights."""
+    found = kept["result"]
+    steps, weights, together = (found[kind] for kind in ("steps", "weights", "together"))
+    inside = f"{steps['inside']}, {weights['inside']} and {together['inside']} of {found['pairs']}"
+    widths = " and ".join(f"{kind['median_width']:.3f}" for kind in (steps, weights))
+    return (
+        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) fits {found['pairs']} such lines under "
+        f"steps, under weights, and both together: the 90 % interval of the creep after a hold at the typical "
+        f"tension holds the truth in {inside}; its median width, in the logarithm, is {widths}, together "
+        f"{together['median_width']:.3f}, and both together are the sharpest in {found['together_sharpest']}.\n"
     )
 
 

@@ -15,8 +15,10 @@ from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.check import EffectSize, ParameterRange
+from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.model.scales import NATURAL
 from wirebayes.notice import Notice
+from wirebayes.results import hold_ends
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import of_posterior
 from wirebayes.results.store import unit_of
@@ -42,11 +44,14 @@ class Preview:
         whether the test ``shows`` it: yes (at usual sizes), if unusually large, or no, and the ``reason``.
     warnings : list of Notice
         What is suspicious about what was fitted.
+    hold_ends : dict or None
+        What it may cost that the ends of holds were not recorded.
     """
 
     parameters: dict[str, ParameterRange]
     effects: dict[str, EffectSize]
     warnings: list[Notice]
+    hold_ends: HoldEnds | None
 
 
 def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> Preview:
@@ -69,7 +74,8 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     parameters = {
         name: _range(theta[:, i], before[:, i], unit_of(name, (), controls)) for i, name in enumerate(problem.names)
     }
-    return Preview(parameters, _effects(block, kinds, rng), of_posterior(own, prior, sample))
+    ends = hold_ends.cost(problem, np.array(list(block.best.values())), theta.std(axis=0, ddof=1))
+    return Preview(parameters, _effects(block, kinds, rng), of_posterior(own, prior, sample), ends)
 
 
 def _range(draws: Array, before: Array, unit: str) -> ParameterRange:

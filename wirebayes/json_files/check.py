@@ -2,6 +2,7 @@
 
 from typing import NotRequired, TypedDict
 
+from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.values import Quantiles
 from wirebayes.notice import Warned
 
@@ -61,6 +62,7 @@ class CheckedExperiment(Understood, Warned):
 
     parameters: dict[str, ParameterRange]
     effects: dict[str, EffectSize]
+    hold_ends: HoldEnds | None
 
 
 class CheckJson(Warned):

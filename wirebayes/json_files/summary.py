@@ -3,6 +3,7 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.discovery import GrossError
+from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.values import Numbers, Statistics
 from wirebayes.notice import Warned
 
@@ -106,6 +107,7 @@ class SummaryJson(Warned):
     derived: Derived
     identifiability: dict[str, Identifiability]
     extrapolation: ExtrapolatedCreep
+    hold_ends: HoldEnds | None
     likelihood_evaluations: int
     kept_evaluations: int
     autocorrelation_steps: float

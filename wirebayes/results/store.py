@@ -20,13 +20,14 @@ from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
 from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.io.run_folder import read_json, stored_results, write_bytes, write_json
+from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import Derived, Mixed, Parameter, SummaryJson
 from wirebayes.json_files.values import UNITS, Statistics
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.notice import Notice, NoticeJson, to_json
-from wirebayes.results import posterior_checks
+from wirebayes.results import hold_ends, posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.stored_check import check
 from wirebayes.typing import Array
@@ -620,6 +621,11 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
     return to_json(found)
 
 
+def _hold_ends(fit: Fit) -> HoldEnds | None:
+    best = fit.flat[int(fit.log_density.argmax())]
+    return hold_ends.cost(fit.problem, best, fit.flat.std(axis=0, ddof=1))
+
+
 def _summary(fit: Fit, sample: Sample | None) -> SummaryJson:
     first = sample or fit.problem.samples[0]
     controls = [s.protocol.control for s in ([sample] if sample else fit.problem.samples)]
@@ -647,6 +653,7 @@ def _summary(fit: Fit, sample: Sample | None) -> SummaryJson:
         "derived": derived(wire, tension),
         "identifiability": identifiability(fit),
         "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
+        "hold_ends": _hold_ends(fit),
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,
         "autocorrelation_steps": float(chains.autocorrelation_steps.max()),

@@ -90,7 +90,7 @@ def check(
                 warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings])
                 found[e.name] = {
                     **_understood(e), "warnings": warnings, "parameters": previewed.parameters,
-                    "effects": previewed.effects,
+                    "effects": previewed.effects, "hold_ends": previewed.hold_ends,
                 }  # fmt: skip
                 understood(e, place.path / f"{e.name}.svg")
             report("check", len(experiments), len(experiments))

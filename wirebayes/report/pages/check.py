@@ -22,6 +22,7 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     picture_file,
+    sentence,
     span,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning, spoken
@@ -72,6 +73,8 @@ def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
         f"{counted(e['readings'], 'reading')}.",
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
+    if ends := e.get("hold_ends"):
+        about.append(sentence(ends["sentence"]))
     hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]
     blind = [f"Effects it cannot show: {', '.join(spoken(name) for name in hidden)}."] if hidden else []
     prior = [name for name, p in e["parameters"].items() if p["determined_by"] == "prior"]

@@ -7,6 +7,7 @@ import numpy as np
 
 from wirebayes.answers import fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.problem import Sample
 from wirebayes.prediction.predictive import PredictionRequest, predict
@@ -26,6 +27,7 @@ from wirebayes.report.blocks import (
     drawn,
     files_beside,
     number,
+    sentence,
     span,
     unit_text,
 )
@@ -99,7 +101,7 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
         drawn_curve = drawn(through_the_readings(stored, sample.name))
         blocks.append(Pictures([Picture(drawn_curve, alt, _CURVE, wide=True)]))
     blocks.append(Text(_next(summary)))
-    blocks.append(Columns([_measured(stored), *_known(draws, shrunk, sample, trusted)]))
+    blocks.append(Columns([_measured(stored, summary.get("hold_ends")), *_known(draws, shrunk, sample, trusted)]))
     alt = f"Measured minus predicted readings of {sample.name}, hold after hold, inside the 90 % band."
     measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
     weights = sample.protocol.control == "force"
@@ -190,7 +192,7 @@ def _sampled(summary: SummaryJson) -> str:
     )
 
 
-def _measured(stored: Stored) -> Points:
+def _measured(stored: Stored, ends: HoldEnds | None) -> Points:
     protocol, read = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
     weights = protocol.control == "force"
     tension = protocol.setting[protocol.recorded] if weights else read
@@ -202,6 +204,7 @@ def _measured(stored: Stored) -> Points:
         f"{counted(len(read), 'reading')}.",
         f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
+        *([sentence(ends["sentence"])] if ends else []),
     ]
     return Points("What was measured", points)
 

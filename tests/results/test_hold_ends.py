@@ -1,0 +1,67 @@
+"""What it costs to take a hold's last reading for its end: against tests whose holds did go on, and recorded it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.effects import named
+from wirebayes.model.problem import build
+from wirebayes.results import hold_ends
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+from wirebayes.wire.effect import Effect
+
+WIRE = {"k1": 900.0, "B": 0.15, "U": 0.9, "k2": 0.05, "N": 0.8, "preload": 0.5, "sensor_sd": 0.002, "setting_sd": 0.002}
+READ_S = (0.0, 10.0, 30.0, 60.0, 90.0)
+WENT_ON = (*READ_S, READ_S[-1] / hold_ends.COVERED)  # the last moment is the hold's end, and not read
+
+
+def lasting(effects: list[Effect], truth: dict[str, float], *, recorded: bool):
+    """Readings without the last moment of each hold, which is known or not."""
+    places = (*range(1, 8), *range(6, 2, -1))
+    bench = Bench(resolution_N=0.0, displacements_mm=places, times_s=WENT_ON)
+    made = draw([bench], Truth(WIRE | truth, effects), 3)
+    (sample,) = made.problem.samples
+    holds = []
+    for hold, y in zip(bench.experiment().holds, sample.readings[..., 0], strict=True):
+        end = WENT_ON[-1] if recorded else READ_S[-1]
+        holds.append(replace(hold, time_s=np.array(READ_S), readings=y[:-1], duration_s=end))
+    return build([replace(bench.experiment(), holds=tuple(holds))], effects)
+
+
+def near(problem, truth):
+    return np.array([(WIRE | truth)[name] for name in problem.names])
+
+
+@pytest.mark.parametrize(("key", "truth"), [(None, {}), ("lost_motion", {"lost_motion.w": 0.1})])
+def test_the_shift_is_the_distance_to_the_fit_that_knows_the_ends(key, truth):
+    effects = [named(key)] if key else []
+    unknown, known = (lasting(effects, truth, recorded=r) for r in (False, True))
+    best, one = near(unknown, truth), np.ones(len(unknown.names))
+    told = hold_ends.cost(unknown, best, one)
+    assert told is not None and hold_ends.cost(known, best, one) is None
+    before, after = hold_ends._modes(unknown, known, best)
+    assert list(told["moved"]) == ["k2", *truth]
+    for name, move in told["moved"].items():
+        i = unknown.names.index(name)
+        assert move["shift"] == pytest.approx(after[i] - before[i], rel=0.02)  # priors follow the holds
+        assert move["sd_share"] == pytest.approx(abs(move["shift"]))
+
+
+def test_the_last_hold_of_a_test_may_end_with_its_last_reading():
+    problem = lasting([], {}, recorded=False)
+    (sample,) = problem.samples
+    lasted = sample.protocol.duration_s.copy()
+    lasted[-1] *= 1.1
+    p = replace(sample.protocol, duration_s=lasted)
+    assert not hold_ends.are_recorded(p)
+    first = p.number[:1]
+    one = replace(p, setting=p.setting[:1], time_s=p.time_s[:1], mask=p.mask[:1], duration_s=lasted[:1], number=first)
+    assert hold_ends.are_recorded(one)
+
+
+@pytest.mark.parametrize(
+    ("share", "words"), [(0.49, "k2 would move by less than 0.5"), (0.51, "k2 would be lower by 0.00300 s⁻ᴺ (0.5")]
+)
+def test_a_small_shift_is_said_to_be_small(share, words):
+    assert words in hold_ends.sentence({"k2": {"shift": -0.003, "sd_share": share, "unit": "s^-N"}})

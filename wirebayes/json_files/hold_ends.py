@@ -1,0 +1,19 @@
+"""What an unrecorded end of holds may cost, as ``summary.json`` and ``check.json`` hold it."""
+
+from typing import TypedDict
+
+
+class MovedByHoldEnds(TypedDict):
+    """How far the best value of a parameter moves; `sd_share` in standard deviations of its posterior."""
+
+    shift: float
+    sd_share: float
+    unit: str
+
+
+class HoldEnds(TypedDict):
+    """What follows if readings cover only the share `covered` of each hold."""
+
+    covered: float
+    moved: dict[str, MovedByHoldEnds]
+    sentence: str
