@@ -57,11 +57,14 @@ def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: i
     except RuntimeError:
         return None
     robot, span = made.robot, made.robot.span_m
+    rule = robot.rule
+    if not tensions:  # what motors under torque control hold: no more than a few times what carries the platform
+        robot = replace(robot, rule=replace(rule, highest_N=0.3 * rule.highest_N))
     true = replace(robot, exit_m=robot.exit_m + anchor * span * rng.normal(size=robot.exit_m.shape))
     prior = session.Prior(made.line, 2e-3 * span)
     mean, cov = prior.moments(robot.legs)
     values = rng.multivariate_normal(mean, cov, 1)
-    log = _visited(true, prior, values, rng, stops)
+    log = _visited(true, prior, values, rng, stops, 0.5 if tensions else 1.0)
     if log is None:
         return None
     with np.errstate(all="ignore"):
@@ -86,16 +89,16 @@ def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: i
 
 
 def _visited(
-    robot: Robot, prior: session.Prior, values: np.ndarray, rng: np.random.Generator, stops: int
+    robot: Robot, prior: session.Prior, values: np.ndarray, rng: np.random.Generator, stops: int, share: float
 ) -> session.Session | None:
-    """Poses of the true robot, each with tensions near others drawn from the range that its file allows."""
+    """Poses of the true robot, each with tensions near others drawn from a share of the range that its file allows."""
     wires, error = prior.wires(robot, values)
     x = rng.uniform(robot.lower_m, robot.upper_m, (20 * stops, 3))
     R = rotation.matrix(0.1 * rng.normal(size=x.shape) * (robot.degrees == 6))
-    lowest, half = robot.rule.lowest_N, 0.5 * robot.rule.highest_N
+    lowest, highest = robot.rule.lowest_N, share * robot.rule.highest_N
 
     def varied(structure: np.ndarray, load: np.ndarray, low: float, high: float) -> np.ndarray | None:
-        return nearest(rng.uniform(lowest, half, robot.legs), structure, load, low, high)
+        return nearest(rng.uniform(lowest, highest, robot.legs), structure, load, low, high)
 
     tau = inverse.tensions(robot, x, R, varied)
     good = np.flatnonzero(np.isfinite(tau).all(1))[:stops]
@@ -104,7 +107,7 @@ def _visited(
     each = wires.part(np.zeros(stops, int))
     joint = inverse.commands(robot, each, x[good], R[good], tau[good], 0.0, error.T).joint_m
     held = np.full(stops, 30.0)
-    return session.Session(x[good], R[good], joint, held, np.ones(stops, bool), 0.003 * half / 2.5)
+    return session.Session(x[good], R[good], joint, held, np.ones(stops, bool), 0.0012 * highest)
 
 
 def _cases(

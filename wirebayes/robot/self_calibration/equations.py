@@ -63,7 +63,7 @@ class Noise:
     balance : float
         Of the balance, over the weight.
     pull_N : float
-        Of a tension that was not read, about `usual_N`.
+        Of a tension that was not read, about its level.
     usual_N : float
     soft_N : float
         Over which range of latent tensions a wire begins to pull: small beside all that is known of tensions, so that
@@ -290,13 +290,16 @@ def _tensions(
     parts = unknowns.parts(state.white)
     pull, taut = pulled(state.pull_N, noise.soft_N)
     off = (pull + sign * parts.bias_N - holds.tension_N) / session.tension_sd_N
-    usual = (state.pull_N - noise.usual_N) / noise.pull_N
+    usual = (state.pull_N - parts.level_N - noise.usual_N) / noise.pull_N
     known[:, rows] = read
     residual[:, rows] = np.where(read, off, usual)
     leg = np.arange(w)
     by_hold[:, rows.start + leg, d + leg] = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
+    if unknowns.errors.level_N > 0:
+        level = unknowns.slices["level"].start + leg
+        by_robot[:, rows.start + leg, level] = np.where(read, 0.0, -unknowns.errors.level_N / noise.pull_N)
     if unknowns.prior.bias_sd_N > 0:
-        bias = unknowns.count - w + leg
+        bias = unknowns.slices["wires"].stop - w + leg
         by_robot[:, rows.start + leg, bias] = np.where(
             read, sign * unknowns.prior.bias_sd_N / session.tension_sd_N, 0.0
         )

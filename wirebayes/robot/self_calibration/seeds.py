@@ -13,7 +13,7 @@ from wirebayes.robot.self_calibration.equations import Holds, State, moved, scal
 from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import Whole, estimate, trust
+from wirebayes.robot.self_calibration.whole import Whole, estimate, trust, with_levels
 from wirebayes.typing import Floats
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
@@ -125,12 +125,15 @@ def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
     holds : Holds
     rng : numpy Generator
     """
+    unknowns = with_levels(unknowns, holds)
     found = estimate(unknowns, holds, seed(unknowns, holds, np.zeros(unknowns.count), rng))
-    for _ in range(_OTHERS):
+    for k in range(_OTHERS):
         if found.converged and trust(found) >= SIGNIFICANT:
             break
-        white = np.zeros(unknowns.count)
-        white[: unknowns.slices["drum"].start] = 0.5 * rng.standard_normal(unknowns.slices["drum"].start)
+        white = np.array(found.state.white)  # holds that went astray are looked for again
+        if k > 0:
+            white = np.zeros(unknowns.count)
+            white[: unknowns.slices["drum"].start] = 0.5 * rng.standard_normal(unknowns.slices["drum"].start)
         other = estimate(unknowns, holds, seed(unknowns, holds, white, rng))
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other

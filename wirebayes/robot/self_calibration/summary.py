@@ -116,7 +116,7 @@ def _standard_deviations(found: Whole) -> dict[str, Floats]:
         "reference_m": prior.reference_sd_m * sd[unknowns.references],
         "length_m": np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope)),
         "drum": unknown("drum", unknowns.errors.drum, (w,)),
-        "bias_N": prior.bias_sd_N * sd[-w:] if prior.bias_sd_N > 0 else np.zeros(w),
+        "bias_N": prior.bias_sd_N * sd[at["wires"]][-w:] if prior.bias_sd_N > 0 else np.zeros(w),
         "position_m": hold[:, :3],
         "turn_rad": hold[:, 3:d] / robot.size_m if d == 6 else np.zeros((len(hold), 3)),
         "pull_N": hold[:, d:],

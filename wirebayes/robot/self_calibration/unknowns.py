@@ -27,6 +27,8 @@ class StatedErrors:
         Of a joint value, as a length; None: estimated from the readings.
     drum : float
         Relative, of the radius of every drum.
+    level_N : float
+        Of what a wire's tension is on average in the holds where nobody read it, about what is usual.
     """
 
     exit_m: float = 0.0
@@ -34,6 +36,7 @@ class StatedErrors:
     pose_m: float = 0.0
     joint_m: float | None = None
     drum: float = 0.0
+    level_N: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class Parts:
         Relative error of every drum's radius.
     wires : (d,) array
         A row of unknowns as `Prior.wires` takes it.
+    level_N : (w,) array
+        What tensions that nobody read are on average beyond what is usual.
     """
 
     exit_m: Floats
@@ -58,6 +63,7 @@ class Parts:
     bias_N: Floats
     drum: Floats
     wires: Floats
+    level_N: Floats
 
 
 @dataclass(frozen=True)
@@ -85,13 +91,17 @@ class Unknowns:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where exit points, platform points, drums and the rest (``wires``) stand; empty slices for what is exact."""
+        """Where exit points, platform points, drums, references with wires and sensors (``wires``) and levels stand.
+
+        Slices of what is exact are empty.
+        """
         legs = self.robot.legs
         counts = {
             "exit": 3 * legs if self.errors.exit_m > 0 else 0,
             "platform": 3 * legs if self.errors.platform_m > 0 else 0,
             "drum": legs if self.errors.drum > 0 else 0,
             "wires": len(self.moments[0]),
+            "level": legs if self.errors.level_N > 0 else 0,
         }
         ends = np.cumsum(list(counts.values()))
         return {
@@ -101,7 +111,7 @@ class Unknowns:
     @property
     def count(self) -> int:
         """Length of the vector."""
-        return self.slices["wires"].stop
+        return self.slices["level"].stop
 
     @property
     def references(self) -> slice:
@@ -119,7 +129,7 @@ class Unknowns:
             part = white[at[name]]
             return points + sd * part.reshape(-1, 3) if len(part) else points
 
-        drum = white[at["drum"]]
+        drum, level = white[at["drum"]], white[at["level"]]
         return Parts(
             moved("exit", self.robot.exit_m, self.errors.exit_m),
             moved("platform", self.robot.platform_m, self.errors.platform_m),
@@ -127,4 +137,5 @@ class Unknowns:
             self.prior.bias_N(legs, wires[None])[0],
             self.errors.drum * drum if len(drum) else np.zeros(legs),
             wires,
+            self.errors.level_N * level if len(level) else np.zeros(legs),
         )

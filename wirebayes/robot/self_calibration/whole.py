@@ -7,6 +7,7 @@ then ever smaller ones, lead from rough geometry to the mode.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from wirebayes.linear_algebra import inv, solve
 from wirebayes.robot.mechanics import rotation as turns
@@ -32,14 +33,23 @@ from wirebayes.typing import Floats
 
 _FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
 _ROUNDS = 25  # of noise and creep
-_AHEAD = 1.7  # times the logarithmic step of a noise: alone it creeps towards where it ends
-_REACH = 0.3  # rad, or of the platform's size: a larger step leaves what the slopes describe, for another equilibrium
+_SOFT = 0.03  # of what is known best of tensions
+_WHOLE_ROUNDS = 3  # before creep goes half the way only
+_STILL = 0.05  # of every unknown's standard deviation
+_SETTLED = 0.02  # of a noise, relative
+_CREEPING = 0.8  # slope of what is shown over what is thought: a secant of more would leap
+_FAR, _TURN = 0.02, 0.3  # of the span, rad: a larger step leaves what slopes describe, for another equilibrium
+_CORRECTIONS, _AS_FORESEEN = 3, 0.5  # of poses and tensions, where a step gains less than half of what slopes foresee
+_GAIN = 1e-3  # of the sum of squares: less changes no estimate by a hundredth of its standard deviation
 _STEPS = 12  # of a descent: noise and creep change before more are worth it
 _EASINGS = 16  # quarterings that lead from a tenth of the span to a micrometre
-_ESTIMATED = ("joint_m", "balance")  # of the noise: no other part of it changes
-# Of the range that a robot's file allows: tensions that nobody read lie anywhere in it.
-_UNREAD = 0.5
+# Of the range that a robot's file allows: tensions that nobody read lie anywhere in it, so this is their standard
+# deviation about a level that the holds share. The level may be off by half the range, and does not average out.
+_UNREAD, _LEVEL = 12**-0.5, 0.5
 _LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of freedom
+# Where nobody read tensions, their scatter explains what errors of lengths would: half a millimetre of five metres is
+# then thought of these, as drums that wind layers have them, unless ten readings or more say otherwise.
+_BLIND, _BLIND_DEGREES = 1e-4, 10.0
 
 
 @dataclass(frozen=True)
@@ -135,6 +145,46 @@ def _stepped(robot: Robot, state: State, change: Floats, hold: Floats) -> State:
     return State(state.white + change, state.position_m + motion[:, :3], turn, state.pull_N + hold[:, d:])
 
 
+def _foreseen(e: Equations, change: Floats, hold: Floats) -> float:
+    """Sum of squares of the residuals after a step, were they straight."""
+    moved_by = e.by_robot @ change + (e.by_hold @ hold[..., None])[..., 0]
+    return float(((e.residual + moved_by) ** 2).sum())
+
+
+def _corrected(
+    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, e: Equations, creep: Grown, since: State
+) -> tuple[State, Equations]:
+    """Poses and tensions a Newton step nearer to where each hold has them for the same robot, where that is better.
+
+    Loops and balance leave a narrow, curved valley; a step along its slope leaves it, and this leads back.
+    """
+    z = e.by_hold
+    zt = z.swapaxes(1, 2)
+    A = zt @ z
+    A = A + 1e-12 * np.einsum("pii->pi", A)[:, None] * np.eye(A.shape[1])
+    hold = -solve(A, zt @ e.residual[..., None])[..., 0]
+    there = _stepped(unknowns.robot, state, np.zeros_like(state.white), np.nan_to_num(hold))
+    ahead = linearised(unknowns, holds, noise, there, creep, since)
+    better = (ahead.residual**2).sum(1) < (e.residual**2).sum(1)
+
+    def chosen(new: Floats, old: Floats) -> Floats:
+        return np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+    state = State(
+        state.white,
+        chosen(there.position_m, state.position_m),
+        chosen(there.rotation, state.rotation),
+        chosen(there.pull_N, state.pull_N),
+    )
+    e = replace(
+        e,
+        residual=chosen(ahead.residual, e.residual),
+        by_robot=chosen(ahead.by_robot, e.by_robot),
+        by_hold=chosen(ahead.by_hold, e.by_hold),
+    )
+    return state, e
+
+
 @dataclass(frozen=True)
 class Descent:
     """Where Levenberg-Marquardt ended, the equations and the sum of squares there, and whether it had come down."""
@@ -164,28 +214,48 @@ def descend(
         At most.
     """
     damping, d = 1e-6, unknowns.robot.degrees
+    reach = np.where(np.arange(d) < 3, _FAR * unknowns.robot.span_m, _TURN * unknowns.robot.size_m)
     equations = linearised(unknowns, holds, noise, state, creep, since)
     cost = _cost(equations, state.white)
     for _ in range(steps):
         normal = _eliminated(equations, state.white, damping)
         change = -solve(normal.matrix, normal.slope[:, None])[:, 0]
         hold = normal.alone + normal.by_robot @ change
-        moves = float(np.abs(hold[:, :d]).max())
-        share = min(1.0, _REACH * unknowns.robot.size_m / max(moves, 1e-300))
+        share = min(1.0, 1.0 / max(float((np.abs(hold[:, :d]) / reach).max()), 1e-300))
         there = _stepped(unknowns.robot, state, share * change, share * hold)
         ahead = linearised(unknowns, holds, noise, there, creep, since)
         new = _cost(ahead, there.white)
+        foreseen = _foreseen(equations, share * change, share * hold) + float(there.white @ there.white)
+        for _ in range(_CORRECTIONS):
+            if cost - new > _AS_FORESEEN * (cost - foreseen):
+                break
+            there, ahead = _corrected(unknowns, holds, noise, there, ahead, creep, since)
+            new = _cost(ahead, there.white)
         if new < cost:
             gain = cost - new
             state, equations, cost = there, ahead, new
             damping = max(damping / 10, 1e-12)
-            if gain < 1e-4 + 1e-9 * cost:
+            if gain < _GAIN:
                 return Descent(state, equations, cost, True)
         else:
             damping = max(damping * 10, 1e-9)
             if damping > 1e6:
                 return Descent(state, equations, cost, True)
     return Descent(state, equations, cost, False)
+
+
+def with_levels(unknowns: Unknowns, holds: Holds) -> Unknowns:
+    """The unknowns with a level for the tensions of every wire, where some were not read.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    """
+    if np.isfinite(holds.tension_N).all():
+        return unknowns
+    rule = unknowns.robot.rule
+    return replace(unknowns, errors=replace(unknowns.errors, level_N=_LEVEL * (rule.highest_N - rule.lowest_N)))
 
 
 def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
@@ -199,35 +269,50 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         A rough guess.
     """
     robot, stated = unknowns.robot, unknowns.errors.joint_m
-    target = _FLOOR * robot.span_m if stated is None else max(stated, EXACT * robot.span_m)
+    target = _usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
     low, high = robot.rule.lowest_N, robot.rule.highest_N
     usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
-    # Tensions that nobody read differ from what is usual as the geometry and the commands have it, alike in many holds:
-    # that does not average out. So their error grows with the number of such holds, and all of them together say no
-    # more of the lengths than one hold does.
-    unread = int((~np.isfinite(holds.tension_N)).any(1).sum())
-    pull = _UNREAD * (high - low) * np.sqrt(max(unread, 1))
-    noise = Noise(target, FRICTIONLESS, pull, usual, 0.03 * min(holds.session.tension_sd_N, low))
+    finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
+    noise = Noise(target, FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
     since, creep = state, _creep(unknowns, holds, state)
 
     state = _from_rough(unknowns, holds, noise, state, creep)
     noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
-    if stated is None:
+    if stated is None and np.isfinite(holds.tension_N).any():
         noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
+    rounds: list[tuple[Floats, Floats]] = []
     for _ in range(_ROUNDS):
-        since, creep = state, _creep(unknowns, holds, state)
+        since = _between(since, state) if len(rounds) > _WHOLE_ROUNDS else state
+        creep = _creep(unknowns, holds, since)
         down = descend(unknowns, holds, noise, state, creep, since, _STEPS)
         state = down.state
         last = inverse.lengths(robot, holds.session.joint_m[-1])[0]
         found = _posterior(unknowns, down, noise, creep, last)
-        before = noise
-        noise, degrees = _estimated(found, noise)
+        shown, degrees = _noise_shown(found, *_usual_joint(robot, holds))
         found = replace(found, degrees=degrees)
-        moved_on = np.abs(state.white - since.white).max() if len(state.white) else 0.0
-        settled = max(abs(np.log(getattr(noise, name) / getattr(before, name))) for name in _ESTIMATED) < 0.02
-        if settled and moved_on < 1e-2:
-            break
-    return found
+        rounds.append((np.log([noise.joint_m, noise.balance]), shown))
+        moved_on = np.abs(state.white - since.white) / np.sqrt(np.diag(found.covariance))
+        if np.abs(shown - rounds[-1][0]).max() < _SETTLED and moved_on.max(initial=0.0) < _STILL:
+            return found
+        joint, balance = np.exp(_ahead(rounds))
+        noise = replace(noise, joint_m=float(joint), balance=float(balance))
+    return replace(found, converged=False)
+
+
+def _between(before: State, after: State) -> State:
+    """Where creep is taken about: halfway, since creep that wires slackened by would make them taut again in turns."""
+    white, pull = 0.5 * (before.white + after.white), 0.5 * (before.pull_N + after.pull_N)
+    return replace(after, white=white, pull_N=pull)
+
+
+def _ahead(rounds: list[tuple[Floats, Floats]]) -> Floats:
+    """Where logarithms of noises and of what the residuals then show will be the same: a secant for each of them."""
+    noise, shown = rounds[-1]
+    if len(rounds) == 1:
+        return shown
+    gone = noise - rounds[-2][0]
+    slope = np.divide(shown - rounds[-2][1], gone, out=np.zeros_like(gone), where=np.abs(gone) > 1e-9)
+    return np.asarray(noise + (shown - noise) / (1.0 - np.clip(slope, -1.0, _CREEPING)))
 
 
 def _creep(unknowns: Unknowns, holds: Holds, state: State) -> Grown:
@@ -294,28 +379,33 @@ def _leverage(found: Whole, rows: slice) -> Floats:
     return own + np.einsum("pri,ij,prj->pr", total, found.covariance, total)
 
 
-def _estimated(found: Whole, noise: Noise) -> tuple[Noise, float]:
-    """Noise that the residuals show, and the degrees of freedom that the error of the loops rests on."""
+def _usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:
+    """Error of a joint value before anything was read, m, and its weight in degrees of freedom."""
+    if np.isfinite(holds.tension_N).any():
+        return _FLOOR * robot.span_m, _LEAST_DEGREES
+    return _BLIND * robot.span_m, _BLIND_DEGREES
+
+
+def _noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, float]:
+    """Logarithms of the noises of loops and balance that the residuals show, and the degrees of freedom of the first.
+
+    Restricted maximum likelihood; the usual error of the loops, `usual_m`, is `worth` some degrees of freedom.
+    """
     e, robot, stated = found.equations, found.unknowns.robot, found.unknowns.errors.joint_m
 
-    def shown(rows: str, sd: float, usual: float) -> tuple[float, float]:
-        """Restricted maximum likelihood, with `usual` worth one degree of freedom."""
+    def shown(rows: str, sd: float, usual: float, worth: float) -> tuple[float, float]:
         residual = e.residual[:, e.rows[rows]]
         left = 1.0 - _leverage(found, e.rows[rows])
         squares = float((residual**2).sum()) * sd**2
-        free = float(np.maximum(left, 0.0).sum()) + _LEAST_DEGREES
-        return float(np.sqrt((squares + _LEAST_DEGREES * usual**2) / free)), free
+        free = float(np.maximum(left, 0.0).sum()) + worth
+        return float(np.sqrt((squares + worth * usual**2) / free)), free
 
-    def ahead(old: float, new: float, low: float, high: float) -> float:
-        return float(np.clip(old * (new / old) ** _AHEAD, low, high))
-
-    balance, _ = shown("balance", noise.balance, FRICTIONLESS)
-    noise = replace(noise, balance=ahead(noise.balance, balance, 1e-2 * FRICTIONLESS, 1e2))
+    balance, _ = shown("balance", found.noise.balance, FRICTIONLESS, _LEAST_DEGREES)
+    balance = float(np.clip(balance, 1e-2 * FRICTIONLESS, 1e2))
     if stated is not None:
-        return noise, np.inf
-    floor = _FLOOR * robot.span_m
-    joint, degrees = shown("loop", noise.joint_m, floor)
-    return replace(noise, joint_m=ahead(noise.joint_m, joint, 1e-2 * floor, robot.span_m)), degrees
+        return np.log([found.noise.joint_m, balance]), np.inf
+    joint, degrees = shown("loop", found.noise.joint_m, usual_m, worth)
+    return np.log([np.clip(joint, 1e-2 * usual_m, robot.span_m), balance]), degrees
 
 
 def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> State:
@@ -348,19 +438,23 @@ def _shown(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: 
 def trust(found: Whole) -> float:
     """Probability of residuals and estimates this far from model and priors: `trust.joint_test`.
 
-    A hold's own unknowns have no prior, so each of them costs a degree of freedom; a tension that nobody read costs
-    what its usual value leaves open, and is not tested itself. Geometry and references are tested alone too.
+    A hold's own unknowns have no prior, so each of them costs a degree of freedom. Geometry and references are tested
+    alone too, and so are tensions that nobody read: far outside the range that the robot's file allows, they show that
+    lengths and geometry contradict each other.
     """
     e, unknowns = found.equations, found.unknowns
-    d, rows = unknowns.robot.degrees, e.rows["tension"]
+    rows = e.rows["tension"]
     unread = ~e.known[:, rows]
-    alone = found.hold_covariance - found.by_robot @ found.covariance @ found.by_robot.swapaxes(1, 2)
-    open_ = np.einsum("pii->pi", alone)[:, d:][unread] / found.noise.pull_N**2
-    count = float(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2] + float(open_.sum())
-    cost = found.cost - float((e.residual[:, rows][unread] ** 2).sum())
+    open_ = float(_leverage(found, rows)[unread].sum())
+    beyond = float((e.residual[:, rows][unread] ** 2).sum())
+    count = float(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2] + open_
     first = np.r_[0 : unknowns.slices["wires"].start, unknowns.references]
     white, spread = found.state.white[first], found.covariance[np.ix_(first, first)]
-    return float(joint_test(np.array([cost]), max(count, 1.0), white[None], spread[None], len(first))[0])
+    p = float(joint_test(np.array([found.cost - beyond]), max(count, 1.0), white[None], spread[None], len(first))[0])
+    if not unread.any():
+        return p
+    tensions = float(chi2.sf(beyond, max(unread.sum() - open_, 1.0)))
+    return min(1.0, 1.5 * p, 3.0 * tensions)  # p has the better of two tests times two
 
 
 def misfit(found: Whole) -> float:

@@ -103,6 +103,7 @@ def answer(
     if inexact:  # how far from exact the joint values are tells more than that there is no answer
         unknowns = replace(unknowns, errors=replace(errors, joint_m=None))
         found = best(unknowns, holds, rng)
+    unknowns = found.unknowns
     plain = whole.estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
     seen = identified(found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
