@@ -36,7 +36,11 @@ KINDS = {
     "unheld": Kind("No tensions hold the platform at a pose, or not those of every draw.", True),
     "fall": Kind("The platform falls or loses its hold, or is close to it.", True),
     "slack": Kind("A wire goes slack, or keeps little of its tension.", True),
-    "break": Kind("The tension falls to nothing and stays there: the wire broke or slipped.", True),
+    "break": Kind(
+        "The tension falls to nothing, or a displacement under weights jumps, and stays there: the wire broke or "
+        "slipped.",
+        True,
+    ),
     "saturation": Kind("A sensor or its amplifier stood at its upper limit while the setting moved.", True),
     "clipped": Kind("A sensor or its amplifier stood at its lower limit while the setting moved.", True),
     "tared": Kind(

@@ -78,6 +78,48 @@ def test_a_fall_counts_where_next_to_nothing_is_left(sound, share, named):
     assert bool(gross_events.of_readings(protocol, tension, 0.01)) == named
 
 
+HUNG = WIRE | {"sensor_sd": 0.003, "setting_sd": 0.002}
+TWICE = (2.0, 4.0, 6.0, 8.0, 6.0, 4.0)
+
+
+def hung(seed=0, weights=TWICE):
+    """Protocol and (H, R) displacements of a test under weights."""
+    made = draw([Bench(weights_N=weights, resolution_mm=0.001)], Truth(HUNG), seed)
+    return made.problem.samples[0].protocol, made.problem.samples[0].readings[..., 0]
+
+
+@pytest.mark.parametrize(
+    ("jump", "hold", "found"),
+    [(15.0, 4, True), (-15.0, 4, True), (1.0, 4, False), (15.0, 6, True), (-15.0, 6, False)],
+)
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])
+def test_a_line_that_breaks_under_weights_is_named(jump, hold, found, scale):
+    """In hold 6 the weight is less than before: the line may give back what it likes."""
+    protocol, read = hung()
+    read = read.copy()
+    read[hold - 1, 3:] += jump
+    read[hold:] = read[hold - 1, -1] if found else read[hold:] + jump  # the gauge stays where the line left it
+    events = gross_events.of_readings(protocol, scale * read, scale * 0.001)
+    assert [event.kind for event in events] == ["break"] * found
+    if found:
+        assert len(events[0].readings) == 2 + 5 * (len(read) - hold)
+        assert f"in hold {hold} from 90 s on and stays there" in events[0].text
+
+
+def test_a_jump_counts_where_it_exceeds_all_elongation_before():
+    protocol, read = hung(weights=(2.0, 4.0, 6.0))
+    before = float(np.ptp(read.ravel()[:13]))
+    for share, found in ((0.95, False), (1.05, True)):
+        jumped = read.copy()
+        jumped[2, 3:] = read[2, 2] + share * before
+        assert bool(gross_events.of_readings(protocol, jumped, 0.001)) == found
+
+
+def test_sound_tests_under_weights_have_no_break():
+    steep = (0.5, 1.0, 4.0, 16.0, 2.0, 20.0)
+    assert not any(gross_events.of_readings(*hung(seed, w), 0.001) for seed in range(20) for w in (TWICE, steep))
+
+
 def test_a_wire_that_goes_slack_on_unloading_is_no_break(sound):
     protocol, tension = sound
     protocol = replace(protocol, setting=np.concatenate([protocol.setting[:11], [1.0]]))

@@ -23,6 +23,7 @@ KEPT = 0.7  # of its first reading a hold keeps until a fall that is one; a wire
 FEWEST, KEPT_IN_ALL = 3, 0.85  # earlier holds that show how little the wire relaxes, where its own hold cannot
 SUDDEN = 3.0  # times the time of the reading before: by then creep has gone on little further
 STAYED = 0.5  # of the reading before a dropout: the wire is still there; less is another zero
+JUMP = 1.0  # of all elongation before, beyond what a further weight adds: no creep from one reading to the next
 AT_LIMIT = 3  # readings at one value, in two holds at least
 MOVED = 5.0  # steps and noise levels by which readings at a limit should differ: not by chance the same
 
@@ -109,7 +110,9 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
         "tension" if forces else "displacement", "N" if forces else "mm",
     )  # fmt: skip
     # an elongation that returns to zero is a recovery, not a fall to nothing
-    found = [*(_falls(test) if forces else []), *_limits(test, resolution)]
+    found = _falls(test) if forces else _jumps(test)
+    away = [i for event in found for i in event.readings]
+    found += [event for event in _limits(test, resolution) if not np.isin(event.readings, away).all()]
     return sorted(found, key=lambda event: int(event.readings[0]))
 
 
@@ -229,6 +232,33 @@ def _fall(test: _Test, begin: int, end: int) -> Event:
         "readings out, or add the tension that was taken off"
     )
     return Event("tared", text, np.arange(begin, len(read)))
+
+
+def _jumps(test: _Test) -> list[Event]:
+    """The readings from where a displacement under weights leaves its course, never to come back, if it does.
+
+    What a further weight adds is taken from the holds before. A hold with less weight than the one before may give back
+    what it likes, and the first two holds have nothing to compare with.
+    """
+    read, weight = test.read, test.setting
+    for i in np.flatnonzero(test.hold >= 2):
+        begins = test.hold[i] != test.hold[i - 1]
+        sudden = begins or test.time_s[i] <= SUDDEN * test.time_s[i - 1]
+        if not sudden:
+            continue
+        before, hung = np.ptp(read[:i]), np.ptp(weight[:i])
+        added = before / hung * (weight[i] - weight[i - 1]) if hung > 0.0 else 0.0
+        jump = read[i] - read[i - 1] - added
+        if jump < 0.0 and weight[i] < weight[test.hold < test.hold[i]][-1]:
+            continue
+        stayed = bool(((read[i:] - read[i - 1]) * np.sign(jump) >= STAYED * abs(jump)).all())
+        if abs(jump) > max(JUMP * before, MOVED * test.noise) and stayed:
+            text = (
+                f"displacement jumps by {jump:.3g} mm in {test.place(i)} and stays there: did the wire break or slip? "
+                "leave these readings out"
+            )
+            return [Event("break", text, np.arange(i, len(read)))]
+    return []
 
 
 def _limits(test: _Test, resolution: float) -> list[Event]:
