@@ -241,7 +241,7 @@ def _jumps(test: _Test) -> list[Event]:
     what it likes, and the first two holds have nothing to compare with.
     """
     read, weight = test.read, test.setting
-    for i in np.flatnonzero(test.hold >= 2):
+    for i in np.flatnonzero(test.hold >= 2).tolist():
         begins = test.hold[i] != test.hold[i - 1]
         sudden = begins or test.time_s[i] <= SUDDEN * test.time_s[i - 1]
         if not sudden:
