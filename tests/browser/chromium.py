@@ -112,10 +112,10 @@ class Tab:
             self.call("Input.dispatchDragEvent", type=kind, x=box[0], y=box[1], data=data)
 
     def click(self, text: str) -> None:
-        """Press the button or follow the link that says `text`."""
-        self.run(
-            f"[...document.querySelectorAll('button, a')].find(e => e.innerText.trim() == {json.dumps(text)}).click()"
-        )
+        """Press the button or follow the link that says `text`, once it is there."""
+        found = f"[...document.querySelectorAll('button, a')].find(e => e.innerText.trim() == {json.dumps(text)})"
+        self.wait_for(found)
+        self.run(f"{found}.click()")
 
     def run(self, script: str) -> Any:
         """The value of an expression in the page, once its promise is kept."""

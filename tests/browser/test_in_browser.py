@@ -158,6 +158,37 @@ def test_nothing_is_cut_off_or_asked_from_outside(kind, pages, tab):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_the_first_screen_of_a_desk_holds_the_answer(kind, pages, tab):
+    """Everything that is rendered within 900 px: the sentence that answers, whole, with its numbers."""
+    tab.open(pages[kind], 1280)
+    lead = tab.run("document.querySelector('.lead').textContent")
+    seen = tab.run(FIRST_SCREEN)
+    assert " ".join(lead.split()) in seen
+    assert any(c.isdigit() for c in lead)
+
+
+# the text whose lines all end above the fold
+FIRST_SCREEN = """(() => {
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), range = document.createRange();
+  const seen = [];
+  for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+    range.selectNodeContents(node);
+    const box = range.getBoundingClientRect();
+    if (box.height > 0 && box.bottom <= 900) seen.push(node.textContent);
+  }
+  return seen.join(" ").replace(/\\s+/g, " ");
+})()"""
+
+
+def test_a_link_opens_the_section_that_is_folded(pages, tab):
+    tab.open(pages["reproduce"], 1280)
+    folded = "[...document.querySelectorAll('section > details')]"
+    assert tab.run(f"{folded}.filter(d => !d.open).length") > 5
+    tab.run("document.querySelector('nav a[href=\"#figures-1-to-4\"]').click()")
+    tab.wait_for("document.querySelector('#figures-1-to-4 > details').open")
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_axe_finds_nothing_wrong(kind, pages, tab):
     for width in (WIDTHS[0], WIDTHS[-1]):
         tab.open(pages[kind], width)

@@ -1,6 +1,14 @@
-// Tables can be sorted by any column: the headings become buttons, so that the keyboard works as well.
+// Tables can be sorted by any column: the headings become buttons, so that the keyboard works as well. A link to a
+// section that is folded opens it.
 "use strict";
 (() => {
+  const unfold = () => {
+    const section = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const folded = section && section.querySelector(":scope > details");
+    if (folded) folded.open = true;
+  };
+  addEventListener("hashchange", unfold);
+  unfold();
   const raised = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻";
   const number = text => {  // the first number of a cell as the page writes them: thin spaces, minus signs, powers of ten
     const match = text.replace(/[\u202f\u2009]/g, "").replace(/−/g, "-").match(/-?\d*\.?\d+(?:·10([⁰-⁹¹²³⁻]+))?/);

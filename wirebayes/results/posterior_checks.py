@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
 from wirebayes.model.problem import FINEST, Sample
@@ -45,7 +46,8 @@ def warnings(fit: Fit, sample: Sample) -> list[Notice]:
         stated = {name for name in ("k1", "preload") if fit.problem.column(name, sample) in fit.problem.stated}
         of_readings += data_checks.one_hold(sample.protocol, stated)
     first = sample is fit.problem.samples[0]
-    columns = [name for name in fit.problem.names if _belongs(name, sample, shared=first)]
+    latent = f"{Discrepancy.name}."  # values of a smooth curve, of which nobody knows anything to state
+    columns = [n for n in fit.problem.names if _belongs(n, sample, shared=first) and not n.startswith(latent)]
     return [*of_readings, *of_posterior(own, prior, sample), *leaning(fit.problem.prior, theta, columns)]
 
 

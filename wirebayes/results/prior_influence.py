@@ -8,6 +8,7 @@ from scipy import stats
 
 from wirebayes.model.prior import Prior, fast_logpdf, logit_normal
 from wirebayes.notice import Notice
+from wirebayes.sentences import listed
 from wirebayes.typing import Array
 
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about
@@ -15,7 +16,7 @@ MOVED = 1.0  # posterior standard deviations by which an end of the 90 % interva
 
 
 def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
-    """A sentence for each prior that decides an interval.
+    """A sentence on the priors that decide an interval, or none.
 
     The posterior under a wider prior is that of the draws, weighted by the ratio of the two priors.
 
@@ -31,7 +32,8 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
     spread = np.maximum(theta.std(axis=0, ddof=1), np.finfo(float).tiny)
     known = prior.known(theta)
     order = np.argsort(theta, axis=0)
-    out = []
+    deciding: list[str] = []
+    open_ones: set[int] = set()
     for name in columns:
         i = prior.names.index(name)
         wide = _wider(prior.distributions[name])
@@ -42,8 +44,9 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
         after = np.stack([_weighted_ends(theta[order[:, j], j], weight[order[:, j]]) for j in range(theta.shape[1])], 1)
         moved = np.abs(after - before).max(axis=0) > MOVED * spread
         if moved.any():
-            out.append(_notice(name, [prior.names[j] for j in np.flatnonzero(moved)]))
-    return out
+            deciding.append(name)
+            open_ones.update(map(int, np.flatnonzero(moved)))
+    return [_notice(deciding, [prior.names[j] for j in sorted(open_ones)])] if deciding else []
 
 
 _ENDS = (0.05, 0.95)  # of the interval that is reported
@@ -70,10 +73,13 @@ def _wider(distribution: Any) -> Any:
     return None
 
 
-def _notice(name: str, moved: Sequence[str]) -> Notice:
+def _notice(deciding: Sequence[str], moved: Sequence[str]) -> Notice:
     what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {', '.join(moved)}"
+    keys = ", ".join(dict.fromkeys(f"[prior.{name.split('[')[0]}]" for name in deciding))
+    named = listed(deciding)
+    whose, decide = ("prior", "prior decides") if len(deciding) == 1 else ("priors", "priors decide")
     return Notice(
         "prior",
-        f"with the prior of {name} twice as wide, {what} would move by more than a standard deviation: the readings "
-        f"leave it open, and the prior decides; state what is known of {name} ([prior.{name.split('[')[0]}])",
+        f"with the {whose} of {named} twice as wide, {what} would move by more than a standard deviation: the readings "
+        f"leave it open, and the {decide}; state what is known of {named} ({keys})",
     )

@@ -12,6 +12,19 @@ def in_a_minute(tables: dict[str, Rows]) -> Columns:
     return Columns([_measured(tables["measured"]), _known(tables), _open(tables)])
 
 
+def answer(rows: Rows) -> str:
+    """The creep of each wire in a sentence, as one history."""
+    first = [row for row in rows if row["likelihood"] == "chain" and row["time_s"] == TWO_MINUTES_S]
+    creep = [
+        f"{unbroken(r)} {number(r['q50_mm'])} mm ({span(r['q05_mm'], r['q95_mm'])}) under {r['tension_N']:.1f} N"
+        for r in first
+    ]
+    return f"Creep within two minutes: {'; '.join(creep)}; intervals hold 90 %."
+
+
+TWO_MINUTES_S = 120.0  # the paper's longest hold
+
+
 def _measured(rows: Rows) -> Points:
     samples = listed([f"{row['material']} ({row['length_mm'] / 1000:g} m)" for row in rows])
     losses = [row["median_loss_percent"] for row in rows]

@@ -8,7 +8,7 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded, files_beside
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import paper_tables
-from wirebayes.report.pages.paper_summary import in_a_minute, of_table_4, unbroken
+from wirebayes.report.pages.paper_summary import answer, in_a_minute, of_table_4, unbroken
 from wirebayes.report.pages.paper_tables import LEAST_COVERAGE, Rows
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.sentences import listed
@@ -34,11 +34,13 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(Section("The robot in three dimensions", robot_view(folder / "figures")))
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(_TERMS))
+    about = (
+        "A paper measured four wires that are held at a stretch and lose tension, and published five numbers for each. "
+        "Here are its tables again, with what they leave open: how well each number is known."
+    )
     return Page(
         "Four wires that creep",
-        "A wire held at a fixed stretch loses tension with time. A paper measured this on four wires and published "
-        "five numbers for each. Here are its tables again, with an answer to what the numbers leave open: how well "
-        "each is known.",
+        f"{answer(tables['creep'])} {about}" if tables.get("creep") else about,
         [section for section in sections if section.blocks],
         f"Seed {configuration.get('seed')}. The tables beside this page (CSV and JSON) hold every number shown; each "
         "fit has a folder with posterior.nc, which opens with ArviZ.",
@@ -107,7 +109,11 @@ def _table_4(tables: Tables, gallery: Gallery) -> Section:
             )
         )
     caption = "One history, creep saturating towards B τᵁ, law (1)."
-    return Section("Table 4 reproduced", [*blocks, paper_tables.table_4(rows, "chain", "saturating", "hooke", caption)])
+    return Section(
+        "Table 4 reproduced",
+        [*blocks, paper_tables.table_4(rows, "chain", "saturating", "hooke", caption)],
+        folded=True,
+    )
 
 
 def _table_4_otherwise(tables: Tables, gallery: Gallery) -> Section:
@@ -131,7 +137,7 @@ def _known(tables: Tables, gallery: Gallery) -> Section:
         "scale the interval has not shrunk to a third of its width before the test."
     )
     table = paper_tables.posterior(tables["posterior"], caption)
-    return Section("What the readings say about each published value", [words, *gallery("known"), table])
+    return Section("What the readings say about each published value", [words, *gallery("known"), table], folded=True)
 
 
 def _figures(tables: Tables, gallery: Gallery) -> Section:
@@ -142,7 +148,7 @@ def _figures(tables: Tables, gallery: Gallery) -> Section:
         "reading, nothing else."
     )
     rest = Text("All unused holds in the same way: what is left when the prediction is taken from the measurement.")
-    return Section("Figures 1 to 4", [words, *gallery("figures-1-to-4"), rest, *gallery("unused-hold")])
+    return Section("Figures 1 to 4", [words, *gallery("figures-1-to-4"), rest, *gallery("unused-hold")], folded=True)
 
 
 def _cannot_know(tables: Tables, gallery: Gallery) -> Section:
@@ -156,7 +162,9 @@ def _cannot_know(tables: Tables, gallery: Gallery) -> Section:
         "the same, most of all on nylon and the kite line: hold by hold, amount and rate are nearly inseparable, "
         "and the prior decides."
     )
-    return Section("What Table 4 does not determine", [ridge, *gallery("ridge"), rate, *gallery("amount-and-rate")])
+    return Section(
+        "What Table 4 does not determine", [ridge, *gallery("ridge"), rate, *gallery("amount-and-rate")], folded=True
+    )
 
 
 def _held_out(tables: Tables, gallery: Gallery) -> Section:
@@ -182,7 +190,9 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
         "Predictions of the unused holds from the first five. A band counts as reliable when at least "
         f"{100 * LEAST_COVERAGE:.0f} % of the readings lie in it; 90 % should."
     )
-    return Section("Where the model fails", [*blocks, *gallery("unused-chain"), paper_tables.held_out(rows, caption)])
+    return Section(
+        "Where the model fails", [*blocks, *gallery("unused-chain"), paper_tables.held_out(rows, caption)], folded=True
+    )
 
 
 def _creep(tables: Tables, gallery: Gallery) -> Section:
@@ -191,7 +201,9 @@ def _creep(tables: Tables, gallery: Gallery) -> Section:
         "geometric mean of its measured tensions, held constant."
     )
     caption = "Only 2 min lies within what was measured; an hour and a day are extrapolated."
-    return Section("Creep after two minutes, an hour, a day", [words, paper_tables.creep(tables["creep"], caption)])
+    return Section(
+        "Creep after two minutes, an hour, a day", [words, paper_tables.creep(tables["creep"], caption)], folded=True
+    )
 
 
 def _robot(tables: Tables, gallery: Gallery) -> Section:
@@ -207,7 +219,9 @@ def _robot(tables: Tables, gallery: Gallery) -> Section:
     blocks.append(paper_tables.robot(tables["robot"]))
     if "robot_mass" in tables:
         blocks.append(paper_tables.robot_mass(tables["robot_mass"]))
-    return Section("What it means for a robot", [*blocks, *gallery("robot"), *gallery("robot-map", small=True)])
+    return Section(
+        "What it means for a robot", [*blocks, *gallery("robot"), *gallery("robot-map", small=True)], folded=True
+    )
 
 
 def _claim(rows: Rows) -> str:
@@ -235,7 +249,7 @@ def _computed(tables: Tables, gallery: Gallery) -> Section:
         "included; autocorrelation time and ESS are those of the worst parameter."
     )
     prior = Text("Prior predictions of each test (grey), and the measurements:")
-    return Section("How it was computed", [words, paper_tables.sampling(rows), prior, *gallery("prior")])
+    return Section("How it was computed", [words, paper_tables.sampling(rows), prior, *gallery("prior")], folded=True)
 
 
 _SECTIONS: tuple[tuple[tuple[str, ...], Callable[[Tables, Gallery], Section]], ...] = (
