@@ -107,7 +107,7 @@ def of_batch(found: BatchJson) -> list[str]:
     rows, far = found["experiments"], found["outliers"]
     failed = sum(row["error"] is not None for row in rows)
     converged = sum(bool(row["converged"]) for row in rows)
-    lines = [f"{len(rows)} experiments: {converged} converged, {failed} failed"]
+    lines = [f"{counted(len(rows), 'experiment')}: {converged} converged, {failed} failed"]
     verdicts = Counter(row["verdict"] for row in rows if row["verdict"])
     if verdicts:
         lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
@@ -176,6 +176,25 @@ _SHOWS = {
     "if unusually large": "effects that would be detected if unusually large",
     "no": "effects that it cannot show",
 }
+
+
+def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
+    """The stiffness as a quick look has it, what only the prior says, and how many effects the test would show.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment.
+    test : dict
+    """
+    alone = [parameter for parameter, p in test["parameters"].items() if p["determined_by"] == "prior"]
+    known = "k1" in test["parameters"] and "k1" not in alone
+    said = [f"k1 is about {_with_unit(test['parameters']['k1'])}"] if known else []
+    said += [f"it does not determine {listed(alone)}"] if alone else ["every parameter is determined by the readings"]
+    shown = sum(effect["shows"] == "yes" for effect in test["effects"].values())
+    said.append(f"it would show {shown} of {counted(len(test['effects']), 'effect')}")
+    many = f"{counted(test['recorded_holds'], 'hold')} with {counted(test['readings'], 'reading')}"
+    return f"{name}, {many}: {', '.join(said)}; intervals hold 90 %."
 
 
 def _size(effect: str, found: EffectSize) -> str:
@@ -350,7 +369,9 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     materials = {row["material"] for row in rows if row["material"]}
     kinds = f"{len(materials)} materials" if len(materials) > 1 else "one material"
     failed = [row["name"] for row in rows if row["error"]]
-    out = [f"{_count(len(rows), 'test')} of {kinds}: {sum(bool(row['converged']) for row in rows)} converged."]
+    many = _count(len(rows), "test")
+    converged = sum(bool(row["converged"]) for row in rows)
+    out = [f"{many[:1].upper()}{many[1:]} of {kinds}: {converged} converged."]
     out += [f"Not fitted: {_some(failed)}."] if failed else []
     clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
     out += [f"Nothing is missing in {_count(len(clean), 'test')}."] if clean else []

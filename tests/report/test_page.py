@@ -325,6 +325,7 @@ def test_the_page_of_a_check_says_what_is_odd_and_what_the_test_cannot_tell(tmp_
     content = {"experiments": {"wire-a": CHECKED}}
     page = read(write(folder_of(tmp_path / "out", "check", check=content)))
     assert "Hold 2 repeats hold 1." in page.words and "0.00123" in page.words
+    assert "it does not determine k1, it would show" in page.words and "k1 is about" not in page.words
     assert (
         "Effects it cannot show: guide friction." in page.words
         and "Parameters it does not determine: k1." in page.words
@@ -337,11 +338,13 @@ def test_the_page_of_an_import_says_what_was_done(tmp_path):
         "holds": 3,
         "readings": 9,
         "length_mm": 1000.0,
+        "material": "line",
         "notes": ["decimal comma"],
         "warnings": [],
     }
     content = {"experiments": {"wire-a": about}}
     page = read(write(folder_of(tmp_path / "out", "import", **{"import": content})))
+    assert "wire-a: 3 holds, 9 readings, 1000 mm of line." in page.words
     assert "From bench.xlsx." in page.words and "Decimal comma." in page.words
 
 

@@ -23,10 +23,12 @@ from wirebayes.report.blocks import (
     drawn,
     files_beside,
     number,
+    unit_text,
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
+from wirebayes.results.store import unit_of
 
 _MOST_WARNINGS = 10  # shown at once; more push the summary's pictures off the screen
 _MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all
@@ -112,9 +114,14 @@ def _table(rows: list[Row]) -> list[Block]:
         ]
         for row in rows[:_MOST_ROWS]
     ]
-    header = ["experiment", "material", "converged", *_SHOWN, "verdict", "best effect"]
+    header = ["experiment", "material", "converged", *map(_with_unit, _SHOWN), "verdict", "best effect"]
     more = f"The first {_MOST_ROWS} of {len(rows)}. " if len(rows) > _MOST_ROWS else ""
     return [Table(header, lines, more + "Posterior medians; intervals stand in summary.csv.")]
+
+
+def _with_unit(name: str) -> str:
+    unit = unit_text(unit_of(name))
+    return f"{name}, {unit}" if unit else name
 
 
 def _value(row: Row, name: str) -> str:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import check_in_a_sentence, of_import
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
@@ -35,6 +36,7 @@ _FILES = (
     ("check.json", "every number of this page as JSON"),
     ("configuration.json", "the options of this run, with version and seed"),
 )
+_MOST_SENTENCES = 3  # of experiments at the top of a page, which a first screen holds
 _DETERMINED_BY = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
 
 
@@ -44,14 +46,15 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     if configuration["command"] == "import":
         imported: ImportJson = read_json(folder / "import.json")
         sections = [Section(name, _imported(e, _picture(folder, name))) for name, e in imported["experiments"].items()]
-        lead = "A file of a bench, as it was understood: look at it before you fit."
+        understood = "; ".join(of_import(name, e)[0] for name, e in imported["experiments"].items())
+        lead = f"{understood}. Look at the picture before you fit."
         return Page("What was imported", lead, [*sections, files])
     checked: CheckJson = read_json(folder / "check.json")
     found = checked["experiments"]
     sections = [Section(name, _checked(e, _picture(folder, name))) for name, e in found.items()]
     effects = [effect for e in found.values() for effect in e["effects"]]
     sections += [files, meaning(("hold", "90 % interval", "prior"), effects)]
-    lead = "What was understood of the readings, what is suspicious, and what such a test can and cannot determine."
+    lead = " ".join(check_in_a_sentence(name, e) for name, e in list(found.items())[:_MOST_SENTENCES])
     return Page("What this test can determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 

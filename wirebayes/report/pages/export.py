@@ -28,8 +28,6 @@ _FILES = (
     ("reprapfirmware.g", "lines for config.g of RepRapFirmware"),
     ("klipper.cfg", "sections for printer.cfg of Klipper"),
     ("robot.xml", "the robot for MuJoCo"),
-    ("robot.urdf", "the robot for ROS and other simulators"),
-    ("robot.sdf", "the robot for Gazebo"),
     ("robot.urdf", "its bodies and frames for ROS and others, without wires"),
     ("robot.sdf", "the same for Gazebo"),
     ("export.json", "the table and the warnings as JSON"),
@@ -65,7 +63,13 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         Section("Creep of the line", [words, Pictures(pictures), Table(header, lines, caption)]),
         meaning(("90 % interval",), model=False),
     ]
-    lead = "A fitted line as settings for firmware and simulators."
+    last = rows[-1]
+    grown = f"{number(float(last['q50_mm_per_m']))} mm"
+    interval = span(float(last["q05_mm_per_m"]), float(last["q95_mm_per_m"]))
+    lead = (
+        f"A metre of the line grows by {grown} ({interval}) under {float(last['tension_N']):g} N within "
+        f"{float(last['time_s']):g} s; the interval holds 90 %. Settings for firmware and simulators know springs only."
+    )
     return Page("Settings for a robot", lead, sections, f"Seed {configuration.get('seed')}.")
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers import of_pose
 from wirebayes.json_files.pose_history import HistoryOfRobot, PoseHistoryJson
 from wirebayes.json_files.values import INTERVAL, Band, Numbers
 from wirebayes.report.blocks import (
@@ -58,8 +59,8 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
     Page
     """
     measured = pose["history"]["kind"] == "measured"
-    lead = "Where the platform was, from measured joint values." if measured else "Where commanded poses lead."
-    lead += " The wires' creep is carried through the whole history of their tensions."
+    about = "from measured joint values" if measured else "where commanded poses lead"
+    lead = f"{of_pose(pose)[-1]}, {about}; the interval holds 90 %."
     if not pose["feasible"]:
         return Page(f"Robot {pose['robot']}", lead, [Section("Summary", before_the_answer(pose))])
     columns = Columns([Points("What was computed", _requested(pose)), *_answers(pose)])

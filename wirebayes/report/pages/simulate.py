@@ -23,6 +23,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import SYMBOLS, meaning, spoken
 from wirebayes.results.store import unit_of
+from wirebayes.sentences import counted, listed
 
 _MOST = 12  # tests of which a page shows the readings
 _FILES = (
@@ -44,7 +45,8 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
         sections.append(Section("More tests", [more]))
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(("hold",), configuration["effects"]))
-    lead = "Tests that were never done: readings of an invented wire, whose true parameters are known."
+    stiff = listed([f"{number(truth['parameters']['k1'])} N" for truth in list(truths.values())[:_MOST]])
+    lead = f"Invented readings of {counted(len(experiments), 'test')}, whose true parameters are known: k1 is {stiff}."
     return Page("Simulated tests", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
