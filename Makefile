@@ -33,7 +33,7 @@ lowest:
 coverage: export COVERAGE_CORE ?= $(shell $(PYTHON) -c 'import sys; print("ctrace" if sys.version_info < (3, 12) else "sysmon")')
 coverage: lint
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not slow and not browser" --cov=wirebayes --cov-report=
-	$(BIN)/python -m analyses.lines_run
+	$(BIN)/python -m analyses.project.lines_run
 	$(BIN)/coverage report --skip-covered --show-missing
 
 lint: .venv/test.stamp
@@ -51,8 +51,8 @@ mutants: .venv/test.stamp
 	$(BIN)/python -m analyses.mutants --output out/mutants
 
 benchmark: .venv/test.stamp
-	$(BIN)/python analyses/robot_speed.py
-	$(BIN)/python analyses/robot_agreement.py
+	$(BIN)/python analyses/robots/speed.py
+	$(BIN)/python analyses/robots/agreement.py
 	$(BIN)/python -m analyses.benchmarks.cost --output out/benchmarks
 	$(BIN)/python -m analyses.benchmarks.profile --output out/benchmarks
 	test -x .venv-benchmark/bin/python || $(PYTHON) -m venv .venv-benchmark

@@ -21,11 +21,11 @@ ROOT = DOCS.parent
 RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
 STUDIES = {
-    "any_scale": ("-m analyses.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
-    "weights": ("-m analyses.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
-    "coverage": ("-m analyses.coverage --output {folder}", "coverage.json"),
-    "robot_agreement": ("analyses/robot_agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
-    "real_wires": ("analyses/discover_real_wires.py --output {folder}/wires.json", "wires.json"),
+    "any_scale": ("-m analyses.posterior.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
+    "weights": ("-m analyses.posterior.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
+    "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
+    "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
+    "real_wires": ("analyses/discovery/real_wires.py --output {folder}/wires.json", "wires.json"),
 }
 _BLOCK = re.compile(r"(<!-- measured -->\n).*?(<!-- end -->)", re.DOTALL)
 

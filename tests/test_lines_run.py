@@ -1,6 +1,6 @@
 """The table of lines that the tests run."""
 
-from analyses.lines_run import HOME, shares, table
+from analyses.project.lines_run import HOME, shares, table
 
 
 class Half:

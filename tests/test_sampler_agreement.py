@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analyses.sampler_agreement import agreement
+from analyses.posterior.sampler_agreement import agreement
 
 
 @pytest.mark.parametrize("times", [1.0, 9.0])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wirebayes as wb
-from analyses.recordings import Drive, imported
-from analyses.recordings import record as recorded
+from analyses.field.recordings import Drive, imported
+from analyses.field.recordings import record as recorded
 from wirebayes.io.bench.convert import About, convert
 from wirebayes.io.bench.plateaus import plateaus
 from wirebayes.io.bench.thinning import KEPT, MOST, thinned

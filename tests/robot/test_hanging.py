@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyses.robot_hanging import compared, drawn
+from analyses.robots.hanging import compared, drawn
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.motion import hanging, inverse

@@ -1,0 +1,160 @@
+"""Do 90 % intervals hold the truth at any scale, under steps and under weights, with rests that are recorded or none?
+
+``python -m analyses.posterior.any_scale --tests 300``: one test after the other from thread under millinewtons to
+mooring rope under meganewtons; every third is under weights, every third of steps and of weights rests before each
+move. All are fitted with the default priors. Truths come from ranges of real lines, not from these priors: creep as a
+share of the elastic stretch, its median time as a share of a hold, errors as shares of a step and of what is read.
+Each parameter is counted by itself.
+"""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analyses.resumable import records
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import frozen
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.problem import build
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+
+SHARES = np.array([0.0, 0.02, 0.06, 0.15, 0.35, 0.7, 1.0])  # of a hold, when it is read
+REST = 1.4  # of a hold, until the next move, where the wire rests before it
+PLAIN = ("k1", "B", "U", "k2", "N", "preload", "sensor_sd", "setting_sd")
+POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line and how it is tested.
+
+    Attributes
+    ----------
+    truth : dict
+        ``k1``, ``B``, ``U``, ``k2``, ``N``.
+    length_mm, tension_N, hold_s : float
+        Its length, the typical tension, how long it is held.
+    """
+
+    truth: dict[str, float]
+    length_mm: float
+    tension_N: float
+    hold_s: float
+
+    @property
+    def stretch_mm(self) -> float:
+        """Elastic stretch at the typical tension."""
+        return self.length_mm * self.tension_N / self.truth["k1"]
+
+
+def line(rng: np.random.Generator) -> Line:
+    """A line between thread and mooring rope."""
+    tension, length, hold_s = 10.0 ** rng.uniform((-3.0, 1.5, 1.0), (6.0, 4.5, 4.0))
+    strain = 10.0 ** rng.uniform(-2.7, -1.5)  # at the typical tension: 0.2 to 3 %
+    k1, U, N = tension / strain, rng.uniform(0.4, 1.2), rng.uniform(0.5, 1.1)
+    creep = strain * length * 10.0 ** rng.uniform(-1.5, -0.3)
+    k2 = np.log(2.0) / (hold_s * 10.0 ** rng.uniform(-1.2, 0.3)) ** N
+    return Line({"k1": k1, "B": creep / tension**U, "U": U, "k2": k2, "N": N}, length, tension, hold_s)
+
+
+def under_weights(made: Line, shares: Sequence[float], rng: np.random.Generator) -> tuple[Bench, dict[str, float]]:
+    """A dead-weight test, one in two partly down again, and the parameters of its own."""
+    holds = int(rng.integers(4, 9))
+    weights = made.tension_N * np.linspace(0.4, 1.6, holds)
+    if rng.random() < 0.5:
+        weights = np.concatenate([weights, weights[-3:-1][::-1]])
+    step = made.tension_N * 1.2 / (holds - 1)
+    own = {"preload": made.stretch_mm * rng.uniform(-0.2, 0.5), "sensor_sd": made.stretch_mm * _small(rng, -3.3, -2.3),
+           "setting_sd": step * _small(rng, -2.5, -1.2)}  # fmt: skip
+    times = (made.hold_s * np.array(shares)).tolist()
+    return Bench("weights", "line", made.length_mm, weights_N=weights.tolist(), resolution_mm=0.0, times_s=times), own
+
+
+def under_steps(made: Line, shares: Sequence[float], rng: np.random.Generator) -> tuple[Bench, dict[str, float]]:
+    """A step test, and the parameters of its own."""
+    holds = int(rng.integers(6, 11))
+    steps = made.stretch_mm * np.linspace(0.3, 1.8, holds)
+    own = {"preload": made.stretch_mm * rng.uniform(0.0, 0.3), "sensor_sd": made.tension_N * _small(rng, -3.3, -2.3),
+           "setting_sd": made.stretch_mm * 1.5 / (holds - 1) * _small(rng, -2.5, -1.2)}  # fmt: skip
+    times = (made.hold_s * np.array(shares)).tolist()
+    return Bench("steps", "line", made.length_mm, 0.0, displacements_mm=steps.tolist(), times_s=times), own
+
+
+def _small(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(10.0 ** rng.uniform(low, high))
+
+
+def measured(bench: Bench, truth: dict[str, float], seed: int, *, rests: bool = False) -> Experiment:
+    """The test with its readings; where it rests, the last moment of each hold is known, and not read.
+
+    Parameters
+    ----------
+    bench : Bench
+    truth : dict
+        All parameters.
+    seed : int
+    rests : bool
+    """
+    (sample,) = draw([bench], Truth(truth), seed).problem.samples
+    test = bench.experiment()
+    holds = []
+    for hold, y, mask in zip(test.holds, sample.readings[..., 0], sample.protocol.mask, strict=True):
+        count = int(mask.sum()) - rests
+        holds.append(replace(hold, time_s=frozen(hold.time_s[:count].tolist()), readings=frozen(y[:count].tolist())))
+    return replace(test, holds=tuple(holds))
+
+
+def one(seed: int, index: int) -> dict[str, Any]:
+    """One test: what was done, and which 90 % intervals hold the truth."""
+    own_seed = seed_of(seed, "any scale", str(index))
+    rng = np.random.default_rng(own_seed)
+    made = line(rng)
+    weights, rests = index % 3 == 0, index // 3 % 3 == 0
+    shares = [*SHARES, REST] if rests else list(SHARES)
+    bench, own = (under_weights if weights else under_steps)(made, shares, rng)
+    truth = made.truth | own
+    done = fit(build([measured(bench, truth, own_seed, rests=rests)]), own_seed, policy=POLICY)
+    low, high = np.quantile(done.flat, [0.05, 0.95], axis=0)
+    columns = {name: done.problem.names.index(name) for name in PLAIN}
+    inside = {name: bool(low[i] <= truth[name] <= high[i]) for name, i in columns.items()}
+    return {"index": index, "weights": weights, "rests": rests, "tension_N": made.tension_N,
+            "converged": done.converged, "inside": inside}  # fmt: skip
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Coverage of each parameter, over all tests and in each kind of test."""
+    kinds = {"all": rows, "weights": [r for r in rows if r["weights"]], "steps": [r for r in rows if not r["weights"]],
+             "rests": [r for r in rows if r["rests"]]}  # fmt: skip
+    out: dict[str, Any] = {"tests": len(rows), "not_converged": sum(not row["converged"] for row in rows)}
+    for kind, chosen in kinds.items():
+        hits = {name: [row["inside"][name] for row in chosen] for name in PLAIN}
+        out[kind] = {"tests": len(chosen), **{name: float(np.mean(hit)) for name, hit in hits.items()}}
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tests", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rows", type=Path, default=Path("out/any_scale"), help="where an interrupted run goes on")
+    parser.add_argument("--output", type=Path, default=Path("out/any_scale/any_scale.json"))
+    options = parser.parse_args()
+    cases = [(index,) for index in range(options.tests)]
+    path = options.rows / f"rows-seed{options.seed}.jsonl"
+    rows = records(path, partial(one, options.seed), cases, workers=options.workers)
+    result = summary(sorted(rows, key=lambda row: row["index"])[: options.tests])
+    write_json(options.output, result)
+    print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,81 @@
+"""One wire under steps and under weights: does each test hold the truth, and are both together sharper than either?
+
+``python -m analyses.posterior.weights --pairs 16``. Lines, tests and truths are those of
+`analyses.posterior.any_scale`.
+"""
+
+import argparse
+import json
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analyses.posterior.any_scale import POLICY, SHARES, Line, line, measured, under_steps, under_weights
+from analyses.resumable import records
+from wirebayes.inference.fit import fit, seed_of
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.problem import build
+from wirebayes.typing import Array
+
+KINDS = ("steps", "weights", "together")
+
+
+def log_creep(made: Line, B: Array, U: Array, k2: Array, N: Array) -> Array:
+    """(n,) logarithm of the creep of a fresh sample after one hold at the typical tension."""
+    return np.log(B * made.tension_N**U * -np.expm1(-k2 * made.hold_s**N))
+
+
+def one(seed: int, index: int) -> dict[str, Any]:
+    """A pair: of each fit the width of the 90 % interval of the log creep, and whether it holds the truth."""
+    own_seed = seed_of(seed, "weights", str(index))
+    rng = np.random.default_rng(own_seed)
+    made = line(rng)
+    tests = []
+    for test in (under_steps, under_weights):
+        bench, own = test(made, SHARES.tolist(), rng)
+        tests.append(measured(bench, made.truth | own, own_seed))
+    exact = log_creep(made, *(np.array(made.truth[name]) for name in ("B", "U", "k2", "N")))
+    row: dict[str, Any] = {"index": index}
+    for kind, chosen in zip(KINDS, ([tests[0]], [tests[1]], tests), strict=True):
+        done = fit(build(chosen), own_seed, policy=POLICY)
+        draws = (done.flat[:, done.problem.names.index(name)] for name in ("B", "U", "k2", "N"))
+        low, high = np.quantile(log_creep(made, *draws), [0.05, 0.95])
+        row[kind] = {"width": float(high - low), "inside": bool(low <= exact <= high), "converged": done.converged}
+    return row
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Median widths, how many intervals hold the truth, and how often both together are the sharpest."""
+    out: dict[str, Any] = {"pairs": len(rows)}
+    for kind in KINDS:
+        out[kind] = {
+            "median_width": float(np.median([row[kind]["width"] for row in rows])),
+            "inside": sum(row[kind]["inside"] for row in rows),
+            "not_converged": sum(not row[kind]["converged"] for row in rows),
+        }
+    alone = [min(row["steps"]["width"], row["weights"]["width"]) for row in rows]
+    out["together_sharpest"] = sum(row["together"]["width"] < w for row, w in zip(rows, alone, strict=True))
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=16)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rows", type=Path, default=Path("out/weights"), help="where an interrupted run goes on")
+    parser.add_argument("--output", type=Path, default=Path("out/weights/weights.json"))
+    options = parser.parse_args()
+    cases = [(index,) for index in range(options.pairs)]
+    path = options.rows / f"rows-seed{options.seed}.jsonl"
+    rows = records(path, partial(one, options.seed), cases, workers=options.workers)
+    result = summary(sorted(rows, key=lambda row: row["index"])[: options.pairs])
+    write_json(options.output, result)
+    print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()
