@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MOST = 60  # readings of a hold that are all kept: nobody writes down more by hand
-KEPT = 30  # of longer ones: ten or more a decade of time, and a fit of twelve such holds takes a minute
+KEPT = MOST  # of longer ones: twenty or so a decade of time
 
 
 def thinned(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
