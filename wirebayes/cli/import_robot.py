@@ -1,4 +1,4 @@
-"""``wirebayes import-robot``: a robot of CASPR or WireX, turned into a robot file."""
+"""``wirebayes import-robot``: a robot of CASPR, WireX or a firmware, turned into a robot file."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +12,9 @@ def import_robot(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FILE.xml…", help="CASPR's bodies and cables (the other is found beside one), or WireX's XML."
+            metavar="FILE…",
+            help="CASPR's bodies and cables (the other is found beside one), WireX's XML, or a Hangprinter's config.g "
+            "or printer.cfg.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="ROBOT.toml", help="The robot file to write.")],
@@ -28,7 +30,7 @@ def import_robot(
     pulleys: Annotated[bool, typer.Option("--pulleys/--no-pulleys", help="Whether radii of pulleys are meant.")] = True,
     quiet: Quiet = False,
 ) -> None:
-    """Turn a robot of CASPR or WireX into a robot file."""
+    """Turn a robot of CASPR or WireX, or the settings of a Hangprinter, into a robot file."""
     from wirebayes.workflows.import_robot import holds_home
     from wirebayes.workflows.import_robot import import_robot as run
     from wirebayes.workflows.wires import read_robot

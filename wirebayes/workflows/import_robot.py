@@ -1,4 +1,4 @@
-"""Robots of other programs, CASPR and WireX, turned into robot files."""
+"""Robots of other programs, CASPR, WireX and the firmware of Hangprinters, turned into robot files."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import write_text
-from wirebayes.robot.exchange import caspr, wirex
+from wirebayes.robot.exchange import caspr, firmware, wirex
 from wirebayes.robot.exchange.imported import ImportedRobot, robot_file
 from wirebayes.robot.exchange.xml_file import Element, read
 from wirebayes.robot.mechanics import schema
@@ -29,12 +29,13 @@ def import_robot(
     cable_set: str | None = None,
     pulleys: bool = True,
 ) -> Path:
-    """Turn a robot of CASPR or WireX into a robot file.
+    """Turn a robot of CASPR or WireX, or the settings of a Hangprinter, into a robot file.
 
     Parameters
     ----------
     files : path or sequence of paths
-        CASPR's ``…_bodies.xml`` and ``…_cables.xml`` (one of them, with the other beside it), or the XML of WireX.
+        CASPR's ``…_bodies.xml`` and ``…_cables.xml`` (one of them, with the other beside it), the XML of WireX,
+        ``config.g`` of RepRapFirmware or ``printer.cfg`` of Klipper.
     output : path
         The robot file to be written (TOML); never overwritten.
     tension : (lowest, highest), optional
@@ -98,6 +99,11 @@ def holds_home(robot: Robot) -> bool:
 
 
 def _read(paths: list[Path], cable_set: str | None, pulleys: bool) -> ImportedRobot:
+    settings = [path for path in paths if path.suffix in firmware.SUFFIXES]
+    if settings:
+        if len(paths) > 1 or cable_set is not None:
+            raise InputError(f"{settings[0]}: found files or a cable set beside it; expected these settings alone")
+        return firmware.robot(settings[0])
     parts: dict[str, Element] = {}
     for path in paths:
         root = read(path)

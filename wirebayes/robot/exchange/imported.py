@@ -29,6 +29,8 @@ class ImportedRobot:
     home_m, home_rotation_rad : (3,) arrays, the first or None
     notes : tuple of str
         What was left out or decided on the way, a sentence each.
+    lines, beyond_m : (w,) arrays or None
+        Parallel lines of each wire, and wire beyond its exit point, where the file says so.
     """
 
     name: str
@@ -44,6 +46,8 @@ class ImportedRobot:
     home_m: Floats | None
     home_rotation_rad: Floats
     notes: tuple[str, ...]
+    lines: Floats | None = None
+    beyond_m: Floats | None = None
 
 
 def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Floats) -> str:
@@ -57,7 +61,8 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
     """
     extent = np.ptp(robot.exit_m, axis=0)
     half = _SHARE * np.where((np.arange(3) == 2) & (extent == 0), extent.max(), extent)
-    ours = "Ours: the choice of tensions, the workspace, beyond_exit_m" + _given(robot, tension_N, home_m)
+    beyond = ", beyond_exit_m" if robot.beyond_m is None else ""
+    ours = f"Ours: the choice of tensions, the workspace{beyond}" + _given(robot, tension_N, home_m)
     source = [_text(line)[1:-1] for line in (robot.source, *robot.notes, ours + ".")]
     lines = [
         "version = 1",
@@ -85,11 +90,15 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
         f"lower_m = {_row((home_m - half).round(6))}",
         f"upper_m = {_row((home_m + half).round(6))}",
     ]
-    for exit_m, point, radius, axis in zip(robot.exit_m, robot.platform_m, robot.pulley_m, robot.axis, strict=True):
+    legs = zip(robot.exit_m, robot.platform_m, robot.pulley_m, robot.axis, strict=True)
+    for i, (exit_m, point, radius, axis) in enumerate(legs):
         lines += ["", "[[leg]]", f"exit_point_m = {_row(exit_m)}", f"platform_point_m = {_row(point)}"]
         if radius:
             lines += [f"pulley_radius_m = {float(radius)!r}", f"swivel_axis = {_row(axis)}"]
-        lines.append("beyond_exit_m = 0.0   # wire from here to the drum: it stretches and creeps too")
+        if robot.lines is not None:
+            lines.append(f"lines = {int(robot.lines[i])}")
+        wire = 0.0 if robot.beyond_m is None else float(robot.beyond_m[i])
+        lines.append(f"beyond_exit_m = {wire!r}   # wire from here to the drum: it stretches and creeps too")
     return "\n".join(lines) + "\n"
 
 

@@ -1,0 +1,56 @@
+"""Settings of Hangprinters, read as they are written: anchors, lines, forces, and mistakes with their line."""
+
+import numpy as np
+import pytest
+
+from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
+from wirebayes.cli import main
+from wirebayes.errors import InputError
+from wirebayes.robot.mechanics import schema
+from wirebayes.workflows.import_robot import import_robot
+
+RRF = """; a printer
+M669 K6 A0:-1620:-150 B1800:900:-150 C-1620:900:-150 D0:0:2350 ; anchors, mm
+M666 U2:2:2:4 W2.5
+M666 Y310:320:330:0
+M666 I10:10:10:1
+M666 X120:120:120:120
+M666 A1.5   ; another command's letter is no anchor
+"""
+
+
+@pytest.mark.parametrize("file", ["reprapfirmware.g", "klipper.cfg"])
+def test_what_export_writes_comes_back(fitted, tmp_path, file):  # noqa: F811
+    out, back = tmp_path / "export", tmp_path / "back.toml"
+    assert main(["export", "hangprinter-4", "--wires", str(fitted), "--output", str(out)]) == 0
+    assert main(["import-robot", str(out / file), "--output", str(back), "--quiet"]) == 0
+    there, here = schema.read("hangprinter-4"), schema.read(back)
+    np.testing.assert_allclose(here.exit_m, there.exit_m, atol=5e-6)
+    np.testing.assert_array_equal(here.lines, there.lines)
+    np.testing.assert_allclose(here.beyond_m, there.beyond_m, atol=5e-4)
+    assert here.mass_kg == there.mass_kg
+    assert (here.rule.lowest_N, here.rule.highest_N) == (there.rule.lowest_N, there.rule.highest_N)
+
+
+def test_a_config_by_hand(tmp_path):
+    (tmp_path / "config.g").write_text(RRF)
+    robot = schema.read(import_robot(tmp_path / "config.g", tmp_path / "robot.toml"))
+    np.testing.assert_allclose(robot.exit_m[1], [1.8, 0.9, -0.15])
+    np.testing.assert_allclose(robot.beyond_m, [0.31, 0.32, 0.33, 0.0])
+    assert (robot.rule.lowest_N, robot.rule.highest_N) == (10.0, 120.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("D0:0:2350", ""), "found no M669 D"),
+        (("D0:0:2350", "D0:2350"), "line 2, M669 D: found 2 numbers; expected x:y:z"),
+        (("W2.5", ""), "found no weight of the mover"),
+        (("U2:2:2:4", "U2:2:4"), "line 3, lines: found 3 numbers"),
+    ],
+)
+def test_what_is_missing_is_said_with_its_line(tmp_path, change, message):
+    (tmp_path / "config.g").write_text(RRF.replace(*change))
+    with pytest.raises(InputError, match=message):
+        import_robot(tmp_path / "config.g", tmp_path / "robot.toml")
+    assert not (tmp_path / "robot.toml").exists()

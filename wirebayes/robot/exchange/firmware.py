@@ -1,0 +1,159 @@
+"""Hangprinters as their firmware knows them: ``config.g`` of RepRapFirmware, ``printer.cfg`` of Klipper.
+
+RepRapFirmware: anchors in M669, lines, masses, forces and wire beyond the anchors in M666, in millimetres; of a letter
+given twice the last counts, as when the file is run. Klipper: anchors in the sections of its winches, the rest under
+``[printer]`` as the Hangprinter branch has it. Spools and springs are left out: zero-tension lengths need neither.
+"""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.robot.exchange.imported import ImportedRobot
+from wirebayes.typing import Floats
+from wirebayes.user_files import read_text
+
+SUFFIXES = (".g", ".cfg")
+_WORD = re.compile(r"([A-Z])\s*((?:[-+]?[0-9.]+)(?::[-+]?[0-9.]+)*)")
+_ANCHORS = "ABCDI"
+_STEPPERS = "abcdefghi"
+
+
+@dataclass
+class _Settings:
+    """Values by name, with the line they were found in."""
+
+    values: dict[str, list[float]] = field(default_factory=dict)
+    line: dict[str, int] = field(default_factory=dict)
+
+    def put(self, name: str, text: str, separator: str, where: str, line: int) -> None:
+        """Keep numbers under a name.
+
+        Parameters
+        ----------
+        name : str
+        text : str
+            Numbers as the file has them.
+        separator : str
+            Between them.
+        where : str
+            The file.
+        line : int
+            Its line, from 1.
+        """
+        parts = [part.strip() for part in text.split(separator)]
+        try:
+            self.values[name] = [float(part) for part in parts]
+        except ValueError:
+            raise InputError(f"{where}, line {line}, {name}: found {text!r}; expected numbers") from None
+        self.line[name] = line
+
+
+def robot(path: Path) -> ImportedRobot:
+    """A robot from the settings of a Hangprinter.
+
+    Parameters
+    ----------
+    path : Path
+        ``….g`` of RepRapFirmware or ``….cfg`` of Klipper.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or has no anchors, with the line.
+    """
+    text = read_text(path, "the settings of a firmware")
+    if path.suffix == ".g":
+        return _of(path, "RepRapFirmware", *_reprapfirmware(text, str(path)))
+    return _of(path, "Klipper", *_klipper(text, str(path)))
+
+
+def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings]:
+    found = _Settings()
+    for number, line in enumerate(text.splitlines(), 1):
+        code = line.split(";")[0].strip().upper()
+        command = code.split(" ")[0]
+        if command in ("M669", "M666"):
+            for letter, value in _WORD.findall(code[len(command) :]):
+                found.put(f"{command} {letter}", value, ":", where, number)
+    names = [f"M669 {letter}" for letter in _ANCHORS]
+    count = int(found.values.get("M669 N", [4])[0])
+    anchors = _anchors(found, names[:count], where, "M669 with A, B, C, D")
+    renamed = {"U": "lines", "W": "mass", "Y": "beyond", "I": "least", "X": "most"}
+    for letter, name in renamed.items():
+        if f"M666 {letter}" in found.values:
+            found.values[name], found.line[name] = found.values[f"M666 {letter}"], found.line[f"M666 {letter}"]
+    return anchors, found
+
+
+def _klipper(text: str, where: str) -> tuple[list[list[float]], _Settings]:
+    found, section = _Settings(), ""
+    renamed = {
+        "winch_mechanical_advantage": "lines",
+        "winch_mover_weight": "mass",
+        "winch_guy_wire_lengths": "beyond",
+        "winch_min_force": "least",
+        "winch_max_force": "most",
+    }
+    for number, line in enumerate(text.splitlines(), 1):
+        bare = line.split("#")[0].strip()
+        if bare.startswith("["):
+            section = bare.strip("[] ")
+        key, _, value = (part.strip() for part in bare.replace("=", ":", 1).partition(":"))
+        if section.startswith("stepper_") and key.startswith("anchor_"):
+            found.put(f"{section} {key}", value, ",", where, number)
+        elif section == "printer" and key in renamed:
+            found.put(renamed[key], value, ",", where, number)
+    anchors = []
+    for letter in _STEPPERS:
+        names = [f"stepper_{letter} anchor_{axis}" for axis in "xyz"]
+        if not any(name in found.values for name in names):
+            break
+        missing = [name for name in names if name not in found.values]
+        if missing:
+            raise InputError(f"{where}: found no {missing[0]}; expected the anchor's three coordinates in mm")
+        anchors.append([found.values[name][0] for name in names])
+    if len(anchors) < 2:
+        raise InputError(f"{where}: found {len(anchors)} anchors; expected [stepper_a] with anchor_x and so on")
+    return anchors, found
+
+
+def _anchors(found: _Settings, names: list[str], where: str, expected: str) -> list[list[float]]:
+    missing = [name for name in names if name not in found.values]
+    if missing:
+        raise InputError(f"{where}: found no {missing[0]}; expected {expected}")
+    out = [found.values[name] for name in names]
+    for name, value in zip(names, out, strict=True):
+        if len(value) != 3:
+            line = found.line[name]
+            raise InputError(f"{where}, line {line}, {name}: found {len(value)} numbers; expected x:y:z in mm")
+    return out
+
+
+def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings) -> ImportedRobot:
+    legs = len(anchors)
+
+    def each(name: str, missing: float) -> Floats:
+        value = found.values.get(name, [missing])
+        if len(value) not in (1, legs):
+            raise InputError(
+                f"{path}, line {found.line[name]}, {name}: found {len(value)} numbers; expected one, or one of each of "
+                f"{legs} wires"
+            )
+        return np.broadcast_to(np.array(value, float), legs).copy()
+
+    if "mass" not in found.values:
+        raise InputError(f"{path}: found no weight of the mover; expected M666 W or winch_mover_weight in kg")
+    bounds = None
+    if "least" in found.values and "most" in found.values:
+        bounds = float(each("least", 0.0).max()), float(each("most", 0.0).min())
+    zero = np.zeros((legs, 3))
+    notes = ("Spools, motors and the spring constant of the line are left out.",)
+    return ImportedRobot(
+        path.stem, f"Imported from {path.name} of {firmware}.", "position", found.values["mass"][0], np.zeros(3),
+        1e-3 * np.array(anchors), zero, np.zeros(legs), zero + [0.0, 0.0, 1.0], bounds, np.zeros(3), np.zeros(3),
+        notes, each("lines", 1.0), 1e-3 * each("beyond", 0.0),
+    )  # fmt: skip
