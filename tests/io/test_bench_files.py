@@ -55,6 +55,17 @@ def test_a_file_in_no_known_words_says_how_it_was_read(tmp_path):
         read(path)
 
 
+def test_all_columns_that_are_missing_are_said_at_once(tmp_path):
+    path = tmp_path / "raw.csv"
+    path.write_text("CH1,CH2,CH3\n" + body())
+    expected = (
+        r"found no column of displacement, time or tension among CH1, CH2, CH3, expected one of each; say which with "
+        r"--map \"HEADER=displacement \[mm\]\" --map \"HEADER=time \[s\]\" --map \"HEADER=tension \[N\]\""
+    )
+    with pytest.raises(wb.InputError, match=expected):
+        read(path)
+
+
 def measurement(sign="\t", decimal=".", units="mm\tN", segments=1, comment=True):
     """An LVM file with the preamble of the file and one of its channels."""
     head = ["LabVIEW Measurement", "Writer_Version\t2", f"Separator\t{'Tab' if sign == chr(9) else 'Comma'}",

@@ -364,16 +364,16 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
         if _best(table.header[index]) == role:
             _column(table, index, role, None)  # its unit is another quantity's, which is said
     names = [name for name in table.header if name]
-    unit = UNITS[role]
     encoding = table.sheet.encoding
     hint = ""
     if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
         hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
-    place = f"{table.sheet.path}, line {table.header_line}: found no column of {role}"
+    place = f"{table.sheet.path}, line {table.header_line}: found no column of"
+    with_units = " ".join(f'--map "HEADER={missed} [{UNITS[missed]}]"' for missed in missing)
     message = (
-        f"{place} among {', '.join(names)}, expected "
-        f'one; say which with --map "HEADER={role}" (or "HEADER={role} [{unit}]" where the header has no unit){hint}'
+        f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {'one of each' if more else 'one'}; "
+        f"say which with {with_units} (a unit only where the header has no unit){hint}"
     )
     answers = {f"--map {table.header[i]}={role}": table.header[i] for i in unread}
     others = [_missing(table, free, unread, more)] if more else []
-    return Undecided(f"{place}", f"which column is the {role}", answers, others, message)
+    return Undecided(f"{place} {role}", f"which column is the {role}", answers, others, message)

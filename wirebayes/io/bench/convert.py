@@ -145,7 +145,7 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     resolution = _resolution(columns[READS[control]], texts[READS[control]])
     if resolution:
         read, unit = READS[control], UNITS[READS[control]]
-        notes.append(f"{read}s are written in steps of {resolution:g} {unit}: that is their resolution")
+        notes.append(f"{read}s are written in steps of {resolution:.3g} {unit}: that is their resolution")
     header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
     rows, origin = _rows(holds, values, control)
     experiment = _experiment(table, columns, header, rows, origin, about, resolution, control)
