@@ -169,3 +169,13 @@ def test_steps_are_the_typical_ones_of_those_that_move(simulated):
     still = replace(sample, protocol=replace(protocol, setting=np.full(7, 3.0)))
     assert posterior_checks.loose_steps({"setting_sd": np.full(9, 5.0)}, still) == ""
     assert posterior_checks.loose_steps({}, sample) == ""  # hold by hold there is no such error
+
+
+@pytest.mark.parametrize(("N", "named"), [(0.049, True), (0.051, False)])
+def test_a_time_exponent_at_its_wall_is_said_to_want_a_power_law(N, named):
+    """A prior between 0 and 1, whose 5 % point is .05."""
+    prior = {"N": np.linspace(0.0, 1.0, 1001)}
+    said = posterior_checks.endless({"N": np.full(100, N)}, prior)
+    assert ("as a power law or the logarithm of time" in said) == named
+    assert posterior_checks.endless({"N": np.full(100, 0.01)}, {"N": np.full(10, 0.01)}) == ""  # stated
+    assert posterior_checks.endless({}, prior) == ""

@@ -20,6 +20,7 @@ LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends 
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
 QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer than a load cell resolves
 FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
+ENDLESS = 0.05  # share of N's prior below its posterior's median: creep that goes on over decades of time, and no end
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
@@ -70,6 +71,7 @@ def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample:
         ("data", loose_steps(own, sample)),
         ("data", noise(own, sample)),
         ("prior", stiffness(own, prior)),
+        ("prior", endless(own, prior)),
         ("prior", unchanged_prior(own, prior)),
     ]
     return [Notice(kind, sentence) for kind, sentence in found if sentence]
@@ -124,6 +126,20 @@ def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
         f"k1 = {middle:.3g} N is far outside its prior ({low:.3g} to {high:.3g} N, from the tensions and strains of "
         "the test): check displacement_mm and length_mm, and whether the wire was taut; if they are right, give this "
         "wire a prior of its own ([prior.k1])"
+    )
+
+
+def endless(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
+    """A time exponent at the lower wall of its prior, as a power law or a logarithm of time drives it there."""
+    if "N" not in own or not np.ptp(prior["N"]):
+        return ""
+    middle, wall = float(np.median(own["N"])), float(np.quantile(prior["N"], ENDLESS))
+    if middle >= wall:
+        return ""
+    return (
+        f"the readings want creep without an end in sight, as a power law or the logarithm of time has it: N = "
+        f"{middle:.2g} lies below {100 * (1.0 - ENDLESS):.0f} % of its prior; what is shown is the stretched exponential "
+        "nearest to it, good for the times that were read, while final creep and creep long after are the prior's"
     )
 
 
