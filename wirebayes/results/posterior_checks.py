@@ -138,8 +138,8 @@ def endless(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
         return ""
     return (
         f"the readings want creep without an end in sight, as a power law or the logarithm of time has it: N = "
-        f"{middle:.2g} lies below {100 * (1.0 - ENDLESS):.0f} % of its prior; shown is the stretched exponential nearest "
-        "to it, good for the times that were read, while final creep and creep long after are the prior's"
+        f"{middle:.2g} is below {100 * (1.0 - ENDLESS):.0f} % of its prior; shown is the stretched exponential "
+        "nearest to it, good for the times that were read, while final creep and creep long after are the prior's"
     )
 
 
