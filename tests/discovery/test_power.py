@@ -138,7 +138,11 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
 
     monkeypatch.setattr(power, "expand", expand)
     monkeypatch.setattr(power, "projected", lambda x, ratio: x.left[:, : x.signatures[0].shape[1]] + ratio)
-    block: Any = SimpleNamespace(target="target", modes=SimpleNamespace(z=np.array([[1.0], [2.0]])))
+    block: Any = SimpleNamespace(
+        experiments=[SimpleNamespace(control="displacement")],
+        target="target",
+        modes=SimpleNamespace(z=np.array([[1.0], [2.0]])),
+    )
     kinds: Any = [SimpleNamespace(name=n, shows=f"shows {n}") for n in ("superposition", "toe")]
     found = power.not_identifiable(block, kinds, ["superposition"])
     assert found == [
@@ -155,6 +159,10 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
     assert trials == [(kind, {column: 1e-3}, 1e-3, False) for kind, column in names]
     power.not_identifiable(block, kinds, ["fixture_compliance", "superposition"])
     assert [t[0] for t in asked[1][2]] == ["_SensorGain", "_ForceOffset", "_DisplacementScale"]
+    block.experiments[0].control = "force"
+    hung = power.not_identifiable(block, kinds, ["superposition"])
+    assert [t[0] for t in asked[2][2]] == ["_SensorGain", "_ForceOffset", "_Compliance"]
+    assert hung[0].startswith("constant displacement offset: 90.4 %")
     for kind in power._ABSORBABLE:
         assert kind.amplitudes[0].neutral == 0.0
 

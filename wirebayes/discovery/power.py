@@ -179,6 +179,11 @@ class _Compliance(Effect):
 _ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _DisplacementScale, _Compliance)
 
 
+def _of_sensor(name: str, weights: bool) -> str:
+    """What is read under weights are displacements."""
+    return name.replace("force", "displacement") if weights else name
+
+
 def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
     """Sentences: what the plain model's own parameters take up on this protocol, and what it cannot show.
 
@@ -194,13 +199,18 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
     -------
     list of str
     """
-    absorbable = [kind for kind in _ABSORBABLE if not (kind is _Compliance and "fixture_compliance" in possible)]
+    weights = block.experiments[0].control == "force"
+    known: list[type[Effect]] = [_Compliance] if "fixture_compliance" in possible else []
+    if weights:
+        known.append(_DisplacementScale)  # there it is the gain of the sensor
+    absorbable = [kind for kind in _ABSORBABLE if kind not in known]
     trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in absorbable]
     x = expand(block.target, block.modes.z[:1], trials)
     wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
     left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
     out = [
-        f"{t.effect.name}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the model's own parameters"
+        f"{_of_sensor(t.effect.name, weights)}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the model's own "
+        "parameters"
         for t, whole, rest in zip(trials, wholes, left, strict=True)
         if rest < 0.1 * whole
     ]
