@@ -25,6 +25,8 @@ STUDIES = {
     "weights": ("-m analyses.posterior.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
     "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
+    "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
+    "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 30 --output {folder}/it.json", "it.json"),
     "real_wires": ("analyses/discovery/real_wires.py --output {folder}/wires.json", "wires.json"),
 }
 _BLOCK = re.compile(r"(<!-- measured -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -62,6 +64,7 @@ def texts() -> dict[Path, str]:
         DOCS / "any-scale.inc": _any_scale(kept["any_scale"]),
         DOCS / "weights.inc": _weights(kept["weights"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
+        DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
     }
 
@@ -132,6 +135,41 @@ def _coverage(kept: dict[str, Any]) -> str:
         f"the holds contained {100 * found['held_out_coverage']:.1f} % of {found['held_out_readings']} readings. "
         f"{found['not_converged']} of {found['wires']} did not converge.\n"
     )
+
+
+def _robot_calibration(kept: dict[str, Any], alone: dict[str, Any]) -> str:
+    """A table of intervals of drawn robots by what is known of the poses, and a sentence on lengths alone."""
+    names = {"exit_points": "exit points", "references": "references", "lengths": "lengths", "poses": "poses"}
+    found, blind = kept["result"], alone["result"]
+    lines = [
+        f"``{kept['command']}``",
+        f"(commit {kept['commit']}, {kept['date']}) draws {found['robots']} robots of 2 to 9 wires",
+        f"and takes {found['median_seconds_each']:.1f} s each at the median. Shares of 90 % intervals that hold",
+        "the truth, and of calibrations that converge and are usable, in %:",
+        "",
+        ".. list-table::",
+        "   :header-rows: 1",
+        "",
+        "   * - poses",
+        "     - robots",
+        *(f"     - {words}" for words in names.values()),
+        "     - converged",
+        "     - usable",
+    ]
+    for mode in ("all", "poses known", "poses roughly known", "some poses", "poses unknown"):
+        share = found["shares"][mode]
+        lines += [f"   * - {mode}", f"     - {share['robots']}"]
+        lines += [f"     - {100 * share[name]:.0f}" for name in (*names, "converged", "usable")]
+    right, wrong, error = (100 * blind[name] for name in ("found", "silently_wrong", "distance_error_over_before"))
+    lines += [
+        "",
+        "Lengths alone, of 24 unknown poses, on four or five anchors that are 2 % of the span off",
+        f"(``{alone['command']}``, commit {alone['commit']}, {alone['date']}): {right:.0f} % of {blind['robots']}",
+        "calibrations are usable with every coordinate within four standard errors,",
+        f"{wrong:.0f} % usable and wrong; the others are refused. Distances between anchors are then {error:.0f} %",
+        "as wrong as before, at the median.",
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def _real_wires(kept: dict[str, Any]) -> str:

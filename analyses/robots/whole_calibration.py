@@ -4,15 +4,13 @@ A robot stands at poses with tensions drawn anew for each; its anchors, referenc
 from what the estimator is told, and its encoders read the true lengths with an error that it is not told. Sessions come
 from the forward statics with creep (`session.predict`), which the estimator does not use.
 
-    python -m analyses.robots.whole_calibration coverage 200 --output docs/results/robot_calibration.json
+    python -m analyses.robots.whole_calibration coverage 200
     python -m analyses.robots.whole_calibration exact 60
-    python -m analyses.robots.whole_calibration lengths 100 --output docs/results/robot_lengths_alone.json
+    python -m analyses.robots.whole_calibration lengths 100
 """
 
 import argparse
 import json
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -248,13 +246,7 @@ if __name__ == "__main__":
         answer = coverage(given.size, given.seed, given.rows)
     else:
         answer = {"exact": exact, "lengths": lengths}[given.what](given.size, given.seed)
-    commit = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
-    origin = {
-        "command": "python -m analyses.robots.whole_calibration " + " ".join(sys.argv[1:]),
-        "commit": commit,
-        "date": time.strftime("%Y-%m-%d", time.gmtime()),
-    }
-    text = json.dumps(origin | {"robots": given.size} | answer, indent=2) + "\n"
+    text = json.dumps({"robots": given.size} | answer, indent=1) + "\n"
     print(text)
     if given.output:
         given.output.write_text(text)
