@@ -22,6 +22,7 @@ RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
 STUDIES = {
     "any_scale": ("-m analyses.posterior.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
+    "real_files": ("-m analyses.real_files --output {folder}/real_files.json", "real_files.json"),
     "weights": ("-m analyses.posterior.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
     "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
@@ -62,6 +63,7 @@ def texts() -> dict[Path, str]:
     return {
         ROOT / "README.md": _BLOCK.sub(lambda block: block[1] + _four_figures(kept) + block[2], readme),
         DOCS / "any-scale.inc": _any_scale(kept["any_scale"]),
+        DOCS / "real-files.inc": _real_files(kept["real_files"]),
         DOCS / "weights.inc": _weights(kept["weights"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
         DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"]),
@@ -108,6 +110,23 @@ def _any_scale(kept: dict[str, Any]) -> str:
         lines += [f"   * - {words}", f"     - {found[kind]['tests']}"]
         lines += [f"     - {100 * found[kind][name]:.0f}" for name in names]
     return "\n".join(lines) + "\n"
+
+
+def _real_files(kept: dict[str, Any]) -> str:
+    """A paragraph on a tendon's relaxation."""
+    found = kept["result"]
+    plain, later = found["least_squares"], found["later"]
+    each = ", ".join(
+        f"{name} {low:.3g} to {high:.3g} (least squares {plain[name]:.3g})"
+        for name, (low, _, high) in found["posterior"].items()
+    )
+    return (
+        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) reads the relaxation of a tendon fascicle, a "
+        f"public recording. Without a preload, 90 % intervals are {each}: least squares fits to "
+        f"{1000 * plain['rms_N']:.1f} mN and says nothing of how little its numbers are worth. From the first minute, "
+        f"{later['in_band_90']} of {later['readings']} later readings lie in their 90 % bands; rms "
+        f"{1000 * later['posterior_rms_N']:.0f} mN, least squares {1000 * later['least_squares_rms_N']:.0f} mN.\n"
+    )
 
 
 def _weights(kept: dict[str, Any]) -> str:

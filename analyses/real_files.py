@@ -1,0 +1,115 @@
+"""What a public recording tells: a tendon's relaxation by the posterior and by a plain least squares.
+
+``python -m analyses.real_files``: the tendon fascicle of ``tests/data/bench``, one hold of three minutes. Least squares
+fits the same law without a preload; the posterior is given that (``preload = 0``) or not. Both are also fitted to the
+readings of the first minute, and predict the others.
+"""
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from wirebayes.inference.fit import fit
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import frozen
+from wirebayes.io.run_folder import write_json
+from wirebayes.model.problem import build
+from wirebayes.typing import Array
+from wirebayes.workflows.import_bench import import_bench
+
+RAW = Path(__file__).parents[1] / "tests" / "data" / "bench" / "tendon_fresh1.csv"
+LENGTH_MM = 14.33
+FIRST_S = 60.0
+POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
+NAMES = ("k1", "k2", "N")
+
+
+def law(parameters: Any, stretched_mm: Any, time_s: Array) -> Array:
+    """Tension of a sample held at one stretched length, with the final creep as a parameter.
+
+    Parameters
+    ----------
+    parameters : sequence of four
+        k1, final creep in mm, k2 and N: numbers, or arrays that broadcast with `time_s`.
+    stretched_mm : float or array
+    time_s : array
+    """
+    k1, amount_mm, k2, N = parameters
+    crept = amount_mm * -np.expm1(-k2 * time_s**N)
+    return np.asarray(k1 * (stretched_mm / (LENGTH_MM + crept) - 1.0))
+
+
+def by_least_squares(time_s: Array, tension_N: Array, stretched_mm: float) -> Array:
+    """(4,) k1, final creep, k2 and N, all found by their logarithms."""
+    start = np.log([tension_N[0] / (stretched_mm / LENGTH_MM - 1.0), 0.2, 0.2, 0.5])
+
+    def left(logs: Array) -> Array:
+        return law(np.exp(logs), stretched_mm, time_s) - tension_N
+
+    found = least_squares(left, start, xtol=1e-12, ftol=1e-12)
+    return np.asarray(np.exp(found.x))
+
+
+def by_posterior(test: Experiment, *, preload: bool) -> dict[str, Array]:
+    """Draws of the parameters, with the amount of creep at the first tension that the model has."""
+    known = test if preload else replace(test, priors={"preload": {"fixed": 0.0}})
+    done = fit(build([known]), 0, policy=POLICY)
+    draws = dict(zip(done.problem.names, done.flat.T, strict=True))
+    zero = np.zeros(len(done.flat))
+    stretched = LENGTH_MM + test.holds[0].setting + draws.get("preload", zero)
+    first = draws["k1"] * (stretched / LENGTH_MM - 1.0)
+    return draws | {"amount_mm": draws["B"] * first ** draws["U"], "stretched_mm": stretched}
+
+
+def summarised(draws: dict[str, Array]) -> dict[str, list[float]]:
+    """The 5, 50 and 95 % points."""
+    return {name: np.quantile(draws[name], [0.05, 0.5, 0.95]).tolist() for name in NAMES}
+
+
+def study() -> dict[str, Any]:
+    """Everything that the page quotes."""
+    (test,) = import_bench(RAW, length_mm=LENGTH_MM, name="tendon", mapping="Extension=displacement").experiments
+    (hold,) = test.holds
+    time, tension, stretched = hold.time_s, hold.readings, LENGTH_MM + hold.setting
+    plain = by_least_squares(time, tension, stretched)
+    left = law(plain, stretched, time) - tension
+    early = time <= FIRST_S
+    first = by_least_squares(time[early], tension[early], stretched)
+    part = replace(
+        hold, time_s=frozen(time[early].tolist()), readings=frozen(tension[early].tolist()),
+        duration_s=float(time[early][-1]),
+    )  # fmt: skip
+    draws = by_posterior(replace(test, holds=(part,)), preload=False)
+    later = time[~early][:, None]
+    drawn = law([draws[name] for name in ("k1", "amount_mm", "k2", "N")], draws["stretched_mm"], later)
+    drawn = drawn + draws["sensor_sd"] * np.random.default_rng(0).normal(size=drawn.shape)
+    low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
+    error = law(first, stretched, time[~early]) - tension[~early]
+    return {
+        "readings": len(time),
+        "least_squares": {"k1": plain[0], "k2": plain[2], "N": plain[3], "rms_N": float(np.sqrt(np.mean(left**2)))},
+        "posterior": summarised(by_posterior(test, preload=False)),
+        "posterior_with_preload": summarised(by_posterior(test, preload=True)),
+        "later": {
+            "readings": int((~early).sum()),
+            "in_band_90": int(((tension[~early] >= low) & (tension[~early] <= high)).sum()),
+            "least_squares_rms_N": float(np.sqrt(np.mean(error**2))),
+            "posterior_rms_N": float(np.sqrt(np.mean((drawn.mean(axis=1) - tension[~early]) ** 2))),
+        },
+    }
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, default=Path("out/real_files.json"))
+    options = parser.parse_args()
+    found = study()
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    write_json(options.output, found)
+    print(json.dumps(json.loads(options.output.read_text(encoding="utf-8")), indent=1))
