@@ -22,7 +22,7 @@ RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
 STUDIES = {
     "any_scale": ("-m analyses.posterior.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
-    "real_files": ("-m analyses.real_files --output {folder}/real_files.json", "real_files.json"),
+    "real_files": ("-m analyses.posterior.real_files --output {folder}/real_files.json", "real_files.json"),
     "weights": ("-m analyses.posterior.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
     "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),

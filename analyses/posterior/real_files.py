@@ -1,6 +1,6 @@
 """What a public recording tells: a tendon's relaxation by the posterior and by a plain least squares.
 
-``python -m analyses.real_files``: the tendon fascicle of ``tests/data/bench``, one hold of three minutes. Least squares
+``python -m analyses.posterior.real_files``: the tendon fascicle of ``tests/data/bench``, one hold of three minutes. Least squares
 fits the same law without a preload; the posterior is given that (``preload = 0``) or not. Both are also fitted to the
 readings of the first minute, and predict the others.
 """
@@ -23,7 +23,7 @@ from wirebayes.model.problem import build
 from wirebayes.typing import Array
 from wirebayes.workflows.import_bench import import_bench
 
-RAW = Path(__file__).parents[1] / "tests" / "data" / "bench" / "tendon_fresh1.csv"
+RAW = Path(__file__).parents[2] / "tests" / "data" / "bench" / "tendon_fresh1.csv"
 LENGTH_MM = 14.33
 FIRST_S = 60.0
 POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
