@@ -1,8 +1,8 @@
 """What a public recording tells: a tendon's relaxation by the posterior and by a plain least squares.
 
-``python -m analyses.posterior.real_files``: the tendon fascicle of ``tests/data/bench``, one hold of three minutes. Least squares
-fits the same law without a preload; the posterior is given that (``preload = 0``) or not. Both are also fitted to the
-readings of the first minute, and predict the others.
+``python -m analyses.posterior.real_files``: the tendon fascicle of ``tests/data/bench``, one hold of three minutes.
+Least squares fits the same law without a preload; the posterior is given that (``preload = 0``) or not. Both are also
+fitted to the readings of the first minute, and predict the others.
 """
 
 import argparse
