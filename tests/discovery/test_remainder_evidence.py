@@ -1,5 +1,6 @@
 """A remainder's evidence, the parameters refitted beside it, against an integral over them by importance sampling."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.special import logsumexp
 
 from analyses.hidden_effects.cases import Spec, seal
 from tests.simulated import simulated_tests
-from wirebayes.discovery.linear_scan import RATIOS, SIZES, expand, moving_columns, residuals, scan
+from wirebayes.discovery.linear_scan import RATIOS, SIZES, evidences, expand, moving_columns, residuals, scan
 from wirebayes.discovery.remainder_evidence import Reference, _refitted, reference_of, remainder_evidence
 from wirebayes.effects import named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
@@ -91,3 +92,23 @@ def test_what_bends_the_parameters_is_weighed_beside_others(tmp_path: Path) -> N
     by_fit, found, exact = weighed(fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0)))
     assert found == pytest.approx(exact, rel=0.06)
     assert by_fit < 0.7 * exact
+
+
+def test_a_mode_at_the_edge_of_a_prior_lends_a_remainder_nothing() -> None:
+    """There the prior falls without a bend; as a parabola it would have its top anywhere, and any height."""
+    experiments = simulated_tests([Bench(displacements_mm=(*range(1, 8), *range(6, 0, -1)))], Truth(WIRE), seed=3)
+    block = fitted(experiments, (named("superposition"),), "hooke", "saturating", np.random.default_rng(0))
+    edge = block.modes.z[:1].copy()
+    edge[0, block.target.problem.names.index("superposition.omega")] = 6.0
+    assert float(expand(block.target, edge, []).prior_square[0]) < 20.0
+    both = replace(block, modes=replace(block.modes, z=np.concatenate([block.modes.z[:1], edge])))
+    reference = reference_of(block)
+    assert remainder_evidence(both, reference) == pytest.approx(remainder_evidence(block, reference), abs=3.0)
+
+
+def test_what_has_no_tangent_has_no_evidence() -> None:
+    experiments = simulated_tests([Bench()], Truth(WIRE), seed=3)
+    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    x = expand(block.target, block.modes.z[:1], [], reference=reference_of(block))
+    plain, beside = evidences(replace(x, residual=np.full_like(x.residual, np.nan)))
+    assert (plain == -np.inf).all() and (beside == -np.inf).all()

@@ -8,9 +8,10 @@ model has estimated.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.discovery import smooth_reference
 from wirebayes.inference.transform import LogPosterior
@@ -569,10 +570,13 @@ def _scan_few(x: Expansion) -> Scan:
 def evidences(x: Expansion) -> tuple[Array, Array]:
     """(n, k) and (n, k, s) log evidence at each ratio, without a remainder and with one of each process and size.
 
-    Parameters and the scale of the noise are integrated out; the prior has its top at one.
+    Parameters and the scale of the noise are integrated out; the prior has its top at one. It is -inf for a row that
+    has no tangent.
     """
+    seen = _has_tangent(x)
     x = _without_tangent(x)
-    return _without_and_with(x, _project(x))
+    plain, beside = _without_and_with(x, _project(x))
+    return np.where(seen[:, None], plain, -np.inf), np.where(seen[:, None, None], beside, -np.inf)
 
 
 def _without_and_with(x: Expansion, found: _Projected) -> tuple[Array, Array]:
@@ -609,17 +613,21 @@ def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:
     return np.where(seen, log_volume, 0.0), np.where(seen, less, 0.0)
 
 
-def _without_tangent(x: Expansion) -> Expansion:
-    """Rows that have no tangent, where the model overflows or jumps, as rows in which nothing is seen."""
-    parts = {name: getattr(x, name) for name in ("parameters", "signatures", "flexible")} | {
-        "residual": x.residual[..., None]
-    }
+def _has_tangent(x: Expansion) -> NDArray[np.bool_]:
+    """(n,) where the model neither overflows nor jumps."""
+    parts = (x.parameters, x.signatures, x.flexible, x.residual[..., None])
     with np.errstate(invalid="ignore"):
-        seen = np.all([(np.abs(a) < _LARGEST).all(axis=(1, 2)) for a in parts.values()], axis=0)
+        return np.all([(np.abs(part) < _LARGEST).all(axis=(1, 2)) for part in parts], axis=0)
+
+
+def _without_tangent(x: Expansion) -> Expansion:
+    """Rows that have no tangent as rows in which nothing is seen."""
+    seen = _has_tangent(x)
     if seen.all():
         return x
-    parts = {name: np.where(seen[:, None, None], a, 0.0) for name, a in parts.items()}
-    return replace(x, **parts | {"residual": parts["residual"][..., 0]})
+    names = ("parameters", "signatures", "flexible")
+    parts: dict[str, Any] = {name: np.where(seen[:, None, None], getattr(x, name), 0.0) for name in names}
+    return replace(x, **parts, residual=np.where(seen[:, None], x.residual, 0.0))
 
 
 def projected(x: Expansion, ratio: float) -> Array:
@@ -693,7 +701,10 @@ def _prior(target: LogPosterior, around: _Around) -> tuple[Array, Array, Array]:
     inside = np.isfinite(plus) & np.isfinite(minus) & np.isfinite(centre)
     with np.errstate(invalid="ignore"):
         gradient = np.where(inside, (plus - minus) / (2 * h), 0.0)
-        diagonal = np.where(inside, np.maximum(-(plus + minus - 2 * centre) / h**2, 1e-3), 1.0)
+        bend = -(plus + minus - 2 * centre) / h**2
+        # Along an edge the density falls without a bend, as an exponential: its width is that of its slope.
+        bend = np.where(bend > _FLAT, bend, np.maximum(gradient**2, _FLAT))
+        diagonal = np.where(inside, bend, 1.0)
     precision = np.zeros((n, p, p))
     precision[:, np.arange(p), np.arange(p)] = diagonal
     return values[:n], gradient, precision
@@ -712,6 +723,7 @@ def _block_diagonal(blocks: Sequence[Array]) -> Array:
 
 _STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and rounding both stay below 1e-5 of a slope
 _PRIOR_STEP = 1e-3  # of the same, for second differences of the prior, which rounding spoils before
+_FLAT = 1e-3  # of a bend: less is rounding, and would put the prior's own best anywhere
 _LARGEST = 1e100  # of any derivative: the square of a larger one overflows
 _PIECE = 16  # parameter sets scanned at once: what stays in the cache
 _PIECES_OF = 300  # simulations whose pieces are kept, for they are large: enough for what 80 % of them show

@@ -195,7 +195,10 @@ def _summary(
     best = profile.best
     at = profile.amplitude[best : best + 1]
     sd = _width(profile.amplitude, profile.value, best, per_delta)
-    log_bayes = float(profile.value[best] + 0.5 * np.log(2.0 * np.pi) + np.log(sd))
+    if sd is None:
+        log_bayes, sd = _integrated(profile, effect.amplitudes[0].neutral, per_delta)
+    else:
+        log_bayes = float(profile.value[best] + 0.5 * np.log(2.0 * np.pi) + np.log(sd))
     theta = tuple(p.natural(e[best][None], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 
@@ -209,15 +212,37 @@ def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:
     return np.where(near[:, None], ends[best] + share[:, None] * (ends[aside] - ends[best]), ends[best])
 
 
-def _width(grid: Array, value: Array, best: int, fallback: float) -> float:
-    """Standard deviation of the amplitude: a parabola through the neighbours of the top and whatever is near it."""
+def _width(grid: Array, value: Array, best: int, per_delta: float) -> float | None:
+    """Standard deviation of the amplitude: a parabola through the neighbours of the top and whatever is near it.
+
+    None where there is no such parabola: the top lies at an end, as of an amplitude that cannot go further.
+    """
     if 0 < best < len(grid) - 1:
         near = (value > value[best] - _TOP) & np.isfinite(value)
         near[best - 1 : best + 2] = True
-        x, y = (grid[near] - grid[best]) / fallback, value[near] - value[best]
+        x, y = (grid[near] - grid[best]) / per_delta, value[near] - value[best]
         if np.isfinite(y).all():
             scale = np.abs(x).max()
             bend = 2.0 * np.polyfit(x / scale, y, 2)[0] / scale**2
             if bend < 0:
-                return float(fallback / np.sqrt(-bend))
-    return fallback
+                return float(per_delta / np.sqrt(-bend))
+    return None
+
+
+def _integrated(profile: _Profile, neutral: float, per_delta: float) -> tuple[float, float]:
+    """Log of the profile's integral over the amplitudes tried and up to neutral, and their standard deviation."""
+    grid, value = profile.amplitude, profile.value
+    top = float(value[profile.best])
+    if not np.isfinite(top):
+        return -np.inf, per_delta
+    if not grid[0] <= neutral <= grid[-1]:  # between neutral and the least amplitude it hardly changes
+        first = 0 if neutral < grid[0] else len(grid)
+        nearest = value[0] if first == 0 else value[-1]
+        grid, value = np.insert(grid, first, neutral), np.insert(value, first, nearest)
+    share = np.exp(value - top)
+    whole = float(np.trapezoid(share, grid))
+    if not whole > 0.0:
+        return -np.inf, per_delta
+    mean = float(np.trapezoid(share * grid, grid)) / whole
+    variance = float(np.trapezoid(share * (grid - mean) ** 2, grid)) / whole
+    return top + float(np.log(whole)), float(np.sqrt(variance)) or per_delta
