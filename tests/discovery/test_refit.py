@@ -27,8 +27,17 @@ class Flat:
         return float(amplitude > 0)
 
 
-def refitted(monkeypatch: pytest.MonkeyPatch, tops: list[float], effect: Any = TWO_SIDED, guess: float = 3.0) -> Any:
-    """Refitted on blocks whose evidence is normal in δ about these tops; δ = 1 is a thousandth of the amplitude."""
+def refitted(
+    monkeypatch: pytest.MonkeyPatch,
+    tops: list[float],
+    effect: Any = TWO_SIDED,
+    guess: float = 3.0,
+    leap: float = np.inf,
+) -> Any:
+    """Refitted on blocks whose evidence is normal in δ about these tops; δ = 1 is a thousandth of the amplitude.
+
+    Climbs converge over no more than `leap`.
+    """
 
     class Curve:
         def __init__(self, block: Any, effect: Any) -> None:
@@ -45,7 +54,8 @@ def refitted(monkeypatch: pytest.MonkeyPatch, tops: list[float], effect: Any = T
             if len(start) > 1 and amplitude[0] == amplitude[1]:
                 value[1::2] -= 5.0
             end = (amplitude / 1e-3)[:, None]
-            return SimpleNamespace(converged=np.ones(len(start), bool), log_evidence=value, z=end)
+            near = np.abs(end - start[:, :1])[:, 0] <= leap
+            return SimpleNamespace(converged=near, log_evidence=value, z=end)
 
         def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
             assert z[:, 0] == pytest.approx(amplitude / 1e-3)
@@ -66,6 +76,12 @@ def test_the_top_is_found_within_and_far_beyond_the_first_amplitudes(
     assert found.log_bayes == pytest.approx(0.5 * top**2 - 0.5 * off**2 + occam(False))
     assert found.sd == pytest.approx(1e-3, rel=1e-6)
     assert found.theta[0] == pytest.approx([found.amplitude / 1e-3, found.amplitude])
+
+
+def test_where_climbs_from_afar_end_nowhere_nearer_ones_lead_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the effect the other parameters are so different that only the least amplitude is reached from there."""
+    found = refitted(monkeypatch, [15.0], leap=4.0)
+    assert found.amplitude / 1e-3 == pytest.approx(15.0, abs=0.3) and found.sd == pytest.approx(1e-3, rel=1e-6)
 
 
 def test_blocks_that_share_an_amplitude_add_their_evidence(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,6 +81,13 @@ class _Profile:
         ends = [np.concatenate(pair)[order] for pair in zip(self.ends, other.ends, strict=True)]
         return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
 
+    def known(self) -> "_Profile":
+        """Without the amplitudes at which no climb converged, where there are others."""
+        rows = np.isfinite(self.value)
+        if not rows.any():
+            return self
+        return _Profile(self.amplitude[rows], self.value[rows], [ends[rows] for ends in self.ends])
+
 
 def refit(
     blocks: Sequence[LaplaceFit],
@@ -110,6 +117,7 @@ def refit(
     main = effect.amplitudes[0]
     low, high = (float(v) for v in main.prior.support())
     one_sided = low >= main.neutral
+    low, high = max(low, main.neutral - reach), min(high, main.neutral + reach)
     pinned = [Pinned(blocks[b], effect) for b in which]
     reference = sum(blocks[b].log_evidence for b in which)
     log_prior = within(pinned[0].prior, main.neutral, reach)
@@ -120,20 +128,20 @@ def refit(
     steps = np.concatenate([_DELTAS, [max(abs(guess) / per_delta, 0.3)]]) * per_delta
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
-    profile = _climbed(pinned, added, grid, [np.tile(p.starts(shapes), (len(grid), 1)) for p in pinned])
+    profile = _climbed(pinned, added, grid, [np.tile(p.starts(shapes), (len(grid), 1)) for p in pinned]).known()
     outward = refined = 0
     while refined < 2:
         at = float(profile.amplitude[profile.best])
         at_end = profile.best in (0, len(profile.amplitude) - 1)
         if at_end and low < at < high and at != main.neutral and outward < _OUTWARD:
-            # The scan's unit was too small: go on outwards before looking closer.
+            # The scan's unit was too small, or climbs from afar ended nowhere: go on outwards before looking closer.
             finer = np.clip(main.neutral + (at - main.neutral) * np.array([1.3, 1.7, 2.3]), low, high)
             outward += 1
         else:
             finer = _around(profile, main.neutral if one_sided else None)
             refined += 1
         begin = [_between(profile.amplitude, e, profile.best, finer) for e in profile.ends]
-        profile = profile.joined(_climbed(pinned, added, finer, begin))
+        profile = profile.joined(_climbed(pinned, added, finer, begin)).known()
     return _summary(effect, which, pinned, profile, per_delta)
 
 
