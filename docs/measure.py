@@ -1,6 +1,6 @@
 """Runs the studies whose figures README and docs quote, keeps their results, and writes the figures into the texts.
 
-    python docs/measure.py [NAME ...]      (make figures; some ten minutes of processor time)
+    python docs/measure.py [NAME ...]      (make figures; some hours of processor time, or NAMEs)
     python docs/measure.py --texts         only the texts, from the results that are there
 
 Each file of ``docs/results`` holds the command, the commit, the date and what the command found. A test compares the
@@ -28,7 +28,7 @@ STUDIES = {
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
     "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 30 --output {folder}/it.json", "it.json"),
-    "real_wires": ("analyses/discovery/real_wires.py --output {folder}/wires.json", "wires.json"),
+    "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
 }
 _BLOCK = re.compile(r"(<!-- measured -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -182,7 +182,8 @@ def _robot_calibration(kept: dict[str, Any], alone: dict[str, Any]) -> str:
     right, wrong, error = (100 * blind[name] for name in ("found", "silently_wrong", "distance_error_over_before"))
     lines += [
         "",
-        "Lengths alone, of 24 unknown poses, on four or five anchors that are 2 % of the span off",
+        "Lengths alone, of 24 unknown poses, on four or five anchors that are 2 % of the span off, with unread",
+        "tensions that the robot's file bounds at 0.3 of what the lines may bear",
         f"(``{alone['command']}``, commit {alone['commit']}, {alone['date']}): {right:.0f} % of {blind['robots']}",
         "calibrations are usable with every coordinate within four standard errors,",
         f"{wrong:.0f} % usable and wrong; the others are refused. Distances between anchors are then {error:.0f} %",
@@ -208,6 +209,14 @@ def _real_wires(kept: dict[str, Any]) -> str:
         lines += [f"     - {', '.join(wire['accepted']).replace('_', ' ') or '–'}"]
         lines += [f"     - {wire['plain_rmse_N']:.3f} → {wire['final_rmse_N']:.3f}"]
         lines += [f"     - {100 * wire['plain_inside_90']:.0f} → {100 * wire['final_inside_90']:.0f} %"]
+    for title, words in {"all holds": "All holds, each wire by itself", "all four": "The four judged together"}.items():
+        lines += ["", f"{words}:", "", ".. list-table::", "   :header-rows: 1", ""]
+        lines += ["   * - wire", "     - verdict", "     - accepted", "     - families established", "     - remainder"]
+        for name, wire in kept["result"][title].items():
+            families = [f"{family['name']} ({family['inclusion']:.2f})" for family in wire["families"]]
+            lines += [f"   * - {name}", f"     - {wire['verdict']}"]
+            lines += [f"     - {', '.join(wire['accepted']).replace('_', ' ') or '–'}"]
+            lines += [f"     - {', '.join(families).replace('_', ' ') or '–'}", f"     - {wire['remainder']:.2f}"]
     return "\n".join(lines) + "\n"
 
 

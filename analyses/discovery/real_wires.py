@@ -1,7 +1,7 @@
 """The paper's four wires: what `discover` names, alone and together, and the gap on holds it did not see.
 
-Run with ``python analyses/discovery/real_wires.py [--output FILE.json]``. Names are chosen on the first eight holds
-(kite: five); the models are then asked for the rest.
+Run with ``python analyses/discovery/real_wires.py [--together] [--output FILE.json]``. Names are chosen on the first
+eight holds (kite: five), and the models are then asked for the rest; then on all holds, each wire by itself.
 """
 
 import argparse
@@ -40,6 +40,21 @@ def unseen(experiment, seed=0):
     }  # fmt: skip
 
 
+def said(report):
+    """What a report says of a wire: verdict, names, established families, a remainder, and the screw."""
+    families = [
+        {key: family[key] for key in ("name", "members", "inclusion", "leave_one_hold_out")}
+        for family in report["families"]
+        if family["established"]
+    ]
+    return {
+        "verdict": report["verdict"], "set": report["set"], "accepted": report["accepted"], "p": report["p_global"],
+        "families": families, "remainder": report["remainder"]["probability"],
+        "screw_error": report["inclusion"].get("screw_error"), "shared_with": report["shared_with"],
+        "parameters": report["parameters"],
+    }  # fmt: skip
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--output", type=Path)
@@ -57,13 +72,18 @@ def main():
         )
     reductions = [r["reduction"] for r in results["first holds to the rest"].values()]
     print(f"median reduction {100 * np.median(reductions):.0f} %")
+    groups = {"all holds": [[w] for w in wires]}
     if chosen.together:
-        for title, group in {"two Roc lines": wires[:2], "all four": wires}.items():
-            report = investigate(group, Settings(kinds=CATALOGUE), 0).report["experiments"]
-            results[title] = report
-            for name, r in report.items():
-                shared = f", shared with {', '.join(r['shared_with'])}" if r["shared_with"] else ""
-                print(f"{title}: {name:16s} {r['verdict']:16s} set {r['set']}, accepted {r['accepted']}{shared}")
+        groups |= {"two Roc lines": [wires[:2]], "all four": [wires]}
+    for title, files in groups.items():
+        reports = [investigate(file, Settings(kinds=CATALOGUE), 0).report["experiments"] for file in files]
+        results[title] = {name: said(report) for found in reports for name, report in found.items()}
+        for name, r in results[title].items():
+            shared = f", shared with {', '.join(r['shared_with'])}" if r["shared_with"] else ""
+            families = ", ".join(f"{f['name']} {f['inclusion']:.2f}" for f in r["families"]) or "no family established"
+            print(
+                f"{title}: {name:16s} {r['verdict']:16s} set {r['set']}, accepted {r['accepted']}, {families}{shared}"
+            )
     if chosen.output:
         chosen.output.write_text(json.dumps(results, indent=1, default=float) + "\n")
 
