@@ -25,7 +25,7 @@ def studies() -> dict[str, Path]:
     """Every script by its name in the index; a folder that is a package is one study."""
     packages = {path.parent for path in ANALYSES.glob("*/__init__.py")}
     scripts = [path for path in ANALYSES.rglob("*.py") if path.parent not in packages]
-    return {str(path.relative_to(ANALYSES)): path for path in [*scripts, *packages]}
+    return {str(path.relative_to(ANALYSES)): path for path in sorted([*scripts, *packages])}
 
 
 def cited(name: str) -> set[str]:
