@@ -9,7 +9,7 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet
 from wirebayes.discovery.name_evidence import reaches, weigh_names
 from wirebayes.discovery.remainder_evidence import reference_of
-from wirebayes.discovery.settings import Settings
+from wirebayes.discovery.settings import SAME_EVIDENCE, Settings
 from wirebayes.discovery.smooth_credit import beside_smooth
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
@@ -47,7 +47,7 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
         scans = [scan(expand(b.target, b.modes.z[:1], probes)) for b in blocks]
         beside = weigh_names(blocks, probes, further, scans, reach=found.reach)
         values.append(found.log_bayes[one] + beside.log_bayes[other])
-    assert values[0] == pytest.approx(values[1], abs=0.15)
+    assert values[0] == pytest.approx(values[1], abs=SAME_EVIDENCE)
 
 
 def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() -> None:

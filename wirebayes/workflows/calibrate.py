@@ -123,7 +123,7 @@ def calibrate(
 
     Examples
     --------
-    >>> lengths = wb.calibrate("linear-7", "linear-7-session.csv", posterior, draws=100, output="out/calibrate")
+    >>> lengths = wb.calibrate("linear-7", "linear-7-session.csv", thin, draws=100, output="out/calibrate")
     >>> len(lengths.summary()["with_creep_model"]["length_m"]["mean"])
     7
     """

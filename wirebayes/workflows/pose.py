@@ -158,7 +158,7 @@ def pose(
 
     After a calibration, whose session wore the wires in and told their lengths:
 
-    >>> known = wb.pose("linear-7", posterior, trajectory=path, calibration=lengths, draws=20)
+    >>> known = wb.pose("linear-7", thin, trajectory=path, calibration=lengths, draws=20)
     >>> known.summary()["history"]["calibration"]["holds"]
     9
     """

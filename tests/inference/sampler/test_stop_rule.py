@@ -134,21 +134,6 @@ def test_the_last_step_ends_it_and_names_what_is_missing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "again", "most_steps", "finished"),
-    [(0.9, 3, 1600, False), (1.1, 3, 1600, True), (1.1, 2, 1600, False), (1.1, 3, 1604, False)],
-)
-def test_a_run_that_will_not_be_enough_ends_before_its_last_step(
-    share: float, again: int, most_steps: int, finished: bool
-) -> None:
-    """Of what 400 steps promise for all of them, nine tenths are wanted, or eleven."""
-    z = draws(400, 0.8)
-    _, about = looked(z, ess=1e6)
-    wanted = share * about.ess.min() * most_steps / 400.0
-    state, _ = looked(z, ess=wanted, again=again, most_steps=most_steps)
-    assert state.finished == finished and not state.converged
-
-
-@pytest.mark.parametrize(
     ("nats", "again", "finished", "converged"),
     [
         (OUTWEIGHS - 0.1, 0, True, True),

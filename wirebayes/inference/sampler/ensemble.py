@@ -10,7 +10,7 @@ block, until for every parameter
 - no region of the posterior is underrated by the frozen proposal so much that one place there outweighs a pool of draws
   (`burn_in.overlooked`),
 
-or until `Policy.most_steps`, or a quarter of them where the rest will not do: the result says *not converged*, and why.
+or until `Policy.most_steps`: then the result says *not converged*, and why.
 
 If kept draws show that a better proposal would need fewer evaluations in total, or that it overlooks something, the
 proposal is learned again from them, and walkers go on with it. Draws stay: they are of a chain whose proposal was

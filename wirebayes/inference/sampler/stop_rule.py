@@ -10,7 +10,7 @@ import numpy as np
 from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
-from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Learned, Sampling, by_ensemble
+from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Sampling, by_ensemble
 from wirebayes.inference.transform import LogPosterior
 from wirebayes.typing import Array
 
@@ -49,7 +49,7 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
                 f"e^{beyond:.1f} (allowed e^{OUTWEIGHS:.1f}); a narrow neck or a far mode may be missing"
             )
             return replace(state, finished=True, why=why)
-    elif steps >= policy.most_steps or _in_vain(learned, steps, float(found.ess.min()), policy):
+    elif steps >= policy.most_steps:
         worst = target.problem.names[int(np.argmin(found.ess))]
         why = (
             f"not converged after {steps} steps: {worst} has ESS {found.ess.min():.0f} (wanted {policy.ess:.0f}), "
@@ -57,12 +57,6 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
         )
         return replace(state, finished=True, why=why)
     return state
-
-
-def _in_vain(learned: Learned, steps: int, least: float, policy: Policy) -> bool:
-    """Whether draws at the rate so far will not be enough by the last step, and no better proposal is to be had."""
-    settled = learned.again >= _FOR_MORE and steps >= _SETTLED * policy.most_steps
-    return settled and least * policy.most_steps < policy.ess * steps
 
 
 def _judged_by(target: LogPosterior, z: Array) -> Array:
@@ -136,7 +130,6 @@ def slow_at_first(state: Sampling, policy: Policy) -> bool:
 OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
 # times that the proposal may be learned again for more draws, and for what it overlooks
 _FOR_MORE, _MOST_AGAIN = 3, 8
-_SETTLED = 0.25  # of all steps, from which the rate of effective draws is known well enough to give up
 # standard errors between draws of two proposals: thirty numbers of which all agree exceed it in two of a thousand cases
 _DISAGREE = 4.0
 # nats over the typical ratio of posterior to proposal: walkers seldom find such places, or stay; and how much of the
