@@ -63,7 +63,7 @@ benchmark: .venv/test.stamp
 outputs: .venv/run.stamp
 	$(BIN)/python docs/run_tutorial.py
 
-# The studies whose figures the README quotes (docs/results); outputs writes them into it.
+# The studies whose figures README and docs quote (docs/results): hours; `python docs/measure.py NAME` runs one.
 figures: .venv/test.stamp
 	$(BIN)/python docs/measure.py
 

@@ -1,12 +1,16 @@
 """Studies of many cases that write a line of JSON for each, so that an interrupted run goes on where it ended."""
 
+import argparse
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+from wirebayes.io.run_folder import write_json
 
 Record = dict[str, Any]
 Case = tuple[Any, ...]
@@ -40,6 +44,44 @@ def records(
             file.write(json.dumps(record) + "\n")
             file.flush()
     return found
+
+
+def study(
+    doc: str | None,
+    name: str,
+    counted: tuple[str, int],
+    one: Callable[[int, int], Record],
+    summary: Callable[[Sequence[Record]], Record],
+) -> None:
+    """The command of a study of numbered cases: its options, its records, and their summary, printed and written.
+
+    Parameters
+    ----------
+    doc : str
+        What ``--help`` says.
+    name : str
+        Of its folder in ``out`` and of the file of its summary.
+    counted : (str, int)
+        What is counted, which is the option of its number, and how many there are when it is left out.
+    one : function of seed and number
+        Computes a case; its record has the number as ``index``.
+    summary : function of records
+    """
+    what, usual = counted
+    folder = Path("out") / name
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(f"--{what}", type=int, default=usual, dest="count")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rows", type=Path, default=folder, help="where an interrupted run goes on")
+    parser.add_argument("--output", type=Path, default=folder / f"{name}.json")
+    options = parser.parse_args()
+    path = options.rows / f"rows-seed{options.seed}.jsonl"
+    cases = [(index,) for index in range(options.count)]
+    rows = records(path, partial(one, options.seed), cases, workers=options.workers)
+    result = summary(sorted(rows, key=lambda row: row["index"])[: options.count])
+    write_json(options.output, result)
+    print(json.dumps(result, indent=1))
 
 
 def _computed(run: Callable[..., Record], cases: Sequence[Case], workers: int) -> Iterator[Record]:

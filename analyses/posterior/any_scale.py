@@ -7,22 +7,17 @@ share of the elastic stretch, its median time as a share of a hold, errors as sh
 Each parameter is counted by itself.
 """
 
-import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from analyses.resumable import records
+from analyses.resumable import study
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import frozen
-from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
@@ -140,21 +135,5 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tests", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--rows", type=Path, default=Path("out/any_scale"), help="where an interrupted run goes on")
-    parser.add_argument("--output", type=Path, default=Path("out/any_scale/any_scale.json"))
-    options = parser.parse_args()
-    cases = [(index,) for index in range(options.tests)]
-    path = options.rows / f"rows-seed{options.seed}.jsonl"
-    rows = records(path, partial(one, options.seed), cases, workers=options.workers)
-    result = summary(sorted(rows, key=lambda row: row["index"])[: options.tests])
-    write_json(options.output, result)
-    print(json.dumps(result, indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    study(__doc__, "any_scale", ("tests", 300), one, summary)

@@ -4,19 +4,14 @@
 `analyses.posterior.any_scale`.
 """
 
-import argparse
-import json
 from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analyses.posterior.any_scale import POLICY, SHARES, Line, line, measured, under_steps, under_weights
-from analyses.resumable import records
+from analyses.resumable import study
 from wirebayes.inference.fit import fit, seed_of
-from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
 from wirebayes.typing import Array
 
@@ -61,21 +56,5 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pairs", type=int, default=16)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--rows", type=Path, default=Path("out/weights"), help="where an interrupted run goes on")
-    parser.add_argument("--output", type=Path, default=Path("out/weights/weights.json"))
-    options = parser.parse_args()
-    cases = [(index,) for index in range(options.pairs)]
-    path = options.rows / f"rows-seed{options.seed}.jsonl"
-    rows = records(path, partial(one, options.seed), cases, workers=options.workers)
-    result = summary(sorted(rows, key=lambda row: row["index"])[: options.pairs])
-    write_json(options.output, result)
-    print(json.dumps(result, indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    study(__doc__, "weights", ("pairs", 16), one, summary)

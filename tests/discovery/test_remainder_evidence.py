@@ -11,7 +11,13 @@ from scipy.special import logsumexp
 from analyses.hidden_effects.cases import Spec, seal
 from tests.simulated import simulated_tests
 from wirebayes.discovery.linear_scan import RATIOS, SIZES, evidences, expand, moving_columns, residuals, scan
-from wirebayes.discovery.remainder_evidence import Reference, _refitted, reference_of, remainder_evidence
+from wirebayes.discovery.remainder_evidence import (
+    Reference,
+    _most_probable,
+    _refitted,
+    reference_of,
+    remainder_evidence,
+)
 from wirebayes.effects import named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import read_experiments
@@ -70,7 +76,8 @@ def weighed(fit: LaplaceFit) -> tuple[float, float, float]:
     """Log Bayes factor of a remainder: by the fit without it, refitted, and by the integral."""
     reference = reference_of(fit)
     plain = expand(fit.target, fit.modes.z[:1], [], reference=reference)
-    beside, _ = _refitted(fit.target, fit.modes.z[:1], plain, reference)
+    which = _most_probable(evidences(plain)[1])
+    beside, _ = _refitted(fit.target, fit.modes.z[:1], plain, which, reference)
     exact = integral(fit, beside, reference) - integral(fit, fit.modes.z[:1], None)
     return float(scan(plain).flexible[0]), remainder_evidence(fit, reference), exact
 

@@ -63,9 +63,12 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
     if not np.isfinite(without):
         return 0.0
     found = [_mean(beside)]
-    for i, start in enumerate(block.modes.z[:_MODES]):
-        here = expand(target, start[None], [], reference=reference) if i else fit
-        z, moved = _refitted(target, start[None], here, reference)
+    starts = [(best, fit, beside)]
+    for other in block.modes.z[1:_MODES]:
+        there = expand(target, other[None], [], reference=reference)
+        starts.append((other[None], there, evidences(there)[1]))
+    for start, here, known in starts:
+        z, moved = _refitted(target, start, here, _most_probable(known), reference)
         with_noise_of_fit = z.copy()
         with_noise_of_fit[:, noise] = best[:, noise]
         # the scale of the noise is integrated out: only the prior of the other parameters counts
@@ -102,12 +105,13 @@ def _top_of_prior(x: Expansion) -> float:
     return float(x.prior[0] + 0.5 * x.prior_square[0])
 
 
-def _refitted(target: LogPosterior, z: Array, x: Expansion, reference: Reference) -> tuple[Array, Expansion]:
-    """Parameters (1, d) at their best beside the remainder that suits the readings best, and the expansion there.
+def _refitted(
+    target: LogPosterior, z: Array, x: Expansion, which: tuple[float, int, float], reference: Reference
+) -> tuple[Array, Expansion]:
+    """Parameters (1, d) at their best beside one remainder (see `_most_probable`), and the expansion there.
 
     The noise is what is left beside it: by the noise of the fit, the prior would count too much against the readings.
     """
-    which = _most_probable(x)
     for _ in range(_STEPS):
         remainder = _Remainder.of(x, *which)
         along, noise = remainder.step(x)
@@ -134,10 +138,9 @@ def _with_noise(target: LogPosterior, z: Array, factor: float) -> Array:
     return target.coordinates.to_sampled(theta)
 
 
-def _most_probable(x: Expansion) -> tuple[float, int, float]:
-    """Noise ratio, process and size with the largest evidence."""
-    beside = evidences(x)[1][0]
-    at, which = np.unravel_index(int(np.argmax(beside)), beside.shape)
+def _most_probable(beside: Array) -> tuple[float, int, float]:
+    """Noise ratio, process and size of the remainder that suits the readings best, by the evidence of each."""
+    at, which = np.unravel_index(int(np.argmax(beside[0])), beside[0].shape)
     process, size = divmod(int(which), len(SIZES))
     return float(RATIOS[at]), process, float(SIZES[size])
 
