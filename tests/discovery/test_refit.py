@@ -210,13 +210,19 @@ def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> No
     def around(best: int, end: float | None) -> np.ndarray:
         value = np.zeros(3)
         value[best] = 1.0
-        return refit._around(refit._Profile(grid, value, []), end)
+        return refit._around(refit._Profile(grid, value, []), end, 0.1)
 
     for end in (None, 0.5):
         assert around(1, end) == pytest.approx(np.linspace(1.0, 4.0, 8)[1:-1])
         assert around(2, end) == pytest.approx(np.linspace(3.0, 4.0, 8)[1:-1])
     assert around(0, None) == pytest.approx(np.linspace(-1.0, 3.0, 8)[1:-1])  # as far beyond as within
     assert around(0, 0.5) == pytest.approx(np.linspace(0.5, 3.0, 8)[1:-1])
+
+
+def test_around_the_only_amplitude_known_lie_six_within_a_unit_on_either_side() -> None:
+    alone = refit._Profile(np.array([2.0]), np.zeros(1), [])
+    assert refit._around(alone, None, 0.7) == pytest.approx(np.linspace(1.3, 2.7, 8)[1:-1])
+    assert refit._around(alone, 0.5, 0.7) == pytest.approx(np.linspace(0.5, 2.7, 8)[1:-1])
 
 
 def test_a_profile_keeps_what_it_had_and_is_sorted() -> None:

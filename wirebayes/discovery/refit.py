@@ -138,7 +138,7 @@ def refit(
             finer = np.clip(main.neutral + (at - main.neutral) * np.array([1.3, 1.7, 2.3]), low, high)
             outward += 1
         else:
-            finer = _around(profile, main.neutral if one_sided else None)
+            finer = _around(profile, main.neutral if one_sided else None, per_delta)
             refined += 1
         begin = [_between(profile.amplitude, e, profile.best, finer) for e in profile.ends]
         profile = profile.joined(_climbed(pinned, added, finer, begin)).known()
@@ -184,12 +184,16 @@ def _climbed(
     return _Profile(amplitudes, total + added(amplitudes), ends)
 
 
-def _around(profile: _Profile, end: float | None) -> Array:
-    """Six amplitudes on either side of the best, no lower than `end` if there is one."""
+def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:
+    """Six amplitudes on either side of the best, no lower than `end` if there is one.
+
+    An amplitude that is the only one with evidence has neighbours `per_delta` away.
+    """
     grid, best = profile.amplitude, profile.best
-    outside = 2 * grid[0] - grid[1] if end is None else end
+    next_up = grid[1] if len(grid) > 1 else grid[0] + per_delta
+    outside = 2 * grid[0] - next_up if end is None else end
     left = grid[best - 1] if best else outside
-    right = grid[best + 1] if best + 1 < len(grid) else grid[best]
+    right = next_up if len(grid) == 1 else grid[min(best + 1, len(grid) - 1)]
     return np.linspace(left, right, 8)[1:-1]
 
 
