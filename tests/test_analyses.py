@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -59,3 +60,10 @@ def test_a_study_has_its_question_and_its_pages(row: re.Match[str]):
 @pytest.mark.parametrize("name", list(studies()))
 def test_what_no_page_cites_and_nothing_runs_goes(name: str):
     assert cited(name) or used(name)
+
+
+def test_the_questions_of_a_newcomer_have_answers():
+    asked = tomllib.loads((ANALYSES / "project" / "questions.toml").read_text(encoding="utf-8"))["question"]
+    named = [name for entry in asked for name in [entry["file"], *entry.get("also", ())]]
+    assert len(asked) == 10
+    assert [name for name in named if not (ROOT / name).is_file()] == []
