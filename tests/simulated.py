@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import frozen
+from wirebayes.numeric.frozen import frozen
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 

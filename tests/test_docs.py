@@ -19,7 +19,8 @@ from wirebayes.cli import COMMANDS, main
 from wirebayes.io.experiment import read_experiments
 from wirebayes.robot.mechanics import schema
 from wirebayes.wire import compiled
-from wirebayes.wire.staircase import Model, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import simulate
 
 DOCS = Path(__file__).parent.parent / "docs"
 

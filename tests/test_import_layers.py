@@ -7,11 +7,11 @@ import wirebayes
 
 ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
-    {"errors", "typing", "notice"},
+    {"_version", "errors", "notice"},
+    {"numeric"},
     {"json_files"},
-    {"linear_algebra", "means", "resampling"},
-    {"units", "interrupt", "user_files"},
-    {"workers"},
+    {"sentences"},
+    {"strict", "processes"},
     {"wire"},
     {"io", "effects"},
     {"model"},
@@ -20,15 +20,16 @@ LAYERS: list[set[str]] = [
     {"prediction"},
     {"comparison", "discovery"},
     {"planning", "preloaded"},
+    {"answers"},
     {"report"},
-    {"reproduce"},
+    {"paper"},
     {"workflows"},
     {"app"},
     {"cli"},
 ]
-NEUTRAL = {"errors", "typing", "notice", "json_files", "linear_algebra", "means", "resampling", "units", "user_files"}
+NEUTRAL = {"errors", "notice", "json_files", "numeric", "sentences", "strict"}
 ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
-MAY_USE_ROBOT = {"report", "reproduce", "workflows", "app", "cli", "__init__"}
+MAY_USE_ROBOT = {"report", "paper", "workflows", "app", "cli", "__init__"}
 
 
 def imports() -> set[tuple[str, str, str]]:

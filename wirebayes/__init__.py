@@ -7,6 +7,8 @@ the import itself costs nothing.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from wirebayes._version import __version__ as __version__
+
 if TYPE_CHECKING:
     from wirebayes.errors import InputError as InputError
     from wirebayes.inference.policy import Policy as Policy
@@ -51,8 +53,6 @@ if TYPE_CHECKING:
     from wirebayes.workflows.simulate_tests import simulate_tests as simulate_tests
     from wirebayes.workflows.wires import read_robot as read_robot
     from wirebayes.workflows.write_report import write_report as write_report
-
-__version__ = "0.1.0"
 
 _PLACES = {
     "read_experiments": "wirebayes.io.experiment",

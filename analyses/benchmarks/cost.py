@@ -19,9 +19,8 @@ import numpy as np
 from analyses.benchmarks import parsed
 from analyses.benchmarks.plain import ours
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference import transform
 from wirebayes.inference.fit import fit
-from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.experiment import Experiment, Hold
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
@@ -82,7 +81,7 @@ def growth(title, sizes, problems):
 def share_in_likelihood(problem, seed):
     """Share of a fit's processor time within the likelihood, within the target around it, and elsewhere."""
     spent = {"likelihood": 0.0, "target": 0.0}
-    kind, likelihood, target = type(problem), type(problem).log_likelihood, transform.LogPosterior.__call__
+    kind, likelihood, target = type(problem), type(problem).log_likelihood, LogPosterior.__call__
 
     def watch(function, key):
         def watched(*given):

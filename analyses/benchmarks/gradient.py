@@ -8,8 +8,8 @@ import numpy as np
 
 from analyses.benchmarks import model
 from analyses.benchmarks.measure import Costs, judged, looked_at
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
-from wirebayes.inference.transform import LogPosterior
 
 jax.config.update("jax_enable_x64", True)
 CHAINS = 4

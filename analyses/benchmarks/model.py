@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.inference.coordinates.slack_edge import DECADES
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
-from wirebayes.inference.slack_edge import DECADES
-from wirebayes.inference.transform import LogPosterior
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 

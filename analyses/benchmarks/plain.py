@@ -8,10 +8,10 @@ import emcee
 import numpy as np
 
 from analyses.benchmarks.measure import Costs, judged, looked_at
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import ensemble, kept, stop_rule
-from wirebayes.inference.transform import LogPosterior
 
 
 def ours(problem, seed, seconds, wanted=20_000):

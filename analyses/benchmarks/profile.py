@@ -23,7 +23,7 @@ from wirebayes.inference.fit import fit
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
-from wirebayes.reproduce import run
+from wirebayes.paper import run
 
 HOME = str(Path(wirebayes.__file__).parent)
 SHOWN = 12

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from analyses.calibration.simulation_based_calibration import band, verdict
 from analyses.calibration.study import BROKEN, STUDIES, Study
-from wirebayes.inference.simulation_based_calibration import band, verdict
 from wirebayes.io.run_folder import write_json
-from wirebayes.workers import executor
+from wirebayes.processes.workers import executor
 
 
 def main() -> int:

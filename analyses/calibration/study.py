@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from analyses.calibration.simulation_based_calibration import one
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.simulation_based_calibration import one
 from wirebayes.model.problem import Likelihood, Problem, build, with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.model.scales import planned_scales

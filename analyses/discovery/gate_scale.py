@@ -21,7 +21,7 @@ from wirebayes.discovery import screening
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.settings import ABOVE_COUNT, ALPHA, ONE_NAT, UPPER
 from wirebayes.effects import CATALOGUE
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 ALL, LOTS, TRIED = 8000, 60, 500
 WAYS = {

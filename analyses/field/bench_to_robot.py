@@ -44,7 +44,8 @@ from wirebayes.robot.motion import claim, inverse
 from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw, write
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.fresh import FreshSample
-from wirebayes.wire.staircase import Model, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import simulate
 from wirebayes.workflows.wires import wire_draws
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0)

@@ -22,9 +22,9 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws
 from wirebayes.io.bench.convert import About, Converted, convert
 from wirebayes.io.bench.undecided import Choices
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
+from wirebayes.processes.workers import workers
 from wirebayes.wire.laws import creep_fraction, creep_target, strain
-from wirebayes.workers import workers
 
 WIRES = {
     "k1": stats.lognorm(0.5, scale=900.0), "B": stats.lognorm(0.5, scale=0.3), "U": stats.lognorm(0.3, scale=0.6),

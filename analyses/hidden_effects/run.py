@@ -12,7 +12,7 @@ from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
 
-from wirebayes.workers import executor
+from wirebayes.processes.workers import executor
 
 from . import cases as case_list
 from .ask import ANSWERERS, BASELINES, ask

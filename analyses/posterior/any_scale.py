@@ -17,8 +17,8 @@ from analyses.resumable import study
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import frozen
 from wirebayes.model.problem import build
+from wirebayes.numeric.frozen import frozen
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 SHARES = np.array([0.0, 0.02, 0.06, 0.15, 0.35, 0.7, 1.0])  # of a hold, when it is read

@@ -20,7 +20,7 @@ from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Problem, build
 from wirebayes.model.replicate import readings
 from wirebayes.prediction.held_out import LEVELS, held_out
-from wirebayes.workers import workers
+from wirebayes.processes.workers import workers
 
 WIRES = {
     "k1": stats.lognorm(0.5, scale=900.0), "B": stats.lognorm(0.5, scale=0.3), "U": stats.lognorm(0.3, scale=0.6),

@@ -23,10 +23,10 @@ from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.plan import ExpectedWidth
 from wirebayes.model.problem import build, with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.numeric.typing import Array
 from wirebayes.planning.widths import at_centre, expected_widths
+from wirebayes.processes.workers import as_finished, processes
 from wirebayes.simulation.synthetic import Bench
-from wirebayes.typing import Array
-from wirebayes.workers import as_finished, processes
 
 POLICY = Policy(ensembles=2, walkers=64, ess=600, rounds=3, most_rounds=5, round_draws=2048, block=32, most_steps=200,
                 r_hat=1.05)  # fmt: skip

@@ -17,10 +17,10 @@ from scipy.optimize import least_squares
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import frozen
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
-from wirebayes.typing import Array
+from wirebayes.numeric.frozen import frozen
+from wirebayes.numeric.typing import Array
 from wirebayes.workflows.import_bench import import_bench
 
 RAW = Path(__file__).parents[2] / "tests" / "data" / "bench" / "tendon_fresh1.csv"

@@ -16,12 +16,12 @@ from functools import partial
 import numpy as np
 
 from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Likelihood, build
-from wirebayes.workers import workers
+from wirebayes.processes.workers import workers
 
 FIRST = 100
 TAILS = (0.05, 0.95)

@@ -13,7 +13,7 @@ from analyses.posterior.any_scale import POLICY, SHARES, Line, line, measured, u
 from analyses.resumable import study
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.model.problem import build
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 KINDS = ("steps", "weights", "together")
 

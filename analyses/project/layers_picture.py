@@ -16,6 +16,9 @@ from tests.test_import_layers import LAYERS, imports
 
 OUT = Path(__file__).parents[2] / "docs" / "images" / "layers.svg"
 ABOUT = {
+    "numeric": "arithmetic",
+    "strict": "strict readers",
+    "processes": "workers, locks",
     "wire": "physics of one wire",
     "io": "files",
     "effects": "the catalogue",
@@ -29,7 +32,7 @@ ABOUT = {
     "planning": "the next test",
     "robot": "statics, drift, calibration",
     "report": "pages, pictures",
-    "reproduce": "the paper",
+    "paper": "its reproduction",
     "workflows": "one module a command",
     "cli": "parses and prints",
 }
@@ -53,8 +56,9 @@ def reduced(uses: dict[str, set[str]]) -> list[tuple[str, str]]:
 
 # Where a package stands across the page; its layer says how high.
 ACROSS = {
-    "reproduce": -2.3, "report": 0.9, "planning": 2.6, "comparison": -2.3, "discovery": 1.3, "prediction": -0.6,
-    "inference": -1.9, "simulation": 2.9, "effects": -1.9, "io": 1.9, "robot": 4.6,
+    "paper": -2.3, "report": 0.9, "planning": 2.6, "comparison": -2.3, "discovery": 1.3, "prediction": -0.6,
+    "inference": -1.9, "simulation": 2.9, "effects": -1.9, "io": 1.9, "robot": 4.6, "strict": 0.5, "numeric": -1.2,
+    "processes": 3.2,
 }  # fmt: skip
 layers = [[name for name in sorted(layer) if name in ABOUT] for layer in LAYERS]
 layers = [layer for layer in layers if layer]

@@ -13,12 +13,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from analyses.robots.enclosure import enclose
 from tests.robot import cases
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import drift, inverse
 from wirebayes.robot.proof import proofs
 from wirebayes.robot.proof.certificate import certify
-from wirebayes.robot.proof.enclosure import enclose
 
 
 def shares(poses, rng):

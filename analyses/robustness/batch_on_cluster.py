@@ -78,7 +78,7 @@ def main() -> int:
         wb.batch(file, **settings, output=options.output / name, **more)  # type: ignore[arg-type]
         return time.monotonic() - begin
 
-    with patch("wirebayes.workers.cores", lambda: 1):
+    with patch("wirebayes.processes.workers.cores", lambda: 1):
         alone = run("one-process")
     print(f"one process: {alone:.0f} s", flush=True)
     with cluster(options.output) as two:

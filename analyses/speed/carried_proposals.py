@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 import wirebayes as wb
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.state import Sampling, State
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import build
-from wirebayes.resampling import effective_number
-from wirebayes.workers import workers
+from wirebayes.numeric.resampling import effective_number
+from wirebayes.processes.workers import workers
 
 _DRAWS = 4000
 

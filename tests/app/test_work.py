@@ -11,7 +11,7 @@ from wirebayes.app.folders import READ, Shelf
 from wirebayes.app.jobs import Jobs
 from wirebayes.cli import main
 from wirebayes.errors import InputError
-from wirebayes.workers import load_early
+from wirebayes.processes.workers import load_early
 
 BENCH = Path(__file__).parents[2] / "docs" / "example" / "bench.csv"
 SAMPLE = {"length_mm": 1200.0, "material": "line", "area_mm2": None, "control": "", "options": []}

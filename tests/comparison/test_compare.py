@@ -16,7 +16,8 @@ from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.problem import build
-from wirebayes.wire.staircase import Model, linearise, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import linearise, simulate
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
 PLAIN = Candidate(BASE, "", "")

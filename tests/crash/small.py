@@ -7,7 +7,7 @@ from pathlib import Path
 import wirebayes as wb
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
-from wirebayes.reproduce import run
+from wirebayes.paper import run
 
 # too short to be believed, long enough to be cut off in search, burn-in and sampling
 POLICY = Policy(walkers=32, ess=300.0, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_interrupt import processes_of
+from tests.processes.test_interrupt import processes_of
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")

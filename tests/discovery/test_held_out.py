@@ -17,7 +17,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
 from wirebayes.model.scales import Scales
 from wirebayes.simulation.synthetic import Bench, Truth
-from wirebayes.wire.staircase import Model
+from wirebayes.wire.model import Model
 
 SCALES = Scales(1.0, 12.0, 4.0, 120.0, 0.3)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analyses.hidden_effects.cases import Spec, seal
-from wirebayes import cli, workers
+from wirebayes import cli
 from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
 from wirebayes.discovery.search import discover, final_models, investigate
 from wirebayes.discovery.settings import REMAINS, Settings
@@ -16,6 +16,7 @@ from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.processes import workers
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect
 

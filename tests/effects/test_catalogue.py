@@ -7,7 +7,8 @@ from tests.wire.protocols import PLAIN, columns, protocol
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Amplitude, Effect
-from wirebayes.wire.staircase import Model, linearise, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import linearise, simulate
 
 TIMES = np.array([0.0, 30.0, 60.0, 120.0])
 PATH = [1.0, 3.0, 5.0, 2.0, 4.0]

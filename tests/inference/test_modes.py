@@ -8,12 +8,12 @@ import pytest
 from tests.statistical.targets import Silent
 from wirebayes.effects import named
 from wirebayes.inference import modes
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import climb, search
-from wirebayes.inference.sampler.mixture import spread_rows
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import build, with_readings
+from wirebayes.numeric.spread_rows import spread_rows
 from wirebayes.prediction.left_out_density import without_hold
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 

@@ -18,7 +18,8 @@ from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import named
 from wirebayes.model import likelihoods
 from wirebayes.wire import compiled
-from wirebayes.wire.staircase import Model, linearise, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import linearise, simulate
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
 ERRORS = {"sensor_sd": 0.01, "setting_sd": 0.03}

@@ -17,7 +17,7 @@ from wirebayes.model import likelihoods
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Likelihood, build, with_protocols, with_readings
 from wirebayes.simulation.synthetic import Bench, Truth
-from wirebayes.wire.staircase import Model
+from wirebayes.wire.model import Model
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.004, "setting_sd": 0.02}
 

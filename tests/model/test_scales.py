@@ -7,13 +7,13 @@ import pytest
 
 from wirebayes.effects import named
 from wirebayes.inference.fit import fit
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
-from wirebayes.means import geometric_mean
 from wirebayes.model.problem import build
 from wirebayes.model.scales import NATURAL, Units, scales_of
+from wirebayes.numeric.means import geometric_mean
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 EFFECTS = ("toe", "creep_threshold", "second_relaxation", "sensor_drift", "clamp_transient", "steady_creep")

@@ -11,7 +11,7 @@ from tests.model.test_likelihoods import SINGLE_STATE, STRONG, filtered, measure
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols
 from wirebayes.effects import named
 from wirebayes.model import likelihoods
-from wirebayes.wire.staircase import Model
+from wirebayes.wire.model import Model
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
 ERRORS = {"sensor_sd": 0.01, "setting_sd": 0.03}

@@ -10,8 +10,8 @@ from wirebayes.discovery.global_test import examine
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
-from wirebayes.io.readings import frozen
 from wirebayes.model.scales import scales_of
+from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.sensitivity import sensitivity
 from wirebayes.planning.widths import at_centre, central
 from wirebayes.simulation.synthetic import Bench, Truth, draw

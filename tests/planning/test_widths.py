@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wirebayes.inference.fit import fit
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import climb
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.problem import build, with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.planning import widths

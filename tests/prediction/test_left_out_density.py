@@ -11,9 +11,9 @@ import pytest
 from wirebayes.effects import named
 from wirebayes.inference import importance
 from wirebayes.inference.fit import fit
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import ensemble
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import Problem, build
 from wirebayes.model.scales import NATURAL, Units

@@ -15,7 +15,7 @@ from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
-from wirebayes.wire.staircase import Model
+from wirebayes.wire.model import Model
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 0.01}
 DRAWS = 40000

@@ -438,7 +438,7 @@ def test_an_unfinished_reproduction_shows_what_there_is(tmp_path):
 
 def test_bars_of_intervals_stand_where_the_numbers_are():
     """Read back from the drawn figure: a wrong column would shift a bar."""
-    from wirebayes.report.pictures.paper_figures import intervals
+    from wirebayes.paper.figures import intervals
 
     row = {"parameter": "k1", "published": 2.0, "q05": 4.0, "q50": 5.0, "q95": 6.0, "prior_q05": 1.0, "prior_q95": 20.0}
     axes = intervals([row | {"likelihood": kind} for kind in ("chain", "hold")], "wire").axes[0]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.io.run_folder import plain
+from wirebayes.json_files.plain import plain
 from wirebayes.report.pictures import robot as pictures
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.pose.answer import answer

@@ -14,7 +14,8 @@ import pytest
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401 - fixtures
 from tests.robot.test_history import _joint_values_for, _line, _simulated, _theta
 from wirebayes.cli import main
-from wirebayes.io.run_folder import plain
+from wirebayes.json_files.plain import plain
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.estimate import estimate
 from wirebayes.robot.history.history import History
@@ -27,7 +28,6 @@ from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.estimate import calibrate
 from wirebayes.robot.self_calibration.session import Prior, Session
-from wirebayes.typing import Floats
 
 HOLD_S, SOON_S = 40.0, 1e-3
 ERRORS = Uncertain(4e-3, 0.05, 0.01)

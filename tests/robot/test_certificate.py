@@ -3,13 +3,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from analyses.robots.enclosure import enclose
 from tests.robot.cases import HANGING
 from wirebayes.robot.mechanics import rotation, schema
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, forward
 from wirebayes.robot.proof import certificate
 from wirebayes.robot.proof.certificate import certify
-from wirebayes.robot.proof.enclosure import enclose
 
 from . import cases
 

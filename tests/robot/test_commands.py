@@ -8,8 +8,8 @@ from wirebayes.cli import main
 from wirebayes.model.problem import Sample
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics import schema
+from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Model
 
 DOCS = Path(__file__).parents[2] / "docs" / "example"
 PROTOCOL = Protocol(

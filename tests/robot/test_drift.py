@@ -10,8 +10,9 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.wires import Wires, tension
 from wirebayes.robot.motion import drift, forward, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Model, simulate
+from wirebayes.wire.staircase import simulate
 
 CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
 

@@ -12,7 +12,7 @@ from tests.robot.test_drift import _line
 from wirebayes.cli import main
 from wirebayes.effects import named
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import plain
+from wirebayes.json_files.plain import plain
 from wirebayes.model.prior import wire_defaults
 from wirebayes.model.scales import Scales
 from wirebayes.notice import Notice

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.robot.cases import HANGING
-from wirebayes.robot.mechanics import cholesky, rotation, schema, statics
+from wirebayes.numeric import cholesky
+from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import tension
 
 from . import cases

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from analyses.calibration import simulation_based_calibration
 from analyses.calibration.__main__ import run, shares
 from analyses.calibration.study import BROKEN, STUDIES, Study
-from wirebayes.inference import simulation_based_calibration
 from wirebayes.inference.policy import Policy
 
 pytestmark = pytest.mark.statistical

@@ -15,13 +15,14 @@ from wirebayes.effects.creep import SteadyCreepCarried, Superposition
 from wirebayes.effects.elastic import LengthDependence, StrainStiffening, ToeOfStrain
 from wirebayes.effects.instrument import ReadingDelay
 from wirebayes.effects.rivals import RIVALS
-from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import build
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.wire.staircase import Linearised, Model, linearise, simulate, streamed
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import Linearised, linearise, simulate, streamed
 
 if compiled.kernel is None:
     pytest.skip("the package was installed without a C compiler", allow_module_level=True)

@@ -14,7 +14,8 @@ from wirebayes.robot.mechanics.draws import WireDraws, for_robot, warnings
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.fresh import FreshSample
-from wirebayes.wire.staircase import Model, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import simulate
 
 LONG_S = PowerLaw().long_s
 LOAD, REFERENCE, LENGTH_REF = 3.5, 2.0, 1300.0

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from tests.wire.protocols import PLAIN, by_hand, columns, parameters, protocol, protocols
 from wirebayes.effects import named
 from wirebayes.wire import laws
-from wirebayes.wire.staircase import Model, linearise, simulate
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import linearise, simulate
 
 TIMES = [0.0, 30.0, 60.0, 90.0, 120.0]
 CUT = {1.0: 0.0273, 0.7: 0.0849, 0.4: 0.2161}  # by time exponent N; the documentation's figures

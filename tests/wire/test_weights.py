@@ -11,7 +11,8 @@ from tests.wire.test_compiled import FORMS, LAWS_OF_CREEP, by_numpy, drawn, mode
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.wire import compiled
 from wirebayes.wire.inverse import inverse
-from wirebayes.wire.staircase import Model, linearise, simulate, simulate_alone
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import linearise, simulate, simulate_alone
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
 UP_AND_DOWN = protocol([1.0, 2.0, 4.0, 3.0, 6.0], [TIMES] * 5, control="force")

@@ -329,7 +329,7 @@ def test_a_batch_on_a_cluster_is_killed_loses_a_worker_and_goes_on(tmp_path):
 
 def test_a_scheduler_that_is_not_there_is_a_mistake(experiment_file, tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("wirebayes.workers._PATIENCE_S", 0.5)
+    monkeypatch.setattr("wirebayes.processes.workers._PATIENCE_S", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         assert main(["batch", str(experiment_file()), "--scheduler", address, "--output", str(tmp_path / "out")]) == 2
         message = capsys.readouterr().err

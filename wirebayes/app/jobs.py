@@ -8,7 +8,7 @@ from typing import Any
 
 from wirebayes.app import work
 from wirebayes.app.folders import Test
-from wirebayes.workers import start_apart
+from wirebayes.processes.workers import start_apart
 
 _PATIENCE_S = 5.0  # for a process to tidy up after SIGTERM, before it is killed
 

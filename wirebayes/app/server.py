@@ -17,7 +17,7 @@ from wirebayes.app.folders import Shelf
 from wirebayes.app.jobs import Jobs
 from wirebayes.app.page import add_pages
 from wirebayes.errors import InputError
-from wirebayes.workers import load_early
+from wirebayes.processes.workers import load_early
 
 ADDRESS = "127.0.0.1"
 PORT = 8137  # of no known service; another free one where it is taken and none was asked for

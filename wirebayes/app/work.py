@@ -64,7 +64,7 @@ def _read(test: Test, step: str, options: dict[str, Any], progress: Progress) ->
 
 def _ask(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
     """Check, fit or discover."""
-    from wirebayes.workers import load_early
+    from wirebayes.processes.workers import load_early
 
     load_early()
     record = test.record(READ) or {}

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.errors import InputError
-from wirebayes.interrupt import watch
+from wirebayes.processes.interrupt import watch
 
 if TYPE_CHECKING:
     import typer
@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ----------
     arguments : sequence of str, optional
         Without the program's name; those of the process when not given. Then Ctrl-C and SIGTERM end the process, too
-        (`wirebayes.interrupt`).
+        (`wirebayes.processes.interrupt`).
 
     Returns
     -------
@@ -173,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     import typer  # only now: Ctrl-C is welcome during imports, too
 
-    from wirebayes.workers import one_thread_each
+    from wirebayes.processes.workers import one_thread_each
 
     one_thread_each()  # small matrices: more threads only fight over them
     try:

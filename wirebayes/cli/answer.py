@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.answers import known_at_the_end
-from wirebayes.io.run_folder import plain
+from wirebayes.json_files.plain import plain
 from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.workflows.results import (

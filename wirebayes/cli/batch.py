@@ -50,7 +50,7 @@ def batch(
     quiet: Quiet = False,
 ) -> None:
     """Fit many experiments and find what each model is missing: DIR/summary.csv and a folder DIR/NAME for each."""
-    from wirebayes.workers import load_early
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.answer import Given, conclude

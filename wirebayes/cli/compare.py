@@ -44,7 +44,7 @@ def compare(
     Every model is judged twice: each hold left out in turn, and the last third of the holds (with --train-holds K, all
     after the K-th, and none of them is used before) predicted from the rest.
     """
-    from wirebayes.workers import load_early
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.answer import Given, conclude

@@ -34,7 +34,7 @@ def discover(
     quiet: Quiet = False,
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
-    from wirebayes.workers import load_early
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.answer import Given, conclude

@@ -50,7 +50,7 @@ def fit(
     quiet: Quiet = False,
 ) -> None:
     """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
-    from wirebayes.workers import load_early
+    from wirebayes.processes.workers import load_early
 
     if check:
         load_early()

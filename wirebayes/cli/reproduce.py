@@ -8,7 +8,7 @@ from wirebayes.cli.options import Output, Seed
 
 def reproduce(output: Output = None, seed: Seed = 0) -> None:
     """Reproduce the paper from its own tables, with posteriors: DIR/report.html, its tables and pictures."""
-    from wirebayes.workers import load_early
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.progress import progress

@@ -8,8 +8,8 @@ import numpy as np
 
 from wirebayes.effects import named
 from wirebayes.effects.rivals import RIVALS
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import Likelihood, Problem, build
 from wirebayes.wire.effect import Effect, EventEffect

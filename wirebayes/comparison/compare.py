@@ -29,11 +29,11 @@ from wirebayes.json_files.comparison import (
 )
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import Notice, from_json, named, to_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
-from wirebayes.typing import Floats
+from wirebayes.processes.workers import workers
 from wirebayes.wire.control import READ_UNIT
-from wirebayes.workers import workers
 
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
 POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=600)

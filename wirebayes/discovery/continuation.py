@@ -39,12 +39,12 @@ from wirebayes.discovery.screening import (
 )
 from wirebayes.discovery.settings import BY_LARGER
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.linear_algebra import cholesky, solve
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
-from wirebayes.typing import Array
+from wirebayes.numeric.linear_algebra import cholesky, solve
+from wirebayes.numeric.typing import Array
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.workers import ParallelMap
 
 _FIRST, _LAST = 1.5, 24.0  # δ of the rungs
 _RAW = 10.0  # δ of the first one before the parameters take their part, if that is less

@@ -13,8 +13,8 @@ from wirebayes.discovery.linear_scan import Probe, expand, moving_columns, proje
 from wirebayes.discovery.power import ALIKE, cosines
 from wirebayes.discovery.refit import Refit
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.typing import Array
+from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.numeric.typing import Array
 
 Family = tuple[str, ...]
 # What a person who tests lines would call what several effects have in common: the pattern, and the sentence of it.

@@ -20,8 +20,8 @@ from wirebayes.discovery.settings import ALPHA, BY_LARGER
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.json_files.discovery import GrossError
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import ParallelMap
 
 Report = Callable[[str, float, float], None]
 PLAIN_TO_SEE = 0.002  # p of the linear scan at which naming needs no look from larger effects either

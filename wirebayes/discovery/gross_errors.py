@@ -12,7 +12,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.notice import Notice
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 MOST = 0.05  # share of readings that may be called gross errors
 

@@ -13,10 +13,11 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.model.linear_amplitudes import completed
 from wirebayes.model.problem import Problem, Sample, build
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.staircase import Model, linearise
-from wirebayes.workers import ParallelMap
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import linearise
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery import smooth_reference
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.linear_algebra import cholesky
-from wirebayes.log_sum import log_sum
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
-from wirebayes.typing import Array
+from wirebayes.numeric.linear_algebra import cholesky
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import linearise, simulate
 

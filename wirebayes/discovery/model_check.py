@@ -25,8 +25,8 @@ from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.json_files.summary import ModelCheckResult, SummaryJson
 from wirebayes.notice import Notice, from_json, to_json
+from wirebayes.processes.workers import ParallelMap, workers
 from wirebayes.results.jobs import Job
-from wirebayes.workers import ParallelMap, workers
 
 _SHOWN = 3  # most surprising effects that are listed
 

@@ -14,7 +14,7 @@ from scipy.special import gammaln, logsumexp
 from wirebayes.discovery.families import Family
 from wirebayes.discovery.settings import IN_SET, MORE, UNKNOWN_WEIGHT
 from wirebayes.discovery.subsets import over_subsets
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

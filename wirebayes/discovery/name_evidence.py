@@ -12,9 +12,9 @@ from wirebayes.discovery.refit import LARGEST, Refit, refit
 from wirebayes.discovery.screening import Candidate, log_bayes
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import ParallelMap
 
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect

@@ -8,10 +8,10 @@ import numpy as np
 
 from wirebayes.discovery.linear_scan import Probe, expand, projected
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.inference.transform import LogPosterior
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
 from wirebayes.model.scales import NATURAL, Units
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import SET_UNIT
 from wirebayes.wire.protocol import Control, Protocol
 

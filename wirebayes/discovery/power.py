@@ -10,7 +10,7 @@ from wirebayes.discovery.refit import LARGEST, occam
 from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only

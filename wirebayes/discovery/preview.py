@@ -18,11 +18,11 @@ from wirebayes.json_files.check import EffectSize, ParameterRange
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.model.scales import NATURAL
 from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Array
 from wirebayes.results import hold_ends
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.posterior_checks import of_posterior
 from wirebayes.results.store import unit_of
-from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Control
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 
 # δ; end of an amplitude's prior. Hardly matters: twice as much takes ln 2 from every name alike

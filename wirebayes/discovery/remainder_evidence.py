@@ -21,11 +21,11 @@ from wirebayes.discovery.linear_scan import (
     whitened,
 )
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.linear_algebra import solve
-from wirebayes.log_sum import log_sum
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
-from wirebayes.typing import Array
+from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.typing import Array
 
 _MODES = 2  # of the fit without a remainder, from which the parameters move: as many as names begin from
 _STEPS = 5  # Gauss-Newton steps: three are usually enough

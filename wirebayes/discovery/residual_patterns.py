@@ -8,7 +8,7 @@ import numpy as np
 from wirebayes.discovery.linear_scan import Scan
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem, Sample
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
 

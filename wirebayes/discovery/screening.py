@@ -19,7 +19,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.modes import climb
 from wirebayes.model.problem import LENGTH_EXPONENT
 from wirebayes.model.replicate import readings as replicate
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
 
 _ROWS = 100  # replicates linearised at once, at most

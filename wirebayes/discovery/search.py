@@ -53,10 +53,10 @@ from wirebayes.json_files.discovery import (
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.scales import scales_of
 from wirebayes.notice import Notice, named, to_json
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.workers import ParallelMap
 
 _VISIBLE = 0.05  # p of a residual pattern that is reported of the remainder
 
@@ -134,7 +134,7 @@ def investigate(
     report : function of (what, done, total)
         Called as the work proceeds.
     parallel_map : function, optional
-        The built-in `map`, or one over processes (`wirebayes.workers`); the findings are the same.
+        The built-in `map`, or one over processes (`wirebayes.processes.workers`); the findings are the same.
 
     Returns
     -------

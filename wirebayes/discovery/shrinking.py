@@ -13,9 +13,9 @@ from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import HeldOut, LeaveOneHoldOutGain, Scores, Step
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import ParallelMap
 
 _NOTHING: Scores = {"rmse_N": None, "elpd": None, "coverage_90": None}
 _NOT_HELD_OUT: HeldOut = {

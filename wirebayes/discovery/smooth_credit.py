@@ -4,8 +4,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from wirebayes.discovery.linear_scan import ABSORBED, RATIOS, SIZES, Expansion, damp
-from wirebayes.linear_algebra import eigh, solve
-from wirebayes.typing import Array
+from wirebayes.numeric.linear_algebra import eigh, solve
+from wirebayes.numeric.typing import Array
 
 
 def beside_smooth(x: Expansion) -> Array:

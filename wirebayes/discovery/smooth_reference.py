@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery.settings import HOLD_LENGTHS, TIME_LENGTHS
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.protocol import Protocol
 
 FUNCTIONS = 16  # they hold 99 % of the process's variance on the paper's protocols

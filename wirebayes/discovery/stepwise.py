@@ -38,9 +38,9 @@ from wirebayes.discovery.settings import (
 from wirebayes.discovery.sharing import informed
 from wirebayes.discovery.smooth_credit import beside_smooth
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
+from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
-from wirebayes.workers import ParallelMap
 
 Key = frozenset[str]
 

@@ -7,7 +7,7 @@ it is expected in the next.
 import numpy as np
 from scipy.special import gammaln
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 def over_subsets(values: Array) -> tuple[float, Array, list[int]]:

@@ -29,8 +29,8 @@ from wirebayes.discovery.settings import (
 from wirebayes.discovery.stepwise import Accepted, Explored, Fits, FittedSet, Key
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.json_files.discovery import Disagreement
-from wirebayes.typing import Array
-from wirebayes.workers import ParallelMap
+from wirebayes.numeric.typing import Array
+from wirebayes.processes.workers import ParallelMap
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy import optimize, stats
 
-from wirebayes.resampling import systematic_rows
-from wirebayes.typing import Floats
+from wirebayes.numeric.resampling import systematic_rows
+from wirebayes.numeric.typing import Floats
 
 SPREAD = stats.lognorm(1.0, scale=0.05)  # specimens of one line mostly agree within one to twenty-five per cent
 _PROPOSALS = 4000  # importance draws: a thousand effective ones and more with five parameters

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 ENOUGH = 5.0  # autocorrelation times that steps must span, lest the time itself be cut short by them
 

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from wirebayes.inference.coordinates.transform import Transformation
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
 from wirebayes.inference.sampler.ensemble import Chains
-from wirebayes.inference.transform import LogPosterior, Transformation
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 STORED_DRAWS = 5000  # per ensemble: beyond that, quantiles no longer move
 

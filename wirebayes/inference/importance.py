@@ -25,9 +25,10 @@ from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.log_sum import log_sum
-from wirebayes.resampling import truncated_rows
-from wirebayes.typing import Array
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.resampling import truncated_rows
+from wirebayes.numeric.spread_rows import spread_rows
+from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ def from_draws(
     """
     height = densities(draws)
     width = draws.std(axis=0)
-    spread = mixture.spread_rows(draws / np.where(width > 0, width, 1.0), _STARTS, rng)
+    spread = spread_rows(draws / np.where(width > 0, width, 1.0), _STARTS, rng)
     which = np.append(np.arange(height.shape[1]), np.zeros(len(spread), int))
     begin = draws[np.append(np.argmax(height, axis=0), spread)]
     found = climb(

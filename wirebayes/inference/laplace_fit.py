@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import Optimum, climb, modes
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem, build, unit_of_column
 from wirebayes.model.scales import NATURAL, Scales
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.sampler.mixture import spread_rows
-from wirebayes.inference.transform import Density, LogPosterior, Residuals
-from wirebayes.resampling import next_power, systematic_rows
-from wirebayes.typing import Array
+from wirebayes.inference.log_posterior import Density, LogPosterior, Residuals
+from wirebayes.numeric.resampling import next_power, systematic_rows
+from wirebayes.numeric.spread_rows import spread_rows
+from wirebayes.numeric.typing import Array
 
 LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
 _ANNEALED = 400  # prior draws

@@ -7,15 +7,15 @@ sampler. For numbers that are reported, sample with `wirebayes.inference.fit`, w
 import numpy as np
 
 from wirebayes.inference.importance import LARGEST_K, effective, tail
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.inference.sampler.points import Points
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.log_sum import log_sum
-from wirebayes.resampling import truncated_rows
-from wirebayes.typing import Array
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.resampling import truncated_rows
+from wirebayes.numeric.typing import Array
 
 # 4096 draws, no test of tails: enough for means and widths, a fraction of a second
 _SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, block=32, most_steps=32)

@@ -15,13 +15,13 @@ import numpy as np
 from wirebayes.inference import importance
 from wirebayes.inference.fit import Fit
 from wirebayes.inference.importance import Weighted, effective, tail
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import Optimum, distinct, searches
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
-from wirebayes.resampling import truncated_rows
-from wirebayes.typing import Array
+from wirebayes.numeric.resampling import truncated_rows
+from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.io.experiment import Experiment, experiment_of
-from wirebayes.io.readings import OPTIONAL, READ, REQUIRED, Table, protocol_columns, shown
-from wirebayes.io.toml_keys import Keys
-from wirebayes.units import nearest
+from wirebayes.io.readings import OPTIONAL, READ, REQUIRED, protocol_columns
+from wirebayes.strict.columns import is_table
+from wirebayes.strict.hint import hint
+from wirebayes.strict.table import Table
+from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
 SOURCE = Path("from_arrays")  # stands where the file's name would: in errors and as an experiment's source
@@ -109,11 +111,6 @@ def protocol_of_columns(columns: Any, control: Control = "displacement") -> Tabl
     return table_of(columns, Path("protocol"), *protocol_columns(control), may_be_empty=(READ[control],))
 
 
-def is_table(value: Any) -> bool:
-    """Whether something is a mapping of columns or a DataFrame."""
-    return isinstance(value, Mapping) or hasattr(value, "columns")
-
-
 def table_of(
     columns: Any, source: Path, required: Sequence[str], optional: Sequence[str], may_be_empty: Sequence[str] = ()
 ) -> Table:
@@ -139,7 +136,7 @@ def table_of(
     for name in names:
         if name not in known:
             raise InputError(
-                f"{source}: found the column {shown(name)}{nearest(str(name), known)}, expected {', '.join(known)}"
+                f"{source}: found the column {shown(name)}{hint(str(name), known)}, expected {', '.join(known)}"
             )
     for name in required:
         if name not in names:

@@ -14,7 +14,7 @@ from wirebayes.io import gross_events
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, times_run_on
 from wirebayes.notice import Notice
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control, Protocol
 

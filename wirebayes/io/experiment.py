@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.errors import InputError
-from wirebayes.io.readings import LARGEST, SET, STRETCH, Hold, Table, frozen, readings_of, readings_table, shown
-from wirebayes.io.toml_keys import Keys, read_toml
+from wirebayes.errors import InputError, shown
+from wirebayes.io.readings import SET, STRETCH, Hold, readings_of, readings_table
+from wirebayes.numeric.frozen import frozen
 from wirebayes.sentences import counted
-from wirebayes.units import nearest
-from wirebayes.user_files import read_text
+from wirebayes.strict.files import read_text
+from wirebayes.strict.hint import hint
+from wirebayes.strict.table import LARGEST, Table
+from wirebayes.strict.toml_keys import Keys, read_toml
 from wirebayes.wire.protocol import Control, Protocol
 
 __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
@@ -263,7 +265,7 @@ def select(experiments: list[Experiment], name: str | None) -> list[Experiment]:
     names = [experiment.name for experiment in experiments]
     if name not in names:
         raise InputError(
-            f"{experiments[0].source}: found no experiment {shown(name)}{nearest(name, names)}, "
+            f"{experiments[0].source}: found no experiment {shown(name)}{hint(name, names)}, "
             f"expected one of {', '.join(names)}"
         )
     return [experiments[names.index(name)]]

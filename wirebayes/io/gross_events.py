@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import Hold, frozen
+from wirebayes.io.readings import Hold
+from wirebayes.numeric.frozen import frozen
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted, listed
-from wirebayes.typing import Floats
 from wirebayes.wire.protocol import Protocol
 
 NOTHING = 0.03  # of the reading before: no wire relaxes so far from one reading to the next

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.errors import shown
 from wirebayes.io.experiment import ENOUGH, LEAST_READINGS, SHORTEST, control_of
-from wirebayes.io.readings import LARGEST, READ, STRETCH, shown
-from wirebayes.io.toml_keys import Keys, read_toml
-from wirebayes.units import nearest
-from wirebayes.user_files import read_text
+from wirebayes.io.readings import READ, STRETCH
+from wirebayes.strict.files import read_text
+from wirebayes.strict.hint import hint
+from wirebayes.strict.table import LARGEST
+from wirebayes.strict.toml_keys import Keys, read_toml
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
 
@@ -253,7 +255,7 @@ def _guess(top: Keys) -> dict[str, Any]:
     inner = replace(top, table=table, prefix="guess.")
     for name, value in table.items():
         if name not in GUESSED:
-            raise inner.complain(name, f"an unknown parameter{nearest(name, GUESSED)}", ", ".join(GUESSED))
+            raise inner.complain(name, f"an unknown parameter{hint(name, GUESSED)}", ", ".join(GUESSED))
         if isinstance(value, bool) or not isinstance(value, int | float | dict):
             raise inner.complain(name, shown(value), 'a number, or a table such as { distribution = "normal", … }')
     return table
@@ -277,5 +279,5 @@ def _aim(top: Keys, effects: Sequence[str]) -> tuple[str, ...]:
         raise top.complain("aim", shown(aim), expected)
     for name in aim:
         if name not in effects:
-            raise top.complain("aim", f"{shown(name)}{nearest(name, effects)}", expected)
+            raise top.complain("aim", f"{shown(name)}{hint(name, effects)}", expected)
     return tuple(aim)

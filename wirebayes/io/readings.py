@@ -5,7 +5,6 @@ fields separated by commas, plain decimal numbers with optional spaces around th
 the end. There are no comments and no quotes. A row whose read value is empty says that its hold lasted until then.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import lgamma
@@ -16,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.sentences import counted
-from wirebayes.units import nearest
-from wirebayes.user_files import read_text
+from wirebayes.numeric.frozen import frozen
+from wirebayes.strict.table import Table, read_table
 from wirebayes.wire.protocol import Control
 
 REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
@@ -28,18 +26,6 @@ SET: dict[Control, str] = {"displacement": "displacement_mm", "force": "tension_
 READ: dict[Control, str] = {"displacement": "tension_N", "force": "displacement_mm"}
 
 UNIT: dict[str, str] = {"displacement_mm": "mm", "tension_N": "N"}
-
-# No bench comes near these: beyond them numbers are typing mistakes, and soon their squares overflow.
-LARGEST = {
-    "displacement_mm": 1e8,  # 100 km
-    "time_s": 1e10,  # three hundred years
-    "tension_N": 1e9,  # 100,000 t, several times the largest bridge's main cable
-    "temperature_C": 1e4,  # above the boiling point of every wire
-}
-
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
-_NEWLINE = re.compile(r"\r\n|\n|\r")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,109 +75,6 @@ class Hold:
         return self.readings if self.control == "displacement" else self.setting
 
 
-def shown(value: object) -> str:
-    """What was found, on one short line."""
-    try:
-        text = repr(value)
-    except ValueError:  # Python does not print integers of thousands of digits
-        return "a number of thousands of digits"
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-@dataclass(frozen=True)
-class Table:
-    """A CSV split into fields; `complain` turns a row and a column into a place a person can find.
-
-    Attributes
-    ----------
-    path : Path
-    header : list of str
-    rows : list of list of str
-    """
-
-    path: Path
-    header: list[str]
-    rows: list[list[str]]
-
-    def place(self, row: int, column: str) -> str:
-        """Where a cell stands; the header where there is no such column."""
-        if column not in self.header:
-            return "line 1, header"
-        return f"line {row + 2}, column {self.header.index(column) + 1} ({column})"
-
-    def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
-        """The error for one cell.
-
-        Parameters
-        ----------
-        row : int
-            Position among the rows of readings, from 0.
-        column : str
-        found, expected : str
-            As the message shows them: what stands there, and what should.
-
-        Returns
-        -------
-        InputError
-            With the file, the line and the column; the caller raises it.
-        """
-        return InputError(f"{self.path}, {self.place(row, column)}: found {found}, expected {expected}")
-
-    def cell(self, row: int, column: str) -> str:
-        """What a cell says."""
-        return self.rows[row][self.header.index(column)]
-
-    def number(self, row: int, column: str) -> float:
-        """A finite number of a size that this column may have."""
-        text = self.cell(row, column)
-        if not _NUMBER.fullmatch(text):
-            raise self.complain(row, column, shown(text) if text else "an empty cell", "a finite decimal number")
-        value = float(text)
-        if not abs(value) <= LARGEST[column]:
-            raise self.complain(row, column, shown(text), f"a number of at most {LARGEST[column]:.0e} in size")
-        return value
-
-    def whole(self, row: int, column: str) -> int:
-        """A whole number, 0 or more, of at most nine digits."""
-        text = self.cell(row, column)
-        if not _WHOLE.fullmatch(text):
-            found = shown(text) if text else "an empty cell"
-            raise self.complain(row, column, found, "a whole number from 0 to 999999999")
-        return int(text)
-
-
-def _read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> Table:
-    known = (*required, *optional)
-    expected = ",".join(required) + f" (and optionally {', '.join(optional)})"
-    lines = _NEWLINE.split(read_text(path, f"a header of {expected} and a line for each reading"))
-    while not lines[-1].strip():
-        lines.pop()
-    header = [field.strip() for field in lines[0].split(",")]
-    for column, name in enumerate(header, start=1):
-        if name not in known:
-            hint = nearest(name, known)
-            raise InputError(
-                f"{path}, line 1, column {column}: found {shown(name)}{hint}, expected a header of {expected}"
-            )
-        if name in header[: column - 1]:
-            raise InputError(f"{path}, line 1, column {column}: found {name} a second time, expected it once")
-    for name in required:
-        if name not in header:
-            raise InputError(f"{path}, line 1: found no column {name}, expected a header of {expected}")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        fields = [field.strip() for field in line.split(",")]
-        if len(fields) != len(header):
-            found = counted(len(fields), "field") if line.strip() else "a blank line"
-            column = min(len(fields), len(header))
-            expected = f"{len(header)} fields ({','.join(header)})"
-            raise InputError(f"{path}, line {number}, column {column}: found {found}, expected {expected}")
-        rows.append(fields)
-    if not rows:
-        raise InputError(f"{path}, line 2: found no readings, expected at least one")
-    return Table(path, header, rows)
-
-
 def read_readings(path: Path, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Read and check a readings' CSV.
 
@@ -218,7 +101,7 @@ def read_readings(path: Path, length_mm: float, control: Control = "displacement
 
 def readings_table(path: Path) -> Table:
     """A readings' CSV split into fields, not checked any further."""
-    return _read_table(path, REQUIRED, OPTIONAL)
+    return read_table(path, REQUIRED, OPTIONAL)
 
 
 def readings_of(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
@@ -264,7 +147,7 @@ def protocol_columns(control: Control) -> tuple[tuple[str, ...], tuple[str, ...]
 
 def protocol_table(path: Path, control: Control = "displacement") -> Table:
     """The CSV of a protocol to predict, split into fields: the readings' columns, with what is read optional."""
-    return _read_table(path, *protocol_columns(control))
+    return read_table(path, *protocol_columns(control))
 
 
 def protocol_holds(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
@@ -423,10 +306,3 @@ def _check_sign(table: Table, holds: Sequence[Hold]) -> None:
 
 PUSH = 5.0  # times the pull, and times the readings' spread in a hold: far beyond a sensor's noise or offset
 FOLLOWS = 0.9  # correlation with the displacement, which noise on a slack wire does not have
-
-
-def frozen(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """A read-only array, so that what was measured stays what was measured."""
-    array = np.array(values, dtype=float)
-    array.flags.writeable = False
-    return array

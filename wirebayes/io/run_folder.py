@@ -9,7 +9,6 @@ import errno
 import glob
 import io
 import json
-import math
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,11 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.errors import InputError
-from wirebayes.interrupt import unfinished
-from wirebayes.io.lock import LOCK, locked
-from wirebayes.user_files import read_bytes
+from wirebayes.json_files.plain import plain
+from wirebayes.processes.interrupt import unfinished
+from wirebayes.processes.lock import LOCK, locked
+from wirebayes.strict.files import read_bytes
 
 CONFIGURATION = "configuration.json"
 COMPLETE = "complete.json"
@@ -163,23 +163,6 @@ def stored_results(path: Path, instead: str = "run its command again in a new fo
         found = f"{type(error).__name__}: {error}"
         expected = f"what wirebayes {__version__} wrote there, unchanged; {instead}"
         raise InputError(f"{path}: cannot be used ({_short(found, 120)}), expected {expected}") from error
-
-
-def plain(value: Any) -> Any:
-    """The value in JSON's own types: arrays as lists, numpy numbers as Python's, paths as text, NaN as None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, set | frozenset):
-        return [plain(item) for item in sorted(value)]
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _umask() -> int:

@@ -4,7 +4,7 @@ from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import MeanAndSd, Numbers
 from wirebayes.notice import Warned
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 class CalibrationPrior(TypedDict):

@@ -2,7 +2,7 @@
 
 from typing import TypedDict
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 Points = Array | list[list[float]]
 

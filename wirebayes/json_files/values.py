@@ -5,7 +5,7 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 # an array where it is computed, a list where it is read
 Numbers = Floats | list[float]

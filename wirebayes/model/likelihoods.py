@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
+from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Model, Theta, Walk, simulate_alone
+from wirebayes.wire.staircase import Linearised, Theta, Walk, simulate_alone
 
 if TYPE_CHECKING:
     from wirebayes.wire._kernel import Staircases

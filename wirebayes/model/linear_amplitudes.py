@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes import linear_algebra
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
-from wirebayes.typing import Array
+from wirebayes.numeric import linear_algebra
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import Linearised, simulate
 
 _ROWS = 2048  # draws completed at once

@@ -37,10 +37,9 @@ import numpy as np
 from scipy import stats
 from scipy.special import expit, log_ndtr, logit, ndtr, ndtri
 
-from wirebayes.errors import InputError
-from wirebayes.io.readings import shown
+from wirebayes.errors import InputError, shown
 from wirebayes.model.scales import Scales
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.protocol import Control
 
 ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # as stiffness, creep and errors are

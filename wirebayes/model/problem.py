@@ -12,17 +12,18 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
-from wirebayes.means import geometric_mean
 from wirebayes.model import likelihoods
 from wirebayes.model.prior import Power, Prior, from_table, possible, scaled, wire_defaults
 from wirebayes.model.scales import NATURAL, Scales, Units, scales_of
-from wirebayes.typing import Array
-from wirebayes.units import nearest
+from wirebayes.numeric.means import geometric_mean
+from wirebayes.numeric.typing import Array
+from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Amplitude, Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.model import Model, tension_reference
 from wirebayes.wire.protocol import Control, Protocol
-from wirebayes.wire.staircase import Linearised, Model, linearise, streamed, tension_reference
+from wirebayes.wire.staircase import Linearised, linearise, streamed
 
 Likelihood = Literal["chain", "hold"]
 
@@ -534,7 +535,7 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
                 stated.add(hits[0])
             elif name not in everything and "." not in name:
                 known = f"one of {', '.join(sorted(everything))}, or effect.parameter"
-                raise InputError(f"{key}: found no such parameter{nearest(name, sorted(everything))}, expected {known}")
+                raise InputError(f"{key}: found no such parameter{hint(name, sorted(everything))}, expected {known}")
     return stated
 
 

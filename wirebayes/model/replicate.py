@@ -4,7 +4,7 @@ import numpy as np
 
 from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.problem import Problem, Sample
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import simulate
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.means import geometric_mean
+from wirebayes.numeric.means import geometric_mean
 
 MOST_OF_SPAN = 10.0  # times what was seen: weights that hardly differ show little but creep, some tenth of the stretch
 _SMALLEST_STEP = 1e-3  # of the length: stands in where a test has no displacement at all

@@ -14,7 +14,7 @@ from wirebayes.model.prior import from_table, possible
 from wirebayes.model.problem import MATERIAL, SAMPLE, default_prior
 from wirebayes.model.scales import NATURAL, TYPICAL_K1_N, planned_scales
 from wirebayes.notice import Notice
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from wirebayes.discovery import power, screening
 from wirebayes.discovery.linear_scan import expand
 from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import Optimum
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.problem import build

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wirebayes.inference.log_posterior import Density, LogPosterior
 from wirebayes.inference.modes import climb
-from wirebayes.inference.transform import Density, LogPosterior
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import frozen
 from wirebayes.json_files.plan import ExpectedWidth
 from wirebayes.model.problem import MATERIAL, Problem, build
 from wirebayes.model.replicate import readings
-from wirebayes.typing import Array
+from wirebayes.numeric.frozen import frozen
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import simulate

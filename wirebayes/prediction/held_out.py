@@ -13,9 +13,9 @@ from scipy.special import logsumexp
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
+from wirebayes.numeric.typing import Array
 from wirebayes.prediction.leave_one_hold_out import thinned
 from wirebayes.prediction.predictive import PredictionRequest, given_first, predict
-from wirebayes.typing import Array
 from wirebayes.wire.staircase import linearise
 
 LEVELS = (0.5, 0.9, 0.99)  # half, the usual nine in ten, and nearly all: intervals whose coverage is counted

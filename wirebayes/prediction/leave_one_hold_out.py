@@ -20,8 +20,8 @@ from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior
+from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.left_out_density import log_densities, without_hold
-from wirebayes.typing import Floats
 
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
 # a posterior without a hold may have a second mode that the one with it never visits, and k says little of that.

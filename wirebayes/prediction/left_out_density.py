@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from wirebayes.inference import importance
 from wirebayes.inference.fit import seed_of
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import searches
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior
 from wirebayes.model.problem import Problem
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 Holds = list[tuple[int, int]]
 

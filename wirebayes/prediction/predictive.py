@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.linear_algebra import eigh, solve
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem, Sample
-from wirebayes.typing import Floats
+from wirebayes.numeric.linear_algebra import eigh, solve
+from wirebayes.numeric.typing import Floats
+from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Model, Theta, Walk, linearise
+from wirebayes.wire.staircase import Theta, Walk, linearise
 
 _CHUNK = 500  # draws at a time: bounds the memory of the normal equations
 

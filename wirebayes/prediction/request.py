@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.io.experiment import protocol_of
-from wirebayes.io.readings import READ, SET, Hold, Table, protocol_holds, protocol_table, shown
+from wirebayes.io.readings import READ, SET, Hold, protocol_holds, protocol_table
+from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.store import Stored
 from wirebayes.sentences import counted
-from wirebayes.typing import Floats
+from wirebayes.strict.table import Table
 from wirebayes.wire.effect import EventEffect
 from wirebayes.wire.protocol import Protocol
 

@@ -10,10 +10,10 @@ import xarray as xr
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.readings import READ, SET
 from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.results.store import Stored
-from wirebayes.typing import Floats
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
 

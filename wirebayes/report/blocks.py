@@ -15,7 +15,8 @@ import numpy as np
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
-from wirebayes.io.run_folder import plain, write_bytes
+from wirebayes.io.run_folder import write_bytes
+from wirebayes.json_files.plain import plain
 from wirebayes.json_files.scene import SceneJson
 from wirebayes.notice import Notice, Warned, from_json
 from wirebayes.sentences import number as number

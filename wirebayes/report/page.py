@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
 from wirebayes.report.blocks import Page, View, sentence

@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 Source = Literal["prior", "data and prior", "data"]
 LEAST, MOST = (

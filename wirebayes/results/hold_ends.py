@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import climb
-from wirebayes.inference.transform import LogPosterior
 from wirebayes.json_files.hold_ends import HoldEnds, MovedByHoldEnds
 from wirebayes.json_files.values import UNITS
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem, Sample, unit_of_column
+from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed, number, unit_text
-from wirebayes.typing import Array
 from wirebayes.wire.protocol import Protocol
 
 COVERED = 0.9  # of each hold, by its readings: a tenth is a rest of 13 s after two minutes, as moving by hand takes

@@ -15,8 +15,8 @@ from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
 from wirebayes.model.prior import fast_logpdf
+from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
-from wirebayes.typing import Array
 from wirebayes.wire.fresh import FreshSample
 
 SENSITIVE = 0.05  # the threshold that the authors of the method propose

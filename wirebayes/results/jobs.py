@@ -11,8 +11,8 @@ from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import Likelihood, build
+from wirebayes.processes.workers import cores, workers
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import cores, workers
 
 
 @dataclass(frozen=True)

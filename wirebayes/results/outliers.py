@@ -12,7 +12,7 @@ from scipy import stats
 
 from wirebayes.json_files.batch import OutlierRow, Row
 from wirebayes.json_files.values import INTERVAL
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 FALSE_ALARMS = 0.05  # of materials whose specimens are all alike, the usual one in twenty has an outlier
 LEAST_SPECIMENS = 6  # with fewer, one would have to lie more than twelve spreads away to be called far

@@ -12,8 +12,8 @@ from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
 from wirebayes.model.problem import FINEST, Sample
 from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Floats
 from wirebayes.results.prior_influence import leaning
-from wirebayes.typing import Floats
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 
 LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends at a half of: it presses against that

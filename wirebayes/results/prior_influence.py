@@ -8,8 +8,8 @@ from scipy import stats
 
 from wirebayes.model.prior import Prior, fast_logpdf, logit_normal
 from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed
-from wirebayes.typing import Array
 
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about
 MOVED = 1.0  # posterior standard deviations by which an end of the 90 % interval moves

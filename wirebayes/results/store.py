@@ -14,7 +14,7 @@ import arviz_stats
 import numpy as np
 import xarray as xr
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit
@@ -27,15 +27,15 @@ from wirebayes.model.prior import Prior
 from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.notice import Notice, NoticeJson, to_json
+from wirebayes.numeric.typing import Array
 from wirebayes.results import hold_ends, posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.stored_check import check
-from wirebayes.typing import Array
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control, Protocol
-from wirebayes.wire.staircase import Model
 
 # a hold of the paper, and what a robot on the wire works through
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}

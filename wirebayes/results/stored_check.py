@@ -7,7 +7,7 @@ import numpy as np
 
 from wirebayes.model.prior import ABOVE_ZERO, NOT_BELOW_ZERO
 from wirebayes.model.problem import Likelihood, Sample
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 
 _LARGEST = 1e30  # no parameter, time or tension comes near, and its square does not overflow

@@ -14,20 +14,22 @@ import numpy as np
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import READ, SET, Hold, frozen
+from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
-from wirebayes.means import geometric_mean
 from wirebayes.model.problem import Problem, Sample, build, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.model.scales import TYPICAL_K1_N, planned_scales
-from wirebayes.typing import Array
-from wirebayes.units import nearest
+from wirebayes.numeric.frozen import frozen
+from wirebayes.numeric.means import geometric_mean
+from wirebayes.numeric.typing import Array
+from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.model import tension_reference
 from wirebayes.wire.protocol import Control
-from wirebayes.wire.staircase import simulate, tension_reference
+from wirebayes.wire.staircase import simulate
 
 FILE, TRUTH = "experiments.toml", "truth.json"
 PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)  # when the paper read its holds
@@ -186,8 +188,8 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     for name, value in truth.parameters.items():
         hits = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
         if not hits:
-            hint = nearest(name, problem.names)
-            raise InputError(f"parameter {name}: no such parameter{hint}; there are {', '.join(problem.names)}")
+            meant = hint(name, problem.names)
+            raise InputError(f"parameter {name}: no such parameter{meant}; there are {', '.join(problem.names)}")
         for i in hits:
             low, high = problem.prior.distributions[problem.names[i]].support()
             high = np.inf if name.split("[")[0] == "setting_sd" else high  # a bench may be worse than its prior

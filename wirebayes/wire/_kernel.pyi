@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 MOST_EFFECTS: int
 FORMULAS: tuple[str, ...]

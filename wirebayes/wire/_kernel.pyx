@@ -890,7 +890,7 @@ cdef inline Read read_hold(
 
 
 def square_gained(const double[:, ::1] drive, const double[:, ::1] reached, const Py_ssize_t[::1] which, double kept):
-    """Squares (n,) of what creep gains in a hold, summed over holds: `wirebayes.inference.transform`.
+    """Squares (n,) of what creep gains in a hold, summed over holds: `wirebayes.inference.coordinates.transform`.
 
     `drive` (H, n) is where creep goes in each hold, `reached` (T, n) the share of it reached, `which` (H,) of these.
     """

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import HoldContext, Placed
 from wirebayes.wire.inverse import inverse
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Protocol
 
 if TYPE_CHECKING:
-    from wirebayes.wire.staircase import Model
+    from wirebayes.wire.model import Model
 
 try:
     from wirebayes.wire import _kernel

@@ -5,7 +5,7 @@ other. Instruments act where they are: the screw or the gauge on the position, t
 it, the sensor or the gauge on what it shows.
 """
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import HoldContext, Placed
 from wirebayes.wire.elastic import Elastic
 from wirebayes.wire.inverse import inverse

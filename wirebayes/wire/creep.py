@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 from wirebayes.wire import laws
 from wirebayes.wire.effect import HoldContext, Placed
 

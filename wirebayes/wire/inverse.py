@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 _MOST_STEPS = 200  # halving a bracket takes 60 from any start; a root far above the first guess some more

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 ElasticLaw = Literal["hooke", "modified"]
 History = Literal["saturating", "additive"]

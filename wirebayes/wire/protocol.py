@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 Control = Literal["displacement", "force"]  # what is set in a hold; the other is read
 

@@ -4,19 +4,19 @@ Arrays end in the batch axis: readings are ``(H, R, n)``, one row of memory per 
 what numpy is fast at.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.means import geometric_mean
 from wirebayes.wire import compiled, laws
 from wirebayes.wire.control import SETTINGS
 from wirebayes.wire.creep import Creep
-from wirebayes.wire.effect import Clock, Effect, HoldContext, Placed
+from wirebayes.wire.effect import Clock, HoldContext, Placed
 from wirebayes.wire.elastic import Elastic
+from wirebayes.wire.model import PLAIN, Model
 from wirebayes.wire.protocol import Protocol
 
 if TYPE_CHECKING:
@@ -25,34 +25,6 @@ if TYPE_CHECKING:
 Theta = Mapping[str, NDArray[Any]]
 _NONE: NDArray[Any] = np.zeros((1, 1))  # stands in for what the hold has not computed yet
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
-
-
-@dataclass(frozen=True)
-class Model:
-    """Which wire: elastic law, history, effects, and the constant the effects refer to.
-
-    Attributes
-    ----------
-    law : {"hooke", "modified"}
-        Eq (1) or eq (3).
-    history : {"saturating", "additive"}
-        Whether eq (4) is the total creep a tension leads to, or is added again in every hold.
-    effects : tuple of Effect
-    tension_ref_N : float
-        Geometric mean of the training tensions.
-    length_ref_mm : float
-        Geometric mean of the samples' lengths, for effects that compare lengths; 0 means this sample's own.
-    """
-
-    law: laws.ElasticLaw = "hooke"
-    history: laws.History = "saturating"
-    effects: tuple[Effect, ...] = ()
-    tension_ref_N: float = 1.0
-    length_ref_mm: float = 0.0
-
-    def at(self, place: str) -> list[Effect]:
-        """The effects at one place, in the order they compose."""
-        return [effect for effect in self.effects if effect.place == place]
 
 
 @dataclass(frozen=True)
@@ -80,7 +52,7 @@ class Linearised:
 
 
 def simulate(
-    protocol: Protocol, theta: Theta, model: Model = Model(), setting_error: NDArray[Any] | None = None
+    protocol: Protocol, theta: Theta, model: Model = PLAIN, setting_error: NDArray[Any] | None = None
 ) -> NDArray[Any]:
     """Noise-free readings, the setting errors entering exactly.
 
@@ -112,7 +84,7 @@ def simulate(
     return np.array(readings)
 
 
-def simulate_alone(protocol: Protocol, theta: Theta, model: Model = Model()) -> list[NDArray[Any]]:
+def simulate_alone(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> list[NDArray[Any]]:
     """Noise-free readings (R, n) of each hold as if there had been none before it.
 
     Parameters
@@ -131,7 +103,7 @@ def simulate_alone(protocol: Protocol, theta: Theta, model: Model = Model()) -> 
     return out
 
 
-def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linearised:
+def linearise(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> Linearised:
     """Readings with their derivatives by setting error and carried creep.
 
     Of a step test without effects the derivatives are in closed form; others come from a complex step through the same
@@ -185,7 +157,7 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = Model()) -> Linea
     return Linearised(reading, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
 
 
-def streamed(protocol: Protocol, theta: Theta, model: Model = Model()) -> "Linearised | Staircases":
+def streamed(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> "Linearised | Staircases":
     """A staircase for one filter alone: compiled, it is filtered as it is computed, and never written to memory.
 
     Parameters
@@ -388,10 +360,3 @@ class Walk:
             past=self.past,
             law=self.model.law,
         )
-
-
-def tension_reference(tensions: Sequence[float] | NDArray[Any]) -> float:
-    """Geometric mean of the positive tensions, N; the constant that some effects and coordinates refer to."""
-    values = np.asarray(tensions, float)
-    values = values[values > 0]
-    return geometric_mean(values) if values.size else 1.0

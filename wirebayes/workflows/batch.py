@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.discovery.search import catalogue_without
 from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
@@ -21,9 +21,9 @@ from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes,
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.problem import MATERIAL, SAMPLE, build
 from wirebayes.notice import Notice, from_json, named, to_json
+from wirebayes.processes.workers import as_finished, computing, executor
 from wirebayes.results.outliers import outliers
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import as_finished, computing, executor
 from wirebayes.workflows.one_experiment import QUANTITIES, Done, Task, do, first_columns, packed
 from wirebayes.workflows.options import (
     PathLike,

@@ -11,6 +11,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.calibrate import BelongsTo, CalibrateJson, UnknownsJson
+from wirebayes.processes.workers import computing
 from wirebayes.robot.exchange.points import with_points
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
@@ -21,10 +22,9 @@ from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.session import Prior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
-from wirebayes.workers import computing
+from wirebayes.strict.columns import as_csv, row_place
 from wirebayes.workflows.options import PathLike, above_zero, check_seed, check_spread, from_zero, path_of
 from wirebayes.workflows.results import Calibration, Place
-from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import (
     RobotLike,
     Wires,

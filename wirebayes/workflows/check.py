@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of
@@ -12,8 +12,8 @@ from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import named, to_json
+from wirebayes.processes.workers import computing
 from wirebayes.wire.control import READ_UNIT
-from wirebayes.workers import computing
 from wirebayes.workflows.options import PathLike, Progress, Source, check_seed, experiments_of, path_of, silent
 from wirebayes.workflows.results import CHECKED, Check, Place
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.comparison.candidates import BASE, Candidate, candidates, problem_of
 from wirebayes.comparison.compare import POLICY, Task, run, side_by_side
 from wirebayes.effects import catalogue, source_of
@@ -17,9 +17,9 @@ from wirebayes.io.run_folder import open_run, read_json, stored_results, write_j
 from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.problem import Likelihood
 from wirebayes.notice import Notice, named
+from wirebayes.processes.workers import computing
 from wirebayes.sentences import counted
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     PathLike,
     Progress,

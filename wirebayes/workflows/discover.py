@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import get_args
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.discovery import search
 from wirebayes.discovery.search import (
     JointModel,
@@ -23,11 +23,11 @@ from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import Interval
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.notice import from_json, named, to_json
+from wirebayes.processes.workers import computing, workers
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.results.store import load
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import computing, workers
 from wirebayes.workflows.options import (
     PathLike,
     Progress,

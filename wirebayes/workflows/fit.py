@@ -7,7 +7,7 @@ from typing import get_args
 
 from scipy import stats
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.discovery.model_check import checked_meanwhile, write_checks
 from wirebayes.effects import catalogue, named, source_of
 from wirebayes.errors import InputError
@@ -15,10 +15,10 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run
 from wirebayes.model.problem import Likelihood, build
+from wirebayes.processes.workers import computing
 from wirebayes.results.jobs import Job, run
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     PathLike,
     Progress,

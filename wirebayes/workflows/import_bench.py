@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
 from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
@@ -15,7 +15,7 @@ from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.notice import named, to_json
-from wirebayes.user_files import read_bytes
+from wirebayes.strict.files import read_bytes
 from wirebayes.wire.protocol import Control
 from wirebayes.workflows.options import PathLike, above_zero, check_choice, without_breaks, words
 from wirebayes.workflows.results import IMPORTED, ImportedTests, Place

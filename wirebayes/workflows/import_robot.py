@@ -10,11 +10,11 @@ from wirebayes.errors import InputError
 from wirebayes.io.run_folder import write_text
 from wirebayes.robot.exchange import caspr, firmware, wirex
 from wirebayes.robot.exchange.imported import ImportedRobot, robot_file
-from wirebayes.robot.exchange.xml_file import Element, read
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
+from wirebayes.strict.xml_file import Element, read
 from wirebayes.workflows.options import Numbers, PathLike, numbers
 
 _PARTS = {"bodies_system": "bodies", "links": "bodies", "cables": "cables", "models": "models"}

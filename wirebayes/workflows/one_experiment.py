@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.discovery.model_check import write_checks
 from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import ALPHA, Settings
@@ -21,9 +21,9 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
+from wirebayes.processes.workers import one_thread_each
 from wirebayes.results.jobs import Job, fitted, store
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import one_thread_each
 from wirebayes.workflows.discover import jobs_of, write_findings
 from wirebayes.workflows.results import POSTERIOR, SUMMARY
 

@@ -10,7 +10,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io import gross_events
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, read_experiments, select
-from wirebayes.units import nearest
+from wirebayes.strict.hint import hint
 
 PathLike = str | os.PathLike[str]
 Source = PathLike | Experiment | Sequence[Experiment]
@@ -134,8 +134,8 @@ def check_choice(option: str, value: str, known: Sequence[str]) -> None:
         With the nearest known value as a hint.
     """
     if value not in known:
-        hint = nearest(value, known) if isinstance(value, str) else ""
-        raise InputError(f"{option}: found {value!r}{hint}, expected {' or '.join(known)}")
+        meant = hint(value, known) if isinstance(value, str) else ""
+        raise InputError(f"{option}: found {value!r}{meant}, expected {' or '.join(known)}")
 
 
 def text_of(values: Numbers) -> str:

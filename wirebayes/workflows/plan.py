@@ -8,24 +8,27 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.discovery.next_measurement import alternatives
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment, read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
-from wirebayes.io.readings import Hold, frozen
-from wirebayes.io.run_folder import open_run, plain, read_json, write_json
+from wirebayes.io.readings import Hold
+from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.json_files.plain import plain
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
 from wirebayes.notice import Notice, to_json
+from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked, too_long
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
 from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
+from wirebayes.processes.workers import computing
 from wirebayes.results import store
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
@@ -34,7 +37,6 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import drift
 from wirebayes.simulation.synthetic import Bench
 from wirebayes.wire.laws import ElasticLaw, History
-from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     PathLike,
     Progress,

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import open_run, plain, write_csv, write_json
+from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.json_files.plain import plain
+from wirebayes.numeric.typing import Floats
+from wirebayes.processes.workers import computing
 from wirebayes.robot.history.history import with_payload
 from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
@@ -19,8 +22,6 @@ from wirebayes.robot.pose.answer import Answer, answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.orientation import orientation
 from wirebayes.robot.pose.request import PoseRequest
-from wirebayes.typing import Floats
-from wirebayes.workers import computing
 from wirebayes.workflows.options import (
     Numbers,
     PathLike,

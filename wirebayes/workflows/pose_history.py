@@ -9,6 +9,8 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.numeric.typing import Floats
+from wirebayes.processes.workers import computing
 from wirebayes.robot.history import table
 from wirebayes.robot.history.answer import answer
 from wirebayes.robot.history.history import History
@@ -17,12 +19,10 @@ from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration.calibrated import to_dict
-from wirebayes.typing import Floats
-from wirebayes.workers import computing
+from wirebayes.strict.columns import as_csv, row_place
 from wirebayes.workflows.calibrate import calibrated_of
 from wirebayes.workflows.options import PathLike, Progress, above_zero
 from wirebayes.workflows.results import Calibration, Place, Pose
-from wirebayes.workflows.tables import as_csv, row_place
 from wirebayes.workflows.wires import Wires, content, hash_of
 
 _OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded

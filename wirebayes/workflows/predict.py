@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from wirebayes.errors import InputError
-from wirebayes.io.arrays import is_table, protocol_of_columns
+from wirebayes.io.arrays import protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
 from wirebayes.json_files.prediction import PredictionJson
@@ -23,6 +23,7 @@ from wirebayes.prediction.table import (
 from wirebayes.results import store
 from wirebayes.results.mixture import members_of
 from wirebayes.results.store import Stored
+from wirebayes.strict.columns import is_table
 from wirebayes.workflows.options import PathLike, check_choice, check_seed, path_of
 from wirebayes.workflows.results import Findings, Posterior, Posteriors
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.workers import computing
+from wirebayes.processes.workers import computing
 from wirebayes.workflows.options import PathLike, Progress, check_seed, silent
 from wirebayes.workflows.results import Place, Reproduction
 
@@ -38,7 +38,7 @@ def reproduce_paper(
     >>> paper.posteriors["nylon-1.5m/chain"].summary()["converged"]  # doctest: +SKIP
     True
     """
-    from wirebayes.reproduce.run import reproduce  # matplotlib only where it is needed
+    from wirebayes.paper.run import reproduce  # matplotlib only where it is needed
 
     place = Place(Path(output))
     with computing():

@@ -29,11 +29,11 @@ from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.truth import TruthJson
 from wirebayes.json_files.values import Quantiles
 from wirebayes.notice import Notice, Warned, from_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics.draws import specimens_in_words
 from wirebayes.sentences import counted, unit_text
-from wirebayes.typing import Floats
 from wirebayes.workflows.options import PathLike
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import get_args
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import check_run, open_run

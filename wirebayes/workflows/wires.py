@@ -10,11 +10,11 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from wirebayes import __version__
+from wirebayes._version import __version__
 from wirebayes.effects import source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.between_specimens import between_specimens
-from wirebayes.io.run_folder import plain
+from wirebayes.json_files.plain import plain
 from wirebayes.results import store
 from wirebayes.results.store import Stored
 from wirebayes.robot.mechanics import schema

@@ -14,7 +14,7 @@ from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
-from wirebayes.resampling import effective_number
+from wirebayes.numeric.resampling import effective_number
 
 D = 3
 NORMAL = Mixture(np.ones(1), np.zeros((1, D)), np.eye(D)[None], 1e6)

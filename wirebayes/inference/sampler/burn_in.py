@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import LEAST_CURVATURE, Optimum, climb, distinct, search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
@@ -24,9 +25,9 @@ from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers, advance, move_of
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.resampling import effective_number, next_power, truncated_rows
-from wirebayes.typing import Array
+from wirebayes.numeric.resampling import effective_number, next_power, truncated_rows
+from wirebayes.numeric.spread_rows import spread_rows
+from wirebayes.numeric.typing import Array
 
 
 def init(
@@ -185,7 +186,7 @@ def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:
     z, value = state.all_kept.flat
     over = value - state.learned.proposal.log_density(z)
     least = np.unique(z[over >= np.quantile(over, 1.0 - _LEAST_OF)], axis=0)
-    begin = least[mixture.spread_rows(least / z.std(axis=0), _CLIMBS, state.generator)]
+    begin = least[spread_rows(least / z.std(axis=0), _CLIMBS, state.generator)]
     density, residuals = target.rowwise()
     found = climb(density, begin, residuals, of=np.zeros(len(begin), np.int64), known=[known])
     return found.rows(found.converged & np.isfinite(found.log_density))

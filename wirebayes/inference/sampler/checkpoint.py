@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import differences, plain, stored_results, write_bytes
+from wirebayes.io.run_folder import differences, stored_results, write_bytes
+from wirebayes.json_files.plain import plain
 
 FORMAT = 5  # raise it whenever what is stored changes its meaning
 _VALUES = "state.json"

@@ -13,7 +13,7 @@ from scipy.special import ndtr, ndtri
 
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.transport_map import Straight
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.inference.convergence import ENOUGH
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, stop_rule
 from wirebayes.inference.sampler.state import BurnIn, Kept, Sampling, advance, move_of
-from wirebayes.inference.transform import LogPosterior
 
 
 def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:

@@ -9,8 +9,9 @@ import numpy as np
 from scipy.special import gammaln
 
 from wirebayes.inference.sampler.points import Points
-from wirebayes.log_sum import log_sum
-from wirebayes.typing import Array
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.spread_rows import spread_rows
+from wirebayes.numeric.typing import Array
 
 DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
 
@@ -237,29 +238,3 @@ def _em(
             break
         last = log_likelihood
     return mixture
-
-
-def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None = None) -> list[int]:
-    """Rows far from one another, for a start (k-means++).
-
-    Parameters
-    ----------
-    x : (n, d) array
-    k : int
-        How many rows.
-    rng : numpy.random.Generator
-    weight : (n,) array, optional
-        Of the rows, summing to one.
-
-    Returns
-    -------
-    list of int
-        Fewer than `k` where there are not so many different points.
-    """
-    share = np.full(len(x), 1.0 / len(x)) if weight is None else weight
-    chosen = [int(rng.choice(len(x), p=share))]
-    nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)
-    while len(chosen) < k and nearest.any():
-        chosen.append(int(rng.choice(len(x), p=share * nearest / (share @ nearest))))
-        nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
-    return chosen

@@ -13,7 +13,7 @@ from wirebayes.inference.sampler import net
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal, components
 from wirebayes.inference.sampler.transport_map import Straight
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 class PoolMove(Move):  # type: ignore[misc]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 def around(given: Array, size: int, random: Any) -> Array:

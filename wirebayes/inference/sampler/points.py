@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.resampling import thinned, truncated
-from wirebayes.typing import Array
+from wirebayes.numeric.resampling import thinned, truncated
+from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Points:
         return Points(np.vstack([self.z, other.z]), np.append(self.weight, other.weight))
 
     def thinned(self, n: int, rng: np.random.Generator) -> "Points":
-        """At most n of the points, their weights raised where others had to go (see `wirebayes.resampling.thinned`).
+        """At most n of the points, their weights raised where others had to go, by `resampling.thinned`.
 
         No more than `distinct` either: where a point stands for less than a draw, it goes or counts as one.
 

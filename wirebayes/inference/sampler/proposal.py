@@ -20,9 +20,9 @@ from wirebayes.inference.sampler.components import Components
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.transport_map import Straight
-from wirebayes.log_sum import log_sum
-from wirebayes.resampling import effective_number
-from wirebayes.typing import Array
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.resampling import effective_number
+from wirebayes.numeric.typing import Array
 
 Shares = tuple[float, float, float, float, float]
 # of the close part, the wide one, the plain one, the start's and that of the excess; without it the others share all

@@ -13,7 +13,7 @@ from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, State, Walkers
 from wirebayes.io.run_folder import stored_results
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 _PLAIN_LEARNED = ("modes", "trusted", "acceptance", "walks", "again", "overlooked", "lost")
 _PLAIN_KEPT = ("evaluations", "accepted", "proposed")

@@ -12,13 +12,13 @@ import emcee
 import numpy as np
 from emcee.moves.move import Move
 
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 POOL = 64  # steps of which one does not trust the proposal; more gain little
 _EXPLORING = 4  # the same in burn-in, which looks for what the proposal leaves out

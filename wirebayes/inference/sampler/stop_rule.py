@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat, slowest_autocorrelation_steps
+from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
 from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Sampling, by_ensemble
-from wirebayes.inference.transform import LogPosterior
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from wirebayes.inference.sampler.points import Points
-from wirebayes.typing import Array
+from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True)

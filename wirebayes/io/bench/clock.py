@@ -7,11 +7,11 @@ from datetime import date
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.errors import shown
 from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.sheet import MONTHS, is_moment, is_value, moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.io.readings import shown
 
 _DAY = 86400.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day

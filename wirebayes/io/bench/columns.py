@@ -5,15 +5,14 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.io.bench.clock import UNDERSTOOD, has_moments, looks_like_a_moment
 from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, is_foreign, unit_of
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best, clock_of, parting
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.io.readings import shown
 from wirebayes.sentences import listed
-from wirebayes.units import nearest
+from wirebayes.strict.hint import hint
 
 IGNORE = "ignore"
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
@@ -213,9 +212,9 @@ def _mapped(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str
         header, unit = header.strip(), unit.strip("[]() ")
         names = [*ROLES, IGNORE]
         if not equals or role not in names or (unit and role in (IGNORE, "hold")):
-            hint = nearest(role, names) if equals else ""
+            meant = hint(role, names) if equals else ""
             expected = f"HEADER=COLUMN or HEADER=COLUMN [UNIT], COLUMN one of {', '.join(names)}"
-            raise InputError(f"--map: found {text!r}{hint}, expected {expected}")
+            raise InputError(f"--map: found {text!r}{meant}, expected {expected}")
         index, unit_in_header = _named(table, header, role)
         out[index] = index, role, unit or unit_in_header
     return list(out.values())
@@ -230,7 +229,7 @@ def _named(table: RawTable, header: str, role: str) -> tuple[int, str]:
         if unit and bare in table.header:
             return table.header.index(bare), unit.text
     names = [name for name in table.header if name]
-    found = f"no column {header!r}{nearest(header, names)}"
+    found = f"no column {header!r}{hint(header, names)}"
     raise InputError(f"{table.sheet.path}, line {table.header_line}: found {found}, expected one of {', '.join(names)}")
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted
-from wirebayes.typing import Floats
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 from wirebayes.wire.protocol import Control
 
 Rows = NDArray[np.int64]

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.errors import InputError
+from wirebayes.errors import InputError, shown
 from wirebayes.io.bench import clock, workbook
 from wirebayes.io.bench.columns import Column, known_words, understand
 from wirebayes.io.bench.control import recognised
@@ -29,10 +29,11 @@ from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.bench.unread import unread
 from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment, experiment_of
-from wirebayes.io.readings import LARGEST, OPTIONAL, REQUIRED, Table, shown
-from wirebayes.io.toml_keys import Keys
+from wirebayes.io.readings import OPTIONAL, REQUIRED
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted, listed
-from wirebayes.typing import Floats
+from wirebayes.strict.table import LARGEST, Table
+from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
 _COLUMN_ROLES: dict[str, Role] = {

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.user_files import read_bytes
+from wirebayes.strict.files import read_bytes
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),

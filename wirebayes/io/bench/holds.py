@@ -30,8 +30,8 @@ from wirebayes.io.bench.recorded import (
 from wirebayes.io.bench.resets import joined
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted, listed
-from wirebayes.typing import Floats
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move

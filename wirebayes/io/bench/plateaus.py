@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 PENALTY = 4.0  # times the log of the readings: noise alone is then split less often than once in a hundred recordings
 SAME_LEVEL = 2.0  # noise levels between neighbours that are one hold

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import UNITS
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expected
 Rows = NDArray[np.int64]

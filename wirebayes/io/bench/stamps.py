@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.io.bench.table import RawTable
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 TICKS_S = (0.001, 0.01, 0.1, 1.0, 60.0)  # what clocks count; rarer stamps are a person's, or a test's own steps
 FEWEST = 10  # stamps between the first and the last that show a habit

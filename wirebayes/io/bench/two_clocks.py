@@ -9,7 +9,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.clock import has_moments, seconds
 from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.table import RawTable
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 SAME_RATE = 1e-3  # of the time that has passed: a quartz is a hundred times better
 

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from wirebayes.errors import shown
 from wirebayes.io.bench.columns import Column, ignored, is_copy, plain
 from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.readings import shown
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import listed
-from wirebayes.typing import Floats
 
 # What a specimen is called, in the languages of the columns, without accents.
 _SPECIMEN = (

@@ -9,7 +9,7 @@ from typing import Any
 from wirebayes.errors import InputError
 from wirebayes.io.bench.sheet import Row, Sheet, is_value
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.units import nearest
+from wirebayes.strict.hint import hint
 
 SIGNATURE = b"PK\x03\x04"
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
@@ -49,7 +49,7 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
     if chosen is not None:
         if chosen not in rows:
             names = ", ".join(rows)
-            raise InputError(f"{path}: found no sheet {chosen!r}{nearest(chosen, list(rows))}, expected one of {names}")
+            raise InputError(f"{path}: found no sheet {chosen!r}{hint(chosen, list(rows))}, expected one of {names}")
         return Sheet(path, rows[chosen], lettered=True, described=f"sheet {chosen}")
     full = [name for name, found in rows.items() if sum(_measured(row) for row in found) > 1]
     if not full:

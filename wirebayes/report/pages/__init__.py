@@ -2,7 +2,7 @@
 
 # each module has ``page(folder, configuration)``
 PAGES = {
-    "reproduce": "wirebayes.report.pages.reproduce",
+    "reproduce": "wirebayes.paper.page",
     "import": "wirebayes.report.pages.check",
     "check": "wirebayes.report.pages.check",
     "fit": "wirebayes.report.pages.fit",

@@ -10,6 +10,7 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.problem import Sample
+from wirebayes.numeric.typing import Array
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
@@ -36,7 +37,6 @@ from wirebayes.report.pictures.curve import through_the_readings
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.store import Stored, load_with_priors, unit_of
 from wirebayes.sentences import counted, listed
-from wirebayes.typing import Array
 from wirebayes.wire.effect import Effect
 
 _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture

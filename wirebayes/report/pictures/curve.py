@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest, chain_course
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
 from wirebayes.results.store import Stored
-from wirebayes.typing import Floats
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
 

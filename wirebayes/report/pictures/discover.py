@@ -12,10 +12,10 @@ from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.model import likelihoods
+from wirebayes.numeric.typing import Array, Floats
 from wirebayes.report.blocks import save
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.store import Stored
-from wirebayes.typing import Array, Floats
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.staircase import Linearised, linearise
 

@@ -13,6 +13,7 @@ from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.pose import ControllerError, Drift, VarianceShares
 from wirebayes.json_files.scene import SceneJson
 from wirebayes.json_files.values import Band, Numbers
+from wirebayes.numeric.typing import Floats
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
 from wirebayes.report.pictures.robot_space import orientation, workspace_maps
@@ -21,7 +22,6 @@ from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.answer import Answer
 from wirebayes.robot.pose.request import PoseRequest
-from wirebayes.typing import Floats
 
 CONTROLLERS = {
     "hooke_only": "ignores creep",

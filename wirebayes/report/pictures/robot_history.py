@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from wirebayes.io.run_folder import write_bytes, write_text
 from wirebayes.json_files.pose_history import Corrections, DriftOverTime
 from wirebayes.json_files.values import INTERVAL, Numbers
+from wirebayes.numeric.typing import Floats
 from wirebayes.report.blocks import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
 from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor
 from wirebayes.robot.history.answer import HistoryAnswer
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.typing import Floats
 
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#8a6d5c", "#b0708e", "#6b7780")
 _PANELS, _FRAMES, _SECONDS = 5, 60, 12

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.numeric.typing import Array
 from wirebayes.report.figures import CHAIN, HOLD, INK, legend_below, panel
-from wirebayes.typing import Array
 
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#b9bec4")
 

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.report.figures import INK, QUIET
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S, WorkspaceDrift
 from wirebayes.robot.pose.maps import Map
-from wirebayes.typing import Floats
 
 
 def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.exchange.imported import ImportedRobot
-from wirebayes.robot.exchange.xml_file import Element
 from wirebayes.robot.mechanics.description import Freedom
 from wirebayes.robot.mechanics.rotation import matrix, vector
-from wirebayes.typing import Floats
+from wirebayes.strict.xml_file import Element
 
 _JOINTS: dict[str, tuple[Freedom, tuple[int, ...]]] = {  # freedom, and the axes that the first coordinates move along
     "SPATIAL_EULER_XYZ": ("pose", (0, 1, 2)),

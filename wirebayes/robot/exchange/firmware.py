@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.exchange.imported import ImportedRobot
-from wirebayes.typing import Floats
-from wirebayes.user_files import read_text
+from wirebayes.strict.files import read_text
 
 SUFFIXES = (".g", ".cfg")
 _WORD = re.compile(r"([A-Z])\s*((?:[-+]?[0-9.]+)(?::[-+]?[0-9.]+)*)")

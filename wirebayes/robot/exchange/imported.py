@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Freedom
-from wirebayes.typing import Floats
 
 _SHARE = 0.15  # of the exit points' extent, to each side of the home pose: the box of workspace figures
 

@@ -2,8 +2,8 @@
 
 import re
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.typing import Floats
 
 _KEY = r"(?m)^(\s*{key}\s*=\s*)\[[^\]]*\]"
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.exchange.imported import ImportedRobot
-from wirebayes.robot.exchange.xml_file import Element
 from wirebayes.robot.mechanics.description import Freedom
-from wirebayes.typing import Floats
+from wirebayes.strict.xml_file import Element
 
 _PATTERNS: dict[str, Freedom] = {"3R3T": "pose", "3T": "position"}
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.export.mujoco_model import mjcf
 from wirebayes.robot.export.robot_models import cut_from, sdf, urdf
 from wirebayes.robot.mechanics import statics
@@ -21,7 +22,6 @@ from wirebayes.robot.mechanics.drums import motor_angle, paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.robot.motion import inverse
-from wirebayes.typing import Floats
 from wirebayes.wire.fresh import FreshSample
 
 ANCHORS = "ABCDI"  # as M669 of RepRapFirmware names them, at most five: its E is an extruder

@@ -13,9 +13,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.rotation import matrix, vector
-from wirebayes.typing import Floats
 
 _STILL = "pulleys do not swivel: they look towards the home pose; lengths and forces are the robot's there"
 

@@ -9,9 +9,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.typing import Floats
 
 
 def urdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wirebayes.json_files.pose_history import Clock, DriftOverTime, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
 from wirebayes.notice import Notice, to_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.corrections import Target
@@ -29,7 +30,6 @@ from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.answer import unheld
 from wirebayes.robot.pose.request import band
-from wirebayes.typing import Floats
 
 _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.estimate import Estimate, Progress
 from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
@@ -14,7 +15,6 @@ from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse
-from wirebayes.typing import Floats
 
 _STRAIGHT = 0.02  # of the robot's span: over so short a way, even joint values make an even motion
 

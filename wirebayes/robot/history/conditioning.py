@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.resampling import systematic_rows
+from wirebayes.numeric.resampling import systematic_rows
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import roll_and_pitch
 from wirebayes.robot.history.readings import Information, Sensors
 from wirebayes.robot.history.unknowns import Unknowns, slopes
-from wirebayes.typing import Floats
 
 Way = Callable[[Floats, str, NDArray[np.bool_]], Track]  # of white unknowns (n, d), a name for the progress, no wires
 _MOST = 12  # passes to the mode; four or five are usual

@@ -5,12 +5,12 @@ from functools import partial
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.estimate import Estimate
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import nearest
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.conditioning import Readings, draw, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow, refined
 from wirebayes.robot.history.history import History
@@ -15,7 +16,6 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState
-from wirebayes.typing import Floats
 
 Progress = Callable[[str, float, float], None]
 _TOO_FEW = 20.0  # effective draws: of fewer, not one lies beyond a 5 % quantile

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.motion.drift import Walk
-from wirebayes.typing import Floats
 
 # Share of the mean tension by which a command must change a wire's tension to restart the clocks. On the paper's
 # bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

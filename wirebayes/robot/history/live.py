@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, sensors, weight
@@ -24,7 +25,6 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import CreepState, HoldCreep
-from wirebayes.typing import Floats
 
 _LONG = 5e-2  # of the platform's size: a longer Newton step is followed with care instead
 _AGAIN = 5e-3  # of the platform's size: after a shorter one, less than a micrometre is left

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.typing import Floats
 
 TOGETHER_S = 1.0  # readings nearer in time count as one: a sensor's noise at a controller's rate is not independent
 _OFFSET = 0.5  # share of a reading's variance that the sensor keeps as an offset

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
-from wirebayes.typing import Floats
-from wirebayes.units import nearest
-from wirebayes.user_files import csv_rows, read_text
+from wirebayes.strict.files import csv_rows, read_text
+from wirebayes.strict.hint import hint
 
 POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
@@ -144,9 +144,7 @@ def _check_header(where: str, names: Sequence[str], columns: Columns) -> None:
     known = columns.known
     for i, name in enumerate(names):
         if name not in known:
-            raise InputError(
-                f"{where}: found the column {name[:60]!r}{nearest(name, known)}; expected {_short(columns)}"
-            )
+            raise InputError(f"{where}: found the column {name[:60]!r}{hint(name, known)}; expected {_short(columns)}")
         if name in names[:i]:
             raise InputError(f"{where}: found the column {name} twice; expected it once")
     for group in (columns.needed, *columns.groups):

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import ndtri
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import uncreeping
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -13,7 +14,6 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.session import Prior
-from wirebayes.typing import Floats
 
 _STEP = 0.05  # of a prior sd: far above the solver's error, and poses are straight over it
 _EXACT_M = 1e-6  # a length that is said to be exact is known to a micrometre

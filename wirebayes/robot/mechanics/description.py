@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 Actuator = Literal["drum", "linear"]
 Freedom = Literal["pose", "position"]

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.json_files.pose import Specimens, WiresUsed
 from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.typing import Floats
 from wirebayes.wire import laws
 from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Drums
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

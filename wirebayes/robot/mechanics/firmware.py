@@ -7,8 +7,8 @@ A wire that runs in several lines is ``lines`` times as long as the straight way
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.typing import Floats
 
 
 def wire_of(robot: Robot, straight_m: ArrayLike) -> Floats:

@@ -14,11 +14,11 @@ References
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.typing import Floats
 
 
 def onto(robot: Robot, position_m: Floats, rotation: Floats) -> tuple[Floats, Floats]:

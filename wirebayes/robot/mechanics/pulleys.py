@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Pulleys
-from wirebayes.typing import Floats
 
 _LEAST = 1e-3  # of the radius: a point nearer to the rim has no tangent worth the name, and nearer to the axis no plane
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 
 def matrix(rotation_vector_rad: Floats) -> Floats:

@@ -11,9 +11,9 @@ References
 import numpy as np
 
 from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
-from wirebayes.typing import Floats
 
 # Weight by tension from which on sag is reported: a level wire is then longer than its chord by a ten-thousandth, as
 # much as minutes of creep.

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Drums, GivenWire, Plane, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.shipped import shipped as shipped
 from wirebayes.robot.mechanics.tensions import CHOICES
-from wirebayes.typing import Floats
-from wirebayes.user_files import read_text
+from wirebayes.strict.files import read_text
 
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.pulleys import WireRun, run
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
-from wirebayes.typing import Floats
 
 _NOWHERE = 1e-300  # m; a wire without length has no direction, and no pull
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import nnls
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 Choice = Callable[[Floats, Floats, float, float], Floats | None]
 

@@ -10,13 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 from wirebayes.wire import laws
 from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.effect import Effect, HoldContext, Placed, steady_hold
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.inverse import inverse
-from wirebayes.wire.staircase import Model
+from wirebayes.wire.model import Model
 
 # nodes and weights exact for polynomials of degree 15; between slack and stretched the laws are smooth
 _GAUSS = np.polynomial.legendre.leggauss(8)

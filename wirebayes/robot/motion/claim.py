@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.json_files.pose import ClaimNumbers
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, hanging, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
-from wirebayes.typing import Floats
 
 TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, inverse
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
-from wirebayes.typing import Floats
 
 Schedule = Callable[[float], Floats]
 

@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.wires import Wires, hold_context
-from wirebayes.typing import Floats
 from wirebayes.wire.creep import Creep
 
 Follow = Literal["current", "start"]

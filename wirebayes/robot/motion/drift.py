@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, one_sided, path
 from wirebayes.robot.motion.creep import CreepState, Follow, HoldCreep, fresh
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import cholesky, plane, statics
+from wirebayes.numeric import cholesky
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 from wirebayes.robot.motion import one_sided
-from wirebayes.typing import Floats
 
 FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
 _GOING_ON = -1  # of a case that is still being solved

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.motion import inverse
-from wirebayes.typing import Floats
 
 _STEPS = 80  # of linearisation; a dozen are usual, and a family of solutions that bends much takes more
 _LONGEST_RAD = 0.3  # turned in a step: beyond, what was linearised means little

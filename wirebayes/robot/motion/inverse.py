@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import CHOICES, Choice
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, zero_tension_length
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

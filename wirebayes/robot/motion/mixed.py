@@ -11,11 +11,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import cholesky, statics
+from wirebayes.numeric import cholesky
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
-from wirebayes.typing import Floats
 
 _SETS = 40  # of taut wires tried in a step; one or two are usual
 _HALVINGS = 30  # of the way along a direction, to the lowest point on it

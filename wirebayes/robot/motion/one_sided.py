@@ -11,10 +11,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
-from wirebayes.typing import Floats
 
 TOUCHING = 1e-9  # strain from zero within which a wire is neither taut nor slack: a nanometre a metre
 # Of the stiffness: added so that no two of its eigenvalues are alike. Symmetric robots have whole planes of

@@ -10,11 +10,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.mechanics import cholesky
+from wirebayes.numeric import cholesky
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed
-from wirebayes.typing import Floats
 
 _SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
 _TRUST = 0.5  # a step that ends further from its prediction, relative to its length, is divided

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.typing import Floats
 
 _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
 _TWICE = 2.0  # times its length: no wire stretches so far, but a wire of two lines looks so where one line was given

@@ -18,6 +18,7 @@ from wirebayes.json_files.pose import (
 )
 from wirebayes.json_files.values import Band
 from wirebayes.notice import Notice, NoticeJson, to_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import draws, drums, plane, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
@@ -30,7 +31,6 @@ from wirebayes.robot.pose.maps import Map, map_slices, summaries
 from wirebayes.robot.pose.orientation import Orientation
 from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
-from wirebayes.typing import Floats
 
 _LEVEL = 1e-6  # sine of a wire's angle to the horizontal: so little is rounding in the robot's file
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.json_files.pose import SliceOfWorkspace
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import draws, plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim
 from wirebayes.robot.motion.claim import WorkspaceDrift
-from wirebayes.typing import Floats
 
 _GRID, _FLAT, _DRAWS = (7, 7, 3), (9, 9, 9), 60  # points of the map; of a workspace in one plane
 TABLE = (

@@ -3,12 +3,12 @@
 import numpy as np
 
 from wirebayes.json_files.pose import OnPlane
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.pose.request import band
-from wirebayes.typing import Floats
 
 
 def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> str:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.json_files.pose import OrientationFound
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
-from wirebayes.typing import Floats
 
 COMPONENTS = ("rx", "ry", "rz")
 _ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off

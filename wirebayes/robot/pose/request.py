@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.json_files.values import Band
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD
 from wirebayes.robot.pose.maps import LEVEL, Slices
 from wirebayes.robot.pose.orientation import Orientation
-from wirebayes.typing import Floats
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}  # the median and the 90 % interval, as everywhere
 

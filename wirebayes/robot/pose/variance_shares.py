@@ -11,7 +11,7 @@ from math import comb
 
 import numpy as np
 
-from wirebayes.typing import Floats
+from wirebayes.numeric.typing import Floats
 
 
 def shares(parameters: Mapping[str, Floats], output: Floats) -> dict[str, float]:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
-from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
 Bounds = tuple[Floats, Floats]  # lower and upper, (w,) each

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.proof.ball_arithmetic import Balance, Bounds
-from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
 

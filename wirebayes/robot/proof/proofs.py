@@ -3,13 +3,13 @@
 import numpy as np
 
 from wirebayes.json_files.pose import Certificate, EnclosedBand
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, forward, inverse
 from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.proof.certificate import certify
 from wirebayes.robot.proof.reach import Reach, apart, reach
-from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
 _Pose = tuple[Floats, Floats, Floats]  # position, rotation, and how exactly they are known

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.proof.ball_arithmetic import Balance, Strand
-from wirebayes.typing import Floats
 from wirebayes.wire.laws import ElasticLaw
 
 _UP = 1.0 + 1e-12  # more than the few roundings of a sum

@@ -14,6 +14,7 @@ from wirebayes.json_files.calibrate import (
     Observed,
 )
 from wirebayes.notice import Notice, to_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
@@ -23,7 +24,6 @@ from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
 from wirebayes.robot.self_calibration.session import Prior, Session
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval
-from wirebayes.typing import Floats
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.json_files.calibrate import CalibratedUnknowns
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix, vector
@@ -13,7 +14,6 @@ from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import session as sessions
 from wirebayes.robot.self_calibration.estimate import Calibration
 from wirebayes.robot.self_calibration.session import Prior, Session
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -17,7 +18,6 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown, stretch
 from wirebayes.robot.self_calibration.unknowns import Parts, Unknowns
-from wirebayes.typing import Floats
 
 EXACT = 1e-8  # of the robot's span: what is exact is known this well, far below anything that matters
 FRICTIONLESS = 1e-5  # of the weight: balance holds this well

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from wirebayes.linear_algebra import inv, solve
+from wirebayes.numeric.linear_algebra import inv, solve
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
 from wirebayes.robot.self_calibration.start import start
 from wirebayes.robot.self_calibration.trust import joint_test
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

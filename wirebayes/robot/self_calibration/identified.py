@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.self_calibration.whole import Whole
-from wirebayes.typing import Floats
 
 _DETERMINED = 0.5  # of the standard deviation before
 _AXES = ("x", "y", "the vertical")

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.linear_algebra import inv, solve
+from wirebayes.numeric.linear_algebra import inv, solve
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Equations, Holds, State, linearised, moved
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.whole import Whole
-from wirebayes.typing import Floats
 
 _CANDIDATES = 150  # in the workspace: closer together they say the same
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.linear_algebra import solve
+from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
-from wirebayes.typing import Floats
 
 
 def response(

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from wirebayes.linear_algebra import solve
+from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -14,7 +15,6 @@ from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.whole import Whole, estimate, trust, with_levels
-from wirebayes.typing import Floats
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
 _SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides among those that carry alike

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import (
     CORE,
@@ -24,7 +25,6 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
-from wirebayes.typing import Floats
 
 _LONGEST = 2.5  # in the logarithm of time: a third of a hold's thousandfold, between two updates of the tensions
 _LEAST = 1e-6  # relative: wires that are said to be alike still get a spread, far below anything that matters

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.robot.self_calibration.session import Session
-from wirebayes.typing import Floats
-from wirebayes.user_files import csv_rows, read_text
+from wirebayes.strict.files import csv_rows, read_text
 
 POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")

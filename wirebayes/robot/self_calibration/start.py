@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.linear_algebra import solve
+from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation, statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import stretched_length
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.wires import Wires, stretched_length
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.typing import Floats
 
 _STEP = 1e-3  # of a prior's standard deviation: differences of smooth functions
 _LOAD = 1e-2  # relative change of all tensions

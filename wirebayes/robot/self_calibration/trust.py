@@ -4,9 +4,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from wirebayes.json_files.calibrate import Interval
-from wirebayes.linear_algebra import solve
 from wirebayes.notice import Notice
-from wirebayes.typing import Floats
+from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.typing import Floats
 
 # Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
 # lengths that are wrong cost a crash.

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.session import Prior
-from wirebayes.typing import Floats
 
 
 @dataclass(frozen=True)

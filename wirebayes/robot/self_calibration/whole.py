@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from wirebayes.linear_algebra import inv, solve
+from wirebayes.numeric.linear_algebra import inv, solve
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -29,7 +30,6 @@ from wirebayes.robot.self_calibration.equations import (
 from wirebayes.robot.self_calibration.strain import Grown, grown
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.typing import Floats
 
 _FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
 _ROUNDS = 25  # of noise and creep

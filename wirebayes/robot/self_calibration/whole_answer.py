@@ -14,6 +14,7 @@ from wirebayes.json_files.calibrate import (
     IdentifiedJson,
 )
 from wirebayes.notice import Notice, to_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
@@ -29,7 +30,6 @@ from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.robot.self_calibration.whole import Whole
-from wirebayes.typing import Floats
 
 _RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean

@@ -1,0 +1,1 @@
+"""Coordinates in which posteriors are sampled, each with its Jacobian."""

@@ -1,0 +1,90 @@
+"""Amplitudes whose prior ends at an edge, transformed to scores that are standard normal under that prior."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
+
+from wirebayes.model.prior import fast_logpdf
+from wirebayes.numeric.typing import Array
+
+_NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
+_log_normal = fast_logpdf(stats.norm())
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A map between values and scores, each (n,), and the log density of the values.
+
+    Attributes
+    ----------
+    score, value, log_prior : function of an array
+    ends : bool
+        Whether the values have an upper end.
+    """
+
+    score: Callable[[Array], Array]
+    value: Callable[[Array], Array]
+    log_prior: Callable[[Array], Array]
+    ends: bool
+
+    def log_slope(self, value: Array) -> Array:
+        """(n,) log |d value / d score|."""
+        return np.asarray(_log_normal(self.score(value)) - self.log_prior(value))
+
+
+def edge(distribution: Any) -> Edge | None:
+    """The map for a half-normal at zero, a normal one cut off below or a uniform distribution; none for others."""
+    kind = distribution.dist.name
+    shapes, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
+    if kind == "halfnorm" and loc == 0.0:
+        return _half_normal(float(scale), fast_logpdf(distribution))
+    if kind == "truncnorm" and shapes[1] == np.inf:
+        return _cut_off(float(shapes[0]), float(loc), float(scale), distribution)
+    return _uniform(float(loc), float(scale), fast_logpdf(distribution)) if kind == "uniform" else None
+
+
+def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
+    """Each half from its own tail, where it keeps its digits."""
+    unit = sd * np.sqrt(2.0)
+
+    def score(value: Array) -> Array:
+        u = value / unit
+        return np.where(u < 0.5, ndtri(np.maximum(erf(u), _NEAREST)), -ndtri(erfc(np.maximum(u, 0.5))))
+
+    def value(score: Array) -> Array:
+        low, high = erfinv(ndtr(np.minimum(score, 0.0))), erfcinv(ndtr(-np.maximum(score, 0.0)))
+        return np.asarray(unit * np.where(score < 0.0, low, high))
+
+    return Edge(score, value, log_prior, False)
+
+
+def _cut_off(least: float, middle: float, sd: float, distribution: Any) -> Edge:
+    """Of a normal distribution what lies above `least` standard deviations; each half from its own tail."""
+    below, above, end = ndtr(least), ndtr(-least), float(distribution.support()[0])
+    end = 0.0 if abs(end) < 1e-12 * sd else end  # where it was cut off, but for rounding
+
+    def score(value: Array) -> Array:
+        u = np.maximum((value - middle) / sd, least)
+        left = ndtr(-u) / above
+        return np.where(left < 0.5, -ndtri(left), ndtri(np.maximum((ndtr(u) - below) / above, _NEAREST)))
+
+    def value(score: Array) -> Array:
+        low = ndtri(below + ndtr(np.minimum(score, 0.0)) * above)
+        found = middle + sd * np.where(score < 0.0, low, -ndtri(ndtr(-np.maximum(score, 0.0)) * above))
+        return np.asarray(np.maximum(found, end))  # rounding may lead beyond
+
+    return Edge(score, value, fast_logpdf(distribution), False)
+
+
+def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> Edge:
+    def score(value: Array) -> Array:
+        return np.asarray(ndtri(np.clip((value - low) / width, _NEAREST, 1.0 - _NEAREST)))
+
+    def value(score: Array) -> Array:
+        return np.asarray(low + width * ndtr(score))
+
+    return Edge(score, value, log_prior, True)

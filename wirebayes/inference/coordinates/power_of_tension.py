@@ -1,0 +1,63 @@
+"""Which power U of the tension suits the losses that a test measured, for each rate that the creep may have.
+
+Where creep is slow, a hold loses tension in proportion to the power of its tension. Where creep is over within a hold,
+what earlier holds gained is missing, and only the step of the power is left: it takes a larger power to lose as much.
+So U and the rate of the creep lie on a bent ridge, along which the measured losses hardly change.
+"""
+
+import numpy as np
+
+from wirebayes.numeric.typing import Array
+
+
+def suiting_powers(
+    lost: Array, log_tension: Array, relative_s: Array, N: float, middle: float, spread: float
+) -> tuple[Array, Array]:
+    """Log U that suits the losses of a staircase of holds best, at several log hazards.
+
+    The elongations that the creep law gives for B = 1, with the measured tensions driving it, are scaled to the losses
+    by least squares. Independent normal residuals of unknown size give log U a likelihood. What is returned is its
+    mean under this likelihood times the prior: where losses say nothing, the middle of the prior.
+
+    Parameters
+    ----------
+    lost : (H,) array
+        Tension lost in every hold, NaN where it was not measured, N.
+    log_tension : (H,) array
+        Logarithm of the tension that drives the creep of every hold.
+    relative_s : (H,) array
+        Durations over half of a typical hold.
+    N : float
+        The exponent of time; it hardly matters here.
+    middle, spread : float
+        Of log U under its prior.
+
+    Returns
+    -------
+    log_hazards : (m,) array
+        Logarithms of ``k2 t^N`` at half of a typical hold.
+    log_powers : (m,) array
+    """
+    powers = middle + spread * _SPREADS
+    known = np.isfinite(lost)
+    if known.sum() < _LEAST_HOLDS or not lost[known].any():
+        return _LOG_HAZARDS, np.full(len(_LOG_HAZARDS), middle)
+    reached = -np.expm1(-np.exp(_LOG_HAZARDS)[:, None, None] * relative_s**N)  # (m, 1, H)
+    drive = np.exp(np.exp(powers)[:, None] * (log_tension - log_tension.max()))  # (p, H)
+    carried = np.zeros((len(_LOG_HAZARDS), len(powers)))
+    gained = np.empty((len(log_tension), *carried.shape))
+    for j in range(len(log_tension)):
+        gained[j] = (drive[:, j] - carried) * reached[..., j]
+        carried = carried + gained[j]
+    gained, lost = gained[known], lost[known, None, None]
+    scale = (gained * lost).sum(axis=0) / np.maximum((gained**2).sum(axis=0), 1e-300)
+    left = ((lost - scale * gained) ** 2).sum(axis=0) / (lost**2).sum() + _LEAST_LEFT
+    log_density = -0.5 * len(lost) * np.log(left) - 0.5 * _SPREADS**2
+    weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+    return _LOG_HAZARDS, weight @ powers / weight.sum(axis=1)
+
+
+_LOG_HAZARDS = np.arange(-10.0, 4.01, 0.25)  # beyond, creep is linear in time, or over at once: nothing changes
+_SPREADS = np.linspace(-5.0, 5.0, 161)  # standard deviations of the prior
+_LEAST_HOLDS = 3  # a scale and a power fit two losses exactly, whatever the hazard
+_LEAST_LEFT = 1e-6  # of the sum of squares: losses are not known better than to a thousandth

@@ -1,0 +1,92 @@
+"""The density that is sampled: of the coordinates of a transformation."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from wirebayes.inference.coordinates.transform import Transformation
+from wirebayes.model.problem import Problem
+from wirebayes.numeric.typing import Array
+
+# of points (m, d) and row numbers (m,): log densities (m,), and the same with their residuals (k, m)
+Density = Callable[[Array, Array], Array]
+Residuals = Callable[[Array, Array], tuple[Array, Array]]
+_NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays in the cache
+
+
+class LogPosterior:
+    """The log posterior density in the sampled coordinates, batched, counting its evaluations."""
+
+    def __init__(self, problem: Problem, for_draws: bool = True) -> None:
+        self.problem, self.coordinates = problem, Transformation(problem, for_draws)
+        self._for_draws = for_draws
+        self.log_prior = problem.prior.log_density()
+        self.evaluations = 0
+        self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # what else there is has closures, which no other process can be sent
+        return LogPosterior, (self.problem, self._for_draws)
+
+    def __call__(self, z: Array, readings: Any = None) -> Array:
+        """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""
+        self.evaluations += len(z)
+        if len(z) <= self._rows:
+            return self._values(z, readings)
+        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
+        return np.concatenate(
+            [self._values(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
+        )
+
+    def standardised(self, z: Array, readings: Any = None) -> tuple[Array, Array]:
+        """(n,) log density, and (m, n) residuals whose derivatives J give its curvature nearly, as JᵀJ.
+
+        Those of the likelihood (`wirebayes.model.problem.Problem.standardised`), and those of the prior.
+        """
+        self.evaluations += len(z)
+        if len(z) <= self._rows:
+            return self._standardised(z, readings)
+        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
+        parts = [self._standardised(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
+        values, residuals = zip(*parts, strict=True)
+        return np.concatenate(values), np.concatenate(residuals, axis=1)
+
+    def rowwise(self, readings: Sequence[Array] | None = None) -> tuple[Density, Residuals]:
+        """The density, and the same with its residuals, of points and row numbers, as a climb takes them.
+
+        Parameters
+        ----------
+        readings : sequence of (H, R, n) arrays, optional
+            In place of the measured ones, a sample each: row r sees the r-th of n.
+        """
+
+        def seen(rows: Array) -> list[Array] | None:
+            return None if readings is None else [y[..., rows] for y in readings]
+
+        return (
+            lambda points, rows: self(points, seen(rows)),
+            lambda points, rows: self.standardised(points, seen(rows)),
+        )
+
+    def _standardised(self, z: Array, readings: Any) -> tuple[Array, Array]:
+        theta = self.coordinates.to_natural(z)
+        with np.errstate(all="ignore"):
+            prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+            residuals = self.coordinates.prior_residuals(theta, z)
+        value, left = self.problem.standardised(theta, readings)
+        return np.where(np.isfinite(prior), prior + value, -np.inf), np.concatenate([left, residuals])
+
+    def _values(self, z: Array, readings: Any) -> Array:
+        theta = self.coordinates.to_natural(z)
+        with np.errstate(all="ignore"):
+            value = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+        inside = np.isfinite(value)
+        if not inside.any():
+            return np.full(len(z), -np.inf)
+        if inside.all():
+            return value + self.problem.log_likelihood(theta, readings)
+        picked = None if readings is None else [y[..., inside] for y in readings]
+        value = np.where(inside, value, -np.inf)
+        value[inside] += self.problem.log_likelihood(theta[inside], picked)
+        return value

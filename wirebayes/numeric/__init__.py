@@ -1,0 +1,1 @@
+"""Arithmetic that knows nothing of wires: types, sums of logarithms, stacks of matrices, resampling."""

@@ -1,0 +1,73 @@
+"""Linear algebra on stacks of matrices, with a result for every one of them: NaN where a matrix has none.
+
+At the edge of a posterior a model overflows, a wire goes slack and derivatives vanish. numpy then raises for the whole
+stack because of one matrix. Here the results of the others are unchanged to the last bit, and the caller sees which
+have none.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.numeric.typing import Array
+
+
+def solve(matrices: Array, right: Array) -> Array:
+    """Solutions ``(..., d, k)`` of ``(..., d, d)`` systems; NaN where a matrix is singular or not finite."""
+    (out,) = _each(lambda a, b: (np.linalg.solve(a, b),), matrices, right)
+    return out
+
+
+def inv(matrices: Array) -> Array:
+    """Inverses ``(..., d, d)``; NaN where a matrix is singular or not finite."""
+    (out,) = _each(lambda a: (np.linalg.inv(a),), matrices)
+    return out
+
+
+def cholesky(matrices: Array) -> Array:
+    """Lower Cholesky factors ``(..., d, d)``, read off the lower halves; NaN where a matrix is not positive."""
+    (out,) = _each(lambda a: (np.linalg.cholesky(a),), matrices)
+    return out
+
+
+def eigh(matrices: Array) -> tuple[Array, Array]:
+    """Eigenvalues ``(..., d)`` and vectors ``(..., d, d)`` of symmetric matrices; NaN where one is not finite."""
+    values, vectors = _each(np.linalg.eigh, matrices)
+    return values, vectors
+
+
+def _each(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> tuple[Array, ...]:
+    """Results of a numpy function for every matrix of the stack it can be computed for."""
+    usable = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
+    if not usable.all():
+        matrices = np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
+    try:
+        out = tuple(function(matrices, *others))
+    except np.linalg.LinAlgError:  # one of them at least: find out which
+        usable = usable & _computable(function, matrices, *others)
+        matrices = np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
+        out = tuple(function(matrices, *others))
+    if usable.all():
+        return out
+    return tuple(np.where(usable.reshape(*usable.shape, *[1] * (a.ndim - usable.ndim)), a, np.nan) for a in out)
+
+
+def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> NDArray[np.bool_]:
+    """Which matrices of a stack a function takes, ``(...)``, by trying ever smaller parts of the stack."""
+    stack = matrices.shape[:-2]
+    flat = matrices.reshape(-1, *matrices.shape[-2:])
+    right = [np.broadcast_to(o, (*stack, *o.shape[-2:])).reshape(-1, *o.shape[-2:]) for o in others]
+    out = np.ones(len(flat), bool)
+    parts = [(0, len(flat))]
+    while parts:
+        first, last = parts.pop()
+        try:
+            function(flat[first:last], *(other[first:last] for other in right))
+        except np.linalg.LinAlgError:
+            if last - first == 1:
+                out[first] = False
+            else:
+                middle = (first + last) // 2
+                parts += [(first, middle), (middle, last)]
+    return out.reshape(stack)

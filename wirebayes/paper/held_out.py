@@ -1,0 +1,156 @@
+"""The unused holds predicted from the first ones, and how far the measurement lies from the prediction."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.likelihoods import hold_courses
+from wirebayes.numeric.typing import Array
+from wirebayes.prediction.predictive import PredictionRequest, predict
+from wirebayes.results.store import Stored
+from wirebayes.wire.model import Model
+from wirebayes.wire.protocol import Protocol
+
+_DRAWS = 2000  # a 5 % quantile is then one between 4 % and 6 %
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Predicted and measured readings of the holds that were not trained on.
+
+    Attributes
+    ----------
+    hold : (m,) int array
+        Hold number of each reading.
+    time_s, measured_N : (m,) arrays
+    drawn_N : (m, n) array
+        Predictive draws: parameter, setting, sensor and rounding error.
+    """
+
+    hold: NDArray[np.int64]
+    time_s: Array
+    measured_N: Array
+    drawn_N: Array
+
+    @property
+    def band_N(self) -> Array:
+        """(3, m) 5 %, 50 % and 95 % quantiles."""
+        return np.asarray(np.quantile(self.drawn_N, [0.05, 0.5, 0.95], axis=1))
+
+    @property
+    def rms_N(self) -> float:
+        """Root mean square of measured minus median prediction."""
+        return float(np.sqrt(np.mean((self.measured_N - self.band_N[1]) ** 2)))
+
+    @property
+    def coverage(self) -> float:
+        """Share of readings inside the 90 % band."""
+        low, _, high = self.band_N
+        return float(np.mean((self.measured_N >= low) & (self.measured_N <= high)))
+
+
+def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -> HeldOut:
+    """Predict what `stored`, trained on the first holds of an experiment, has not seen.
+
+    As a chain the training readings fix the creep carried in, the displacements say the rest; hold by hold each hold
+    is given its own first reading, which is then not predicted.
+
+    Parameters
+    ----------
+    stored : Stored
+        Posterior of the first holds.
+    experiment : Experiment
+        All holds.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    HeldOut
+    """
+    protocol, measured = experiment.protocol(), experiment.tension()
+    trained = len(stored.sample.protocol.setting)
+    alone = stored.likelihood == "hold"
+    unused = protocol.recorded & (np.arange(len(protocol.setting)) >= trained)
+    request = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
+    drawn = predict(stored.problem, some(stored.theta), stored.sample, request, rng)
+    wanted = protocol.mask & unused[:, None]
+    if alone:
+        wanted[:, 0] = False
+    number = np.broadcast_to(protocol.number[:, None], wanted.shape)
+    return HeldOut(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
+
+
+def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator) -> Array:
+    """Predicted readings of the last hold given its first reading, hold by hold.
+
+    Parameters
+    ----------
+    stored : Stored
+        Posterior that has not seen the hold.
+    experiment : Experiment
+    time_s : (t,) array
+        Times since the hold began; they need not be those of the readings.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (t, n) array
+        N.
+    """
+    protocol, first = _last_alone(experiment, time_s)
+    request = PredictionRequest(protocol, 0, np.array([True]), first)
+    drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, request, rng)[0]
+    return drawn
+
+
+def published_course(published: dict[str, float], experiment: Experiment, time_s: Array) -> Array:
+    """The paper's curve of the last hold.
+
+    Parameters
+    ----------
+    published : dict of name to float
+        A row of the paper's Table 4: ``k1 B U k2 N``.
+    experiment : Experiment
+        Its first reading of that hold fixes the stretched length.
+    time_s : (t,) array
+
+    Returns
+    -------
+    (t,) array
+        N.
+    """
+    protocol, first = _last_alone(experiment, time_s)
+    theta = {name: np.array([value]) for name, value in published.items()}
+    course = hold_courses(protocol, theta, Model(), first[:, None])[0]
+    assert course is not None
+    tension: Array = course[0][:, 0]
+    return tension
+
+
+def some(theta: Array) -> Array:
+    """At most a few thousand rows, evenly spread."""
+    rows: Array = theta[np.linspace(0, len(theta) - 1, min(len(theta), _DRAWS)).astype(int)]
+    return rows
+
+
+def _first(measured: Array, given: bool) -> Array:
+    return measured[:, 0] if given else np.full(len(measured), np.nan)
+
+
+def _last_alone(experiment: Experiment, time_s: Array) -> tuple[Protocol, Array]:
+    """The last hold as a test of its own, predicted at other times, and its first reading."""
+    hold = experiment.recorded_holds[-1]
+    whole = experiment.protocol()
+    times = np.concatenate([[0.0], time_s[time_s > 0]])[None]
+    one = replace(
+        whole,
+        setting=np.array([hold.setting]),
+        time_s=times,
+        mask=np.ones(times.shape, bool),
+        duration_s=np.array([float(times[0, -1])]),
+        number=np.array([hold.number or 0]),
+        warming_K=None,
+    )
+    return one, hold.tension_N[:1]

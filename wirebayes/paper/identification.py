@@ -1,0 +1,72 @@
+"""Table 4 beside our own least squares: published and refitted parameters in every interpretation of the model."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wirebayes.inference.fit import seed_of
+from wirebayes.io.experiment import Experiment
+from wirebayes.paper.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
+from wirebayes.processes.workers import ParallelMap
+
+Row = dict[str, Any]
+
+
+def rows(
+    experiments: Sequence[Experiment],
+    published: Mapping[str, Mapping[str, float]],
+    training_holds: int,
+    seed: int,
+    parallel_map: ParallelMap = map,
+) -> list[Row]:
+    """One row for each wire, variant and source of the parameters.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    published : mapping of experiment name to parameters
+    training_holds : int
+        Both are adjusted to these first holds: all parameters, or the preload that the published ones lack.
+    seed : int
+    parallel_map : function, optional
+        The built-in `map`, or one over processes.
+
+    Returns
+    -------
+    list of dict
+        Parameters, and the rms of what each predicts on the training holds, on the rest and on all, in N.
+    """
+    wires = [(e, dict(published[e.name]), training_holds, seed) for e in experiments]
+    return [row for part in parallel_map(_wire, wires) for row in part]
+
+
+def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
+    experiment, published, training_holds, seed = task
+    first, cut = experiment.train(training_holds), leading(experiment, training_holds)
+    out = []
+    for variant in VARIANTS:
+        words = ("least squares", experiment.name, variant.likelihood, variant.history, variant.law)
+        for source, known in (("published", published), ("refitted", None)):
+            rng = np.random.default_rng(seed_of(seed, *words))
+            out.append(_row(experiment, variant, source, identify(first, variant, rng, known), cut))
+    return out
+
+
+def _row(experiment: Experiment, variant: Variant, source: str, found: Identified, cut: int) -> Row:
+    left = residuals(experiment, at(found.parameters), variant)
+    return {
+        "experiment": experiment.name,
+        "likelihood": variant.likelihood,
+        "history": variant.history if variant.likelihood == "chain" else "",
+        "elastic_law": variant.law,
+        "parameters": source,
+        **{f"{name}_{_UNITS[name]}".rstrip("_"): found.parameters.get(name) for name in _UNITS},
+        "rms_first_N": rms(left[:cut]),
+        "rms_rest_N": rms(left[cut:]),
+        "rms_all_N": rms(left),
+        "not_held_back": " ".join(found.not_held_back),
+    }
+
+
+_UNITS = {"k1": "N", "B": "", "U": "", "k2": "", "N": "", "preload": "mm"}

@@ -1,0 +1,213 @@
+"""The paper's identification: least squares from many starts, in every interpretation of its model.
+
+Least squares weights all readings equally and has neither priors nor setting errors; it is here to be compared with the
+published parameters, and with the posterior.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.likelihoods import hold_courses
+from wirebayes.model.problem import MATERIAL, Likelihood, default_prior
+from wirebayes.model.scales import scales_of
+from wirebayes.numeric.typing import Array
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.model import Model
+from wirebayes.wire.staircase import simulate
+
+_WIDE = 100_000  # the search stays between the ends of so many prior draws: along a ridge it would never end
+_LEAST_STIFFNESS = 10.0  # times the largest tension: a thin line does not stretch by a tenth
+_DRAWS, _STARTS = 2000, 6
+_STEP = 1e-5  # of coordinates of order one: central differences are then exact to some 1e-10
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One reading of the paper's model.
+
+    Attributes
+    ----------
+    likelihood : {"hold", "chain"}
+        Hold by hold, the first reading fixes the stretched length and the later ones are predicted; as a chain, the
+        displacements and one preload predict all readings.
+    history : {"saturating", "additive"}
+        Of a chain; hold by hold there is none.
+    law : {"hooke", "modified"}
+    """
+
+    likelihood: Likelihood
+    history: History = "saturating"
+    law: ElasticLaw = "hooke"
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of what is adjusted."""
+        return MATERIAL if self.likelihood == "hold" else (*MATERIAL, "preload")
+
+
+VARIANTS = (
+    Variant("hold"),
+    Variant("hold", law="modified"),
+    Variant("chain"),
+    Variant("chain", law="modified"),
+    Variant("chain", "additive"),
+    Variant("chain", "additive", "modified"),
+)
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Parameters of least squares.
+
+    Attributes
+    ----------
+    parameters : dict of name to float
+    rms_N : float
+        Over the readings they were adjusted to.
+    not_held_back : tuple of str
+        Parameters at the edge of the search, or with an edge within their standard error: the readings do not hold them
+        back, and along such a ridge the search stops anywhere.
+    """
+
+    parameters: dict[str, float]
+    rms_N: float
+    not_held_back: tuple[str, ...] = ()
+
+
+def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: Variant) -> Array:
+    """Measured minus predicted tension.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    theta : mapping of name to (n,) array
+        Without ``preload`` hold by hold.
+    variant : Variant
+
+    Returns
+    -------
+    (H, R, n) array, N
+        NaN where nothing is predicted: padding, and hold by hold the first reading of each hold.
+    """
+    protocol, measured = experiment.protocol(), experiment.tension()[..., None]
+    model = Model(variant.law, variant.history)
+    predicted = np.full((*measured.shape[:2], len(theta["k1"])), np.nan)
+    if variant.likelihood == "hold":
+        for j, course in enumerate(hold_courses(protocol, dict(theta), model, measured[:, 0])):
+            if course is not None:
+                tension, _, valid = course
+                predicted[j, 1:] = np.where(valid, tension[1:], np.nan)
+    else:
+        predicted = simulate(protocol, theta, model)
+    return np.where(protocol.mask[..., None], measured - predicted, np.nan)
+
+
+def rms(residuals_N: Array) -> float:
+    """Root mean square of what was predicted, N; NaN when nothing was."""
+    values = residuals_N[np.isfinite(residuals_N)]
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+def at(parameters: Mapping[str, float]) -> dict[str, Array]:
+    """One parameter set as arrays of one row."""
+    return {name: np.array([value]) for name, value in parameters.items()}
+
+
+def identify(
+    experiment: Experiment, variant: Variant, rng: np.random.Generator, known: Mapping[str, float] | None = None
+) -> Identified:
+    """Least squares over all readings of an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    variant : Variant
+    rng : numpy Generator
+        For the starts: the best of many draws of the prior.
+    known : mapping of name to float, optional
+        Parameters that are not adjusted, such as published ones of which only the preload is missing.
+
+    Returns
+    -------
+    Identified
+    """
+    known = dict(known or {})
+    names = [name for name in variant.parameters if name not in known]
+    if not names:
+        only = residuals(experiment, at(known), variant)
+        return Identified(known, rms(only))
+    prior = default_prior(experiment.length_mm, scales_of([experiment]), {})
+    logarithmic = np.array([name != "preload" for name in names])
+    columns = [prior.names.index(name) for name in names]
+    wide = prior.rvs(_WIDE, rng)[:, columns]
+    low, high = (_logged(end, logarithmic) for end in (wide.min(axis=0), wide.max(axis=0)))
+    if "k1" in names:
+        low[names.index("k1")] = np.log(_LEAST_STIFFNESS * experiment.tension().max())
+
+    def natural(z: Array) -> dict[str, Array]:
+        """(n, d) search coordinates as parameters, each (n,)."""
+        columns = np.where(logarithmic, np.exp(np.where(logarithmic, z, 0.0)), z).T
+        rows = dict(zip(names, np.ascontiguousarray(columns), strict=True))
+        return rows | {name: np.full(len(z), value) for name, value in known.items()}
+
+    def misfit(z: Array) -> Array:
+        """(m, n) residuals of (n, d) points; a reading that cannot be predicted counts in full."""
+        values = residuals(experiment, natural(z), variant)[predicted]
+        return np.where(np.isfinite(values), values, measured[:, None])
+
+    protocol = experiment.protocol()
+    predicted = protocol.mask.copy()
+    if variant.likelihood == "hold":
+        predicted[:, 0] = False
+    measured = experiment.tension()[predicted]
+    draws = prior.rvs(_DRAWS, rng)[:, columns]
+    with np.errstate(all="ignore"):
+        starts = np.clip(_logged(draws, logarithmic), low + 1e-9, high - 1e-9)
+        best = starts[np.argsort((misfit(starts) ** 2).sum(axis=0), kind="stable")[:_STARTS]]
+        ends = [_descend(misfit, start, low, high) for start in best]
+    costs = np.array([np.sqrt(np.mean(misfit(z[None]) ** 2)) for z in ends])
+    end = ends[int(np.argmin(costs))]
+    found = {name: float(value[0]) for name, value in natural(end[None]).items()}
+    ordered = {name: found[name] for name in variant.parameters}
+    loose = np.maximum(0.01 * (high - low), costs.min() * _per_unit_misfit(misfit, end))
+    edge = np.minimum(end - low, high - end) < loose
+    return Identified(ordered, float(costs.min()), tuple(name for name, on in zip(names, edge, strict=True) if on))
+
+
+def leading(experiment: Experiment, holds: int) -> int:
+    """Number of holds, unrecorded ones included, up to the last of the first `holds` recorded ones."""
+    return len(experiment.train(holds).holds)
+
+
+def _logged(values: Array, logarithmic: NDArray[np.bool_]) -> Array:
+    return np.where(logarithmic, np.log(np.where(logarithmic, values, 1.0)), values)
+
+
+def _jacobian(misfit: Callable[[Array], Array], z: Array) -> Array:
+    """(m, d) derivatives of the residuals at a point (d,), by central differences in one batch."""
+    moves = _STEP * np.concatenate([np.eye(len(z)), -np.eye(len(z))])
+    values = misfit(z + moves)
+    return (values[:, : len(z)] - values[:, len(z) :]) / (2.0 * _STEP)
+
+
+def _per_unit_misfit(misfit: Callable[[Array], Array], z: Array) -> Array:
+    """(d,) standard errors at a point (d,) if residuals had a standard deviation of one."""
+    _, singular, directions = np.linalg.svd(_jacobian(misfit, z), full_matrices=False)
+    return np.sqrt(((directions / np.maximum(singular, 1e-12)[:, None]) ** 2).sum(axis=0))
+
+
+def _descend(misfit: Callable[[Array], Array], start: Array, low: Array, high: Array) -> Array:
+    """One least-squares descent."""
+
+    def at_point(z: Array) -> Array:
+        return np.asarray(misfit(z[None])[:, 0])
+
+    jacobian = partial(_jacobian, misfit)
+    found = least_squares(at_point, start, jac=jacobian, bounds=(low, high), x_scale="jac", max_nfev=300)
+    return np.asarray(found.x)

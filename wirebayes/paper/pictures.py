@@ -1,0 +1,171 @@
+"""Draws the pictures of the paper reproduced, and keeps an index that says what each shows."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import write_bytes, write_json
+from wirebayes.model.problem import build
+from wirebayes.model.replicate import readings as replicate
+from wirebayes.numeric.typing import Array
+from wirebayes.paper import figures as paper_figures
+from wirebayes.paper.held_out import HeldOut, last_hold_course, published_course, some
+from wirebayes.paper.least_squares import Variant, at, residuals
+from wirebayes.report import figures
+from wirebayes.report.blocks import number, svg
+from wirebayes.results.store import Stored
+from wirebayes.wire.laws import creep_fraction
+
+INDEX = "index.json"
+
+
+class Gallery:
+    """Pictures of one run, written as they are drawn; `finish` writes the index."""
+
+    def __init__(self, directory: Path) -> None:
+        self.folder = directory / "figures"
+        self.folder.mkdir(exist_ok=True)
+        self.index: list[dict[str, str]] = []
+
+    def add(self, section: str, name: str, figure: Figure, alt: str, caption: str = "") -> None:
+        """Write one picture and its entry in the index.
+
+        Parameters
+        ----------
+        section : str
+            Part of the page that shows it; the file's name begins with it.
+        name : str
+            Unique within the section.
+        figure : matplotlib.figure.Figure
+        alt : str
+            What the picture shows, for those who cannot see it.
+        caption : str
+        """
+        file = f"{section}-{name}.svg"
+        write_bytes(self.folder / file, svg(figure))
+        self.index.append({"section": section, "file": file, "alt": alt, "caption": caption})
+
+    def finish(self) -> None:
+        """Write the index."""
+        write_json(self.folder / INDEX, self.index)
+
+    def measured(self, e: Experiment) -> None:
+        """The test as it was read."""
+        figure = figures.measured(e.protocol(), e.tension(), f"{e.name}: {e.material}, {e.length_mm:g} mm")
+        holds = len(e.recorded_holds)
+        alt = f"Tension of {e.name} against displacement: {holds} holds, each losing tension while it lasts."
+        self.add("measured", e.name, figure, alt)
+
+    def intervals(self, e: Experiment, rows: Sequence[Mapping[str, Any]]) -> None:
+        """What is known of each parameter, beside the published value."""
+        alt = f"90 % intervals of the parameters of {e.name} before and after the test, in multiples of Table 4."
+        self.add("known", e.name, paper_figures.intervals(rows, e.name), alt)
+
+    def last_hold(self, e: Experiment, published: dict[str, float], first: Stored, rng: np.random.Generator) -> None:
+        """The paper's figures 1 to 4: the last hold of a wire, with the paper's curve and the predicted band.
+
+        Parameters
+        ----------
+        e : Experiment
+        published : dict of name to float
+            The wire's row of Table 4.
+        first : Stored
+            Posterior of the first holds, hold by hold.
+        rng : numpy.random.Generator
+        """
+        hold = e.recorded_holds[-1]
+        times = np.linspace(0.0, hold.duration_s, 49)
+        drawn, curve = last_hold_course(first, e, times, rng), published_course(published, e, times)
+        title = f"{e.name}: last hold, {hold.displacement_mm:g} mm"
+        figure = paper_figures.last_hold(times, drawn, curve, (hold.time_s, hold.tension_N), title)
+        missed = np.interp(hold.time_s[1:], times, curve) - hold.tension_N[1:]
+        alt = f"The last hold of {e.name}: measured tension, the paper's curve and the predicted band."
+        caption = f"The paper's curve misses these readings by {number(float(np.sqrt(np.mean(missed**2))), 2)} N (rms)."
+        self.add("figures-1-to-4", e.name, figure, alt, caption)
+
+    def unused_holds(self, e: Experiment, published: dict[str, float], seen: Mapping[str, HeldOut]) -> None:
+        """All unused holds, hold by hold and as one chain.
+
+        Parameters
+        ----------
+        e : Experiment
+        published : dict of name to float
+            The wire's row of Table 4; its curve is drawn hold by hold.
+        seen : mapping of likelihood to HeldOut
+        """
+        for likelihood, out in seen.items():
+            spoken = figures.WORDS[likelihood]
+            curve = _published_at(e, published, out) if likelihood == "hold" else None
+            title, colour = f"{e.name}, {spoken}", figures.COLOURS[likelihood]
+            figure = figures.residuals(out.hold, out.time_s, out.measured_N, out.band_N, title, colour, curve)
+            alt = f"Measured minus predicted tension in the unused holds of {e.name}, {spoken}."
+            caption = f"rms {number(out.rms_N, 2)} N; {100 * out.coverage:.0f} % of the readings lie in the 90 % band."
+            self.add(f"unused-{likelihood}", e.name, figure, alt, caption)
+
+    def ridges(self, e: Experiment, published: Mapping[str, float], full: Mapping[str, Stored]) -> None:
+        """What hold by hold cannot distinguish: stiffness and amount, amount and rate.
+
+        Parameters
+        ----------
+        e : Experiment
+        published : mapping of name to float
+            The wire's row of Table 4, marked in the pictures.
+        full : mapping of likelihood to Stored
+            Posteriors of all holds, ``hold`` and ``chain``.
+        """
+        draws = {kind: {k: some(v) for k, v in full[kind].draws.items()} for kind in ("hold", "chain")}
+        mark = (published["k1"], published["B"])
+        k1, B, k2 = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B", "k2"))
+        figure = figures.joint(k1, B, figures.named("k1"), figures.named("B"), e.name, mark)
+        low, high = np.quantile(full["hold"].draws["k1"], [0.05, 0.95])
+        caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
+        jump = stiffest_step(e)
+        if abs(jump / published["k1"] - 1) < 0.02:
+            nearest = f"{number(published['k1'], 4)} N is within 2 % of the stiffest single step between two holds"
+            caption += f" The published {nearest}, {number(jump, 4)} N."
+        alt = f"Posterior draws of k1 and B of {e.name}: a long ridge hold by hold, a small cloud as a chain."
+        self.add("ridge", e.name, figure, alt, caption)
+        product = {kind: d["k1"] * d["B"] for kind, d in draws.items()}
+        mark = (published["k2"], published["k1"] * published["B"])
+        figure = figures.joint(k2, product, figures.named("k2"), "k1·B, N mm N⁻ᵁ", e.name, mark)
+        whole = full["hold"].draws
+        correlation = float(np.corrcoef(np.log(whole["k1"] * whole["B"]), np.log(whole["k2"]))[0, 1])
+        time_s = e.recorded_holds[-1].duration_s
+        theirs = (np.asarray(published[name]) for name in ("k2", "N"))
+        share = 100 * float(creep_fraction(np.asarray(time_s), *theirs))
+        caption = (
+            f"Correlation hold by hold {number(correlation, 3)} (of logarithms). By the paper's own numbers a hold of "
+            f"{time_s:g} s shows {share:.0f} % of the final creep."
+        )
+        alt = f"Posterior draws of k2 and k1 B of {e.name}: much slow creep looks like little fast creep."
+        self.add("amount-and-rate", e.name, figure, alt, caption)
+
+    def prior(self, e: Experiment, rng: np.random.Generator) -> None:
+        """What the prior expects of this test."""
+        problem = build([e])
+        sample, theta = problem.samples[0], problem.prior.rvs(4000, rng)
+        drawn = replicate(problem, theta, sample, rng)
+        figure = paper_figures.prior_predictive(sample.protocol, drawn, e.tension(), e.name)
+        alt = f"First tensions and first hold of {e.name}: what the prior expects, and the readings."
+        self.add("prior", e.name, figure, alt)
+
+
+def _published_at(e: Experiment, published: Mapping[str, float], out: HeldOut) -> Array:
+    """The paper's prediction of the unused readings, hold by hold."""
+    left = residuals(e, at(published), Variant("hold"))[..., 0]
+    wanted = np.isfinite(left) & np.isin(e.protocol().number, out.hold)[:, None]
+    return np.asarray((e.tension() - left)[wanted])
+
+
+def stiffest_step(e: Experiment) -> float:
+    """Largest tension gained in one step between two neighbouring holds, per unit strain, N."""
+    steps = [
+        (b.tension_N[0] - a.tension_N[-1]) * e.length_mm / (b.displacement_mm - a.displacement_mm)
+        for a, b in zip(e.holds, e.holds[1:], strict=False)
+        if a.recorded and b.recorded and b.displacement_mm != a.displacement_mm
+    ]
+    return float(max(steps))

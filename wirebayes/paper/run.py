@@ -1,0 +1,257 @@
+"""``wirebayes reproduce``, step by step: fits, tables, pictures, page."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes._version import __version__
+from wirebayes.inference.fit import seed_of
+from wirebayes.inference.policy import Policy, describe
+from wirebayes.io import paper
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.model.problem import Likelihood, build
+from wirebayes.numeric.typing import Array
+from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
+from wirebayes.paper.held_out import HeldOut, held_out
+from wirebayes.processes.workers import workers
+from wirebayes.report.page import write as write_page
+from wirebayes.results.jobs import Job
+from wirebayes.results.jobs import run as run_jobs
+from wirebayes.results.store import Stored, load
+
+Row = dict[str, Any]
+LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
+POLICY = Policy()
+_PRIOR_DRAWS = 20_000  # cheap, so many: a 5 % quantile is then one between 4.7 % and 5.3 %
+
+
+def reproduce(
+    directory: Path,
+    seed: int = 0,
+    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    policy: Policy = POLICY,
+) -> list[str]:
+    """Everything the paper shows, on its own tables, with posteriors.
+
+    Parameters
+    ----------
+    directory : Path
+        Gets the page, the tables, the pictures, and ``NAME/LIKELIHOOD`` for each fit: of all holds, and of the first
+        five with ``-first-5`` behind.
+    seed : int
+    report : callable
+        ``report(name, done, total)``, for a progress bar.
+    policy : Policy
+        When a fit counts as converged.
+
+    Returns
+    -------
+    list of str
+        A line for each fit that did not converge.
+
+    Raises
+    ------
+    InputError
+        The folder belongs to something else.
+    """
+    experiments, published = paper.experiments(), paper.published()
+    training = int(published["identification"]["training_holds"])
+    with open_run(directory, configuration(experiments, seed, policy)) as run:
+        if run.state != "done":
+            jobs = fits(experiments, training)
+            run_jobs(jobs, directory, seed, policy=policy, report=report)
+            _tables_and_pictures(directory, experiments, published, training, seed, report)
+            write_page(directory)
+            run.finish()
+    return _not_converged(directory, fits(experiments, training))
+
+
+def configuration(experiments: Sequence[Experiment], seed: int, policy: Policy) -> dict[str, Any]:
+    """Everything that decides the results.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        The paper's; their content counts, as a hash.
+    seed : int
+    policy : Policy
+
+    Returns
+    -------
+    dict
+        What ``configuration.json`` holds: another one is refused in the same folder.
+    """
+    return {
+        "command": "reproduce",
+        "version": __version__,
+        "seed": seed,
+        "policy": describe(policy),
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }
+
+
+def fits(experiments: Sequence[Experiment], training: int) -> list[Job]:
+    """Every wire under both likelihoods: trained on its first holds, and on all of them."""
+    jobs = []
+    for suffix, holds in ((f"-first-{training}", training), ("", None)):
+        for e in experiments:
+            shown = e if holds is None else e.train(holds)
+            for likelihood in LIKELIHOODS:
+                provenance = {"version": __version__, "data_sha256": {e.name: e.data_hash}, "train_holds": holds}
+                folder = f"{e.name}/{likelihood}{suffix}"
+                jobs.append(Job(folder, (shown,), likelihood=likelihood, provenance=provenance))
+    return jobs
+
+
+def _tables_and_pictures(
+    directory: Path,
+    experiments: Sequence[Experiment],
+    published: Mapping[str, Any],
+    training: int,
+    seed: int,
+    report: Callable[[str, float, float], None],
+) -> None:
+    table_4 = published["table_4"]
+    with workers(len(experiments)) as parallel_map:
+        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, parallel_map))
+    report("tables and pictures", 1, 3)
+    posterior: list[Row] = []
+    creep: list[Row] = []
+    forecasts: list[Row] = []
+    sampling: list[Row] = []
+    chains: dict[str, Stored] = {}
+    drawn = pictures.Gallery(directory)
+    for e in experiments:
+        full: dict[str, Stored] = {}
+        first: dict[str, Stored] = {}
+        seen: dict[str, HeldOut] = {}
+        for likelihood in LIKELIHOODS:
+            full[likelihood] = load(directory / e.name / likelihood)
+            first[likelihood] = load(directory / e.name / f"{likelihood}-first-{training}")
+            prior = _prior_draws(e, likelihood, seed)
+            posterior += verdicts.rows(e.name, likelihood, full[likelihood].draws, prior, table_4[e.name])
+            tension = round(full[likelihood].sample.model.tension_ref_N, 3)
+            creep += verdicts.creep_rows(
+                e.name, likelihood, full[likelihood].draws, table_4[e.name], tension, e.length_mm
+            )
+            rng = np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
+            seen[likelihood] = held_out(first[likelihood], e, rng)
+            forecasts.append(_forecast_row(e.name, likelihood, seen[likelihood]))
+            for suffix in ("", f"-first-{training}"):
+                sampling.append(_sampling_row(directory, e.name, likelihood, suffix))
+        chains[e.name] = full["chain"]
+        mine = [row for row in posterior if row["experiment"] == e.name]
+        _draw(drawn, e, table_4[e.name], full, first, seen, mine, seed)
+    for name, rows in (("posterior", posterior), ("creep", creep), ("held_out", forecasts), ("sampling", sampling)):
+        write_table(directory, name, rows)
+    write_table(directory, "measured", [_measured_row(e) for e in experiments])
+    report("tables and pictures", 2, 3)
+    robot = section_4.rows(chains, seed)
+    write_table(directory, "robot", robot)
+    lines, lengths = {n: section_4.as_line(c) for n, c in chains.items()}, {e.name: e.length_mm for e in experiments}
+    write_table(directory, "robot_claim", claim_steps.rows(section_4.MAPPED, table_4, lengths, lines))
+    write_table(directory, "robot_mass", section_4.needed(chains))
+    limit_mm = published["pose_claim"]["centre_moves_less_than_mm"]
+    section_4.draw(drawn, robot, limit_mm)
+    section_4.draw_poses(drawn, chains, limit_mm)
+    section_4.draw_maps(drawn, chains)
+    drawn.finish()
+    report("tables and pictures", 3, 3)
+
+
+def _draw(
+    gallery: pictures.Gallery,
+    experiment: Experiment,
+    published: dict[str, float],
+    full: dict[str, Stored],
+    first: dict[str, Stored],
+    seen: dict[str, HeldOut],
+    rows: list[Row],
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed_of(seed, "pictures", experiment.name))
+    gallery.measured(experiment)
+    gallery.intervals(experiment, rows)
+    gallery.last_hold(experiment, published, first["hold"], rng)
+    gallery.unused_holds(experiment, published, seen)
+    gallery.ridges(experiment, published, full)
+    gallery.prior(experiment, rng)
+
+
+def _prior_draws(experiment: Experiment, likelihood: Likelihood, seed: int) -> dict[str, Array]:
+    prior = build([experiment], likelihood=likelihood).prior
+    draws = prior.rvs(_PRIOR_DRAWS, np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood)))
+    return dict(zip(prior.names, draws.T, strict=True)) | {k: np.full(len(draws), v) for k, v in prior.fixed.items()}
+
+
+def _measured_row(e: Experiment) -> Row:
+    tension = np.concatenate([hold.tension_N for hold in e.recorded_holds])
+    return {
+        "experiment": e.name,
+        "material": e.material,
+        "length_mm": e.length_mm,
+        "holds": len(e.recorded_holds),
+        "unrecorded_holds": len(e.holds) - len(e.recorded_holds),
+        "readings": len(tension),
+        "smallest_tension_N": tension.min(),
+        "largest_tension_N": tension.max(),
+        "median_loss_percent": 100 * float(np.median([1 - h.tension_N[-1] / h.tension_N[0] for h in e.recorded_holds])),
+    }
+
+
+def _forecast_row(name: str, likelihood: str, seen: HeldOut) -> Row:
+    return {
+        "experiment": name,
+        "likelihood": likelihood,
+        "readings": len(seen.measured_N),
+        "rms_N": seen.rms_N,
+        "coverage_90": seen.coverage,
+        "median_band_width_N": float(np.median(seen.band_N[2] - seen.band_N[0])),
+    }
+
+
+def _sampling_row(directory: Path, name: str, likelihood: str, suffix: str) -> Row:
+    summary = json.loads((directory / name / f"{likelihood}{suffix}" / "summary.json").read_text(encoding="utf-8"))
+    evaluations, ess = summary["likelihood_evaluations"], summary["smallest_ess"]
+    return {
+        "experiment": name,
+        "likelihood": likelihood,
+        "trained_on": suffix.removeprefix("-").replace("-", " ") or "all holds",
+        "converged": summary["converged"],
+        "autocorrelation_steps": summary["autocorrelation_steps"],
+        "smallest_ess": ess,
+        "largest_nested_r_hat": summary["largest_nested_r_hat"],
+        "likelihood_evaluations": evaluations,
+        "effective_draws_per_evaluation": ess / evaluations,
+        "effective_draws_per_kept_evaluation": ess / summary["kept_evaluations"],
+        "modes_found": summary["modes_found"],
+    }
+
+
+def write_table(directory: Path, name: str, rows: Sequence[Row]) -> None:
+    """The same rows as CSV and JSON.
+
+    Parameters
+    ----------
+    directory : Path
+    name : str
+        Of both files, without its ending.
+    rows : sequence of dict
+        All with the keys of the first, which make the header; at least one.
+    """
+    header = list(rows[0])
+    write_csv(directory / f"{name}.csv", header, ([row[key] for key in header] for row in rows))
+    write_json(directory / f"{name}.json", list(rows))
+
+
+def _not_converged(directory: Path, jobs: Sequence[Job]) -> list[str]:
+    lines = []
+    for job in jobs:
+        summary = json.loads((directory / job.folder / "summary.json").read_text(encoding="utf-8"))
+        if not summary["converged"]:
+            lines.append(f"{job.folder}: {summary['convergence']}")
+    return lines

@@ -1,0 +1,151 @@
+"""Section 4 of the paper, the robot: the one place where the reproduced fits and the robot meet.
+
+The paper gives no coordinates of its robot, so its claim is evaluated for two representative ones, over their
+workspace.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.fit import seed_of
+from wirebayes.io.run_folder import write_json
+from wirebayes.paper.figures import drifts
+from wirebayes.paper.pictures import Gallery
+from wirebayes.report.blocks import number
+from wirebayes.report.pictures.robot import scene_points
+from wirebayes.report.pictures.robot_lines import budgets, drifts_in_time
+from wirebayes.report.pictures.robot_space import workspace_maps
+from wirebayes.results.store import Stored
+from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import claim, drift
+from wirebayes.robot.pose import variance_shares
+
+Row = dict[str, Any]
+ROBOTS = ("linear-6", "linear-7")  # linear actuators through pulley blocks, as the paper's; the second is redundant
+# spread from specimen to specimen, and for how long the wires had hung under the same load before
+CASES = ((0.0, 0.0), (0.05, 0.0), (0.05, 3600.0))
+_DRAWS, _GRID = 100, (3, 3, 2)
+MAPPED = "linear-7"
+# evenly spread on a logarithmic axis: the minute that the paper speaks of, and on to an hour
+_TIMES_S = np.array([1.0, 3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0])
+_MAP, _SIZES, _FEW = (7, 7, 3), (0.5, 1.0, 2.0), 40
+
+
+def rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
+    """Drift and tilt of a vertical platform after a minute, over posterior and workspace, for each wire and robot.
+
+    Parameters
+    ----------
+    chains : mapping of wire name to Stored
+    seed : int
+    """
+    out = []
+    for wire, stored in chains.items():
+        line = as_line(stored)
+        for name in ROBOTS:
+            robot = schema.read(name)
+            for spread, loaded_s in CASES:
+                rng = np.random.default_rng(seed_of(seed, "robot", wire, name, f"{spread} {loaded_s}"))
+                wires = draws.for_robot(robot, line, spread, rng)
+                found = claim.over_workspace(robot, wires, claim.grid(robot, _GRID), loaded_s=loaded_s)
+                row: Row = {"experiment": wire, "robot": name, "specimen_spread": spread, "loaded_before_s": loaded_s}
+                for key, values in (("drift_mm", 1e3 * found.distance_m), ("tilt_deg", np.degrees(found.tilt_rad))):
+                    quantiles = np.nanquantile(values, [0.05, 0.5, 0.95])
+                    row |= {f"{q}_{key}": v for q, v in zip(("q05", "q50", "q95"), quantiles, strict=True)}
+                out.append(row | {"probability": float(found.holds().mean()), "solved": found.found})
+    return out
+
+
+def needed(chains: Mapping[str, Stored]) -> list[Row]:
+    """Largest platform mass for which the claim holds on new wires, for each wire and size of the robot."""
+    robot = schema.read(MAPPED)
+    return [
+        {
+            "experiment": wire,
+            "robot": MAPPED,
+            "size_factor": size,
+            "specimen_spread": 0.05,
+            "largest_mass_kg": claim.largest_mass(robot, as_line(stored, _FEW), size, steps=7),
+        }
+        for wire, stored in chains.items()
+        for size in _SIZES
+    ]
+
+
+def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
+    """A map of the workspace for each wire, new and alike."""
+    robot = schema.read(MAPPED)
+    for wire, stored in chains.items():
+        wires = draws.for_robot(robot, as_line(stored, _FEW))
+        found = claim.over_workspace(robot, wires, claim.grid(robot, _MAP))
+        maps = workspace_maps(found, wire)
+        low, high = (1e3 * f(np.nanmedian(found.distance_m, 1)) for f in (np.min, np.max))
+        caption = f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace."
+        for quantity, figure in maps.items():
+            alt = f"Median {quantity} of {MAPPED} on new {wire} within a minute, over its workspace at three heights."
+            under = caption if quantity == "drift" else f"The tilt of {MAPPED} on {wire}, same places."
+            gallery.add("robot-map", f"{quantity}-{wire}", figure, alt, under)
+
+
+def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) -> None:
+    """The robot with its drift, the drift of every wire against time, and whose uncertainty makes it uncertain.
+
+    Parameters
+    ----------
+    gallery : Gallery
+    chains : mapping of wire to Stored
+        Posteriors of all holds.
+    limit_mm : float
+        The paper's claim, drawn as a line.
+    """
+    robot = schema.read(MAPPED)
+    x, R = robot.home_m, matrix(robot.home_rotation_rad)
+    moved: dict[str, NDArray[np.float64]] = {}
+    budget: dict[str, dict[str, float]] = {}
+    for wire, stored in chains.items():
+        line = as_line(stored)
+        course = drift.from_command(robot, draws.for_robot(robot, line), x, R, _TIMES_S)
+        if not moved:
+            write_json(gallery.folder / "scene.json", scene_points(robot, x, R, course))
+        distance = 1e3 * np.linalg.norm(course.position_m - x, axis=-1)
+        moved[wire] = np.where(course.found[:, None], distance, np.nan)
+        budget[wire] = variance_shares.shares({name: line.parameters[name] for name in draws.CORE}, distance[:, -1])
+    alt = f"Distance of the platform of {MAPPED} from its pose while new wires of one line creep, for an hour."
+    caption = "New wires, the actuators still. Band: 90 % of the posterior draws; beyond 120 s extrapolated."
+    gallery.add("robot", "drift", drifts_in_time(moved, _TIMES_S, limit_mm, f"Robot {MAPPED}: drift"), alt, caption)
+    alt = f"Shares of the parameters in the variance of the drift of {MAPPED} after an hour, for each wire."
+    figure = budgets(budget, f"Robot {MAPPED}: sources of uncertainty")
+    gallery.add("robot", "budget", figure, alt, f"Of the drift after {_TIMES_S[-1]:g} s.")
+
+
+def draw(gallery: Gallery, claims: Sequence[Row], limit_mm: float) -> None:
+    """One picture a robot.
+
+    Parameters
+    ----------
+    gallery : Gallery
+    claims : sequence of rows
+        Those of ``robot_claim.csv``.
+    limit_mm : float
+        The paper's claim, drawn as a line.
+    """
+    for name in ROBOTS:
+        mine = [row for row in claims if row["robot"] == name]
+        best = max(row["probability"] for row in mine if not row["loaded_before_s"])
+        alt = f"Drift of the platform of {name} within a minute, for each wire, new and after an hour under load."
+        caption = f"Highest probability that the claim holds on new wires: {best:.2f}."
+        gallery.add("robot", name, drifts(mine, limit_mm, f"Robot {name}"), alt, caption)
+
+
+def as_line(stored: Stored, count: int = _DRAWS) -> WireDraws:
+    """Posterior draws of a wire, some of them, as the robot takes them."""
+    pick = np.linspace(0, len(stored.theta) - 1, count).round().astype(int)
+    model = stored.sample.model
+    parameters = {name: stored.draws[name][pick] for name in draws.CORE}
+    length = stored.sample.protocol.length_mm
+    return WireDraws(parameters, length, model.law, model.history, tension_ref_N=model.tension_ref_N)

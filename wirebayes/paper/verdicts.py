@@ -1,0 +1,134 @@
+"""What the readings say about each published value: inside the posterior's interval, outside, or not determined.
+
+A parameter counts as determined by the readings when they took away nine tenths of its prior variance, on a
+logarithmic scale: its interval has then less than a third of the width it had before the test.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from wirebayes.model.problem import MATERIAL
+from wirebayes.numeric.typing import Array
+from wirebayes.results.contraction import MOST, contraction, interval
+from wirebayes.results.store import CREEP_TIMES_S, unit_of
+from wirebayes.wire.fresh import FreshSample
+from wirebayes.wire.model import Model
+
+Verdict = Literal["inside", "outside", "not determined"]
+PRODUCT = "k1*B"  # the only combination that one hold alone determines
+
+
+def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict:
+    """The word for a published value.
+
+    Parameters
+    ----------
+    published : float
+    low, high : float
+        Ends of the posterior's 90 % interval.
+    shrunk : float
+        The contraction (`wirebayes.results.contraction.contraction`).
+
+    Returns
+    -------
+    {"inside", "outside", "not determined"}
+    """
+    if shrunk < MOST:
+        return "not determined"
+    return "inside" if low <= published <= high else "outside"
+
+
+def rows(
+    experiment: str,
+    likelihood: str,
+    draws: Mapping[str, Array],
+    prior: Mapping[str, Array],
+    published: Mapping[str, float],
+) -> list[dict[str, Any]]:
+    """One row a parameter: posterior and prior interval, contraction, published value and verdict.
+
+    Parameters
+    ----------
+    experiment, likelihood : str
+    draws, prior : mapping of name to (n,) array
+        Of the posterior and of the prior.
+    published : mapping of name to float
+    """
+    out = []
+    for name in (*MATERIAL, PRODUCT):
+        after, before = (_quantity(name, values) for values in (draws, prior))
+        value = float(_quantity(name, published))
+        low, middle, high = interval(after)
+        shrunk = contraction(after, before)
+        out.append(
+            {
+                "experiment": experiment,
+                "likelihood": likelihood,
+                "parameter": name,
+                "unit": "N mm N^-U" if name == PRODUCT else unit_of(name),
+                "published": value,
+                "q05": low,
+                "q50": middle,
+                "q95": high,
+                "prior_q05": interval(before)[0],
+                "prior_q95": interval(before)[2],
+                "contraction": shrunk,
+                "verdict": verdict(value, low, high, shrunk),
+            }
+        )
+    return out
+
+
+def creep_rows(
+    experiment: str,
+    likelihood: str,
+    draws: Mapping[str, Array],
+    published: Mapping[str, float],
+    tension_N: float,
+    length_mm: float,
+) -> list[dict[str, Any]]:
+    """Creep elongation at a tension after 2 min, 1 h and 1 day: published parameters beside the posterior.
+
+    Parameters
+    ----------
+    experiment, likelihood : str
+        Written into every row.
+    draws : mapping of name to (n,) array
+        Of the posterior.
+    published : mapping of name to float
+        The wire's row of Table 4.
+    tension_N : float
+        The constant tension of a fresh sample.
+    length_mm : float
+        Its length.
+
+    Returns
+    -------
+    list of dict
+        One a time, with the median and the ends of the 90 % interval.
+    """
+    times = np.array(list(CREEP_TIMES_S.values()))
+    table = {name: np.array([value]) for name, value in published.items()}
+    ours, theirs = (FreshSample(theta, Model(), length_mm).creep_mm(tension_N, times) for theta in (draws, table))
+    out = []
+    for time_s, mine, published_mm in zip(times.tolist(), ours, theirs[:, 0], strict=True):
+        low, middle, high = interval(mine)
+        out.append(
+            {
+                "experiment": experiment,
+                "likelihood": likelihood,
+                "tension_N": tension_N,
+                "time_s": time_s,
+                "published_mm": float(published_mm),
+                "q05_mm": low,
+                "q50_mm": middle,
+                "q95_mm": high,
+            }
+        )
+    return out
+
+
+def _quantity(name: str, values: Mapping[str, Any]) -> Any:
+    return values["k1"] * values["B"] if name == PRODUCT else values[name]

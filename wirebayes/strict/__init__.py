@@ -1,0 +1,1 @@
+"""What users write, read strictly: every complaint names the place, what was found and what was expected."""

@@ -1,0 +1,50 @@
+"""Which wire is computed: its laws and effects, and the constants they refer to."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.numeric.means import geometric_mean
+from wirebayes.wire import laws
+from wirebayes.wire.effect import Effect
+
+
+@dataclass(frozen=True)
+class Model:
+    """Which wire: elastic law, history, effects, and the constant the effects refer to.
+
+    Attributes
+    ----------
+    law : {"hooke", "modified"}
+        Eq (1) or eq (3).
+    history : {"saturating", "additive"}
+        Whether eq (4) is the total creep a tension leads to, or is added again in every hold.
+    effects : tuple of Effect
+    tension_ref_N : float
+        Geometric mean of the training tensions.
+    length_ref_mm : float
+        Geometric mean of the samples' lengths, for effects that compare lengths; 0 means this sample's own.
+    """
+
+    law: laws.ElasticLaw = "hooke"
+    history: laws.History = "saturating"
+    effects: tuple[Effect, ...] = ()
+    tension_ref_N: float = 1.0
+    length_ref_mm: float = 0.0
+
+    def at(self, place: str) -> list[Effect]:
+        """The effects at one place, in the order they compose."""
+        return [effect for effect in self.effects if effect.place == place]
+
+
+PLAIN = Model()
+
+
+def tension_reference(tensions: Sequence[float] | NDArray[Any]) -> float:
+    """Geometric mean of the positive tensions, N; the constant that some effects and coordinates refer to."""
+    values = np.asarray(tensions, float)
+    values = values[values > 0]
+    return geometric_mean(values) if values.size else 1.0
