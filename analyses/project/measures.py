@@ -82,8 +82,10 @@ def imported(tree: ast.Module, known: dict[str, Path]) -> set[Path]:
         elif isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         for name in names:
-            if name.split(".")[0] == "wirebayes":
-                found.add(known.get(name) or known.get(name.rpartition(".")[0]) or known["wirebayes"])
+            while name and name not in known:  # a name in a module, or the compiled kernel in its package
+                name = name.rpartition(".")[0]
+            if name:
+                found.add(known[name])
     return found
 
 
