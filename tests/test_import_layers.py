@@ -4,6 +4,7 @@ import ast
 from pathlib import Path
 
 import wirebayes
+from analyses.project import measures
 
 ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
@@ -78,3 +79,16 @@ def test_every_package_has_a_layer() -> None:
 
 def test_the_app_is_a_room_of_its_own() -> None:
     assert {file for _, imported, file in imports() if imported == "app"} == {"cli/app.py"}
+
+
+def test_no_files_import_one_another_in_a_circle():
+    """Not within a package either."""
+    files = measures.trees(ROOT.parent)
+    known = {measures.module_name(path): path for path in files}
+    assert measures.circles({path: measures.imported(tree, known) for path, tree in files.items()}) == []
+
+
+def test_a_circle_is_found():
+    a, b, c, d = map(Path, "abcd")
+    assert measures.circles({a: {b}, b: {c}, c: {a}, d: {a}}) == [[a, b, c]]
+    assert measures.circles({a: {b}, b: {c}, c: set(), d: {a}}) == []
