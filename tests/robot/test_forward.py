@@ -223,9 +223,11 @@ def test_a_step_is_taken_where_the_energy_falls(monkeypatch):
         assert (moved != 0.0) is taken and damping == (0.0 if taken else 1e-3) and ended == forward._GOING_ON
     assert stepped(monkeypatch, gain=-1.0, damping=0.5)[:2] == (0.0, 5.0)
     assert stepped(monkeypatch, gain=-1.0, damping=1e-6)[:2] == (0.0, 1e-3)
-    # along no stiffness at all, or against one that pushes, no step is taken
-    assert stepped(monkeypatch, gain=1.0, stiffness=0.0)[:2] == (0.0, 1e-3)
-    assert stepped(monkeypatch, gain=1.0, stiffness=-2.0)[:2] == (0.0, 1e-3)
+    # against a stiffness that pushes as far as against one that pulls, along none at all a tenth of the robot's size
+    assert stepped(monkeypatch, gain=1.0, stiffness=-2.0)[:2] == (pytest.approx(-0.5), 0.0)
+    assert stepped(monkeypatch, gain=1.0, stiffness=0.0)[:2] == (pytest.approx(-10.0), 0.0)
+    assert stepped(monkeypatch, gain=-1.0, stiffness=-2.0)[:2] == (0.0, 1e-3)
+    assert stepped(monkeypatch, gain=0.0, stiffness=0.0, floor=1.1)[0] == 0.0  # by a force that is rounding nowhere
     assert stepped(monkeypatch, gain=1.0, stiffness=-1.0, damping=0.5)[0] == pytest.approx(-1.0)  # but if damped enough
 
 
@@ -266,7 +268,7 @@ def test_a_case_ends_in_balance_far_away_or_where_no_step_helps(monkeypatch):
     assert stepped(monkeypatch, **known, floor=3.9)[2] == going_on
     assert stepped(monkeypatch, **known, floor=4.0, damping=0.5)[1:] == (0.0, going_on)  # the bare stiffness decides
     assert stepped(monkeypatch, gain=-1.0, size=4.0, floor=4.0)[2] == forward.FOUND  # it was in balance before
-    loose = {"gain": 1.0, "size": 4.0, "floor": 4.0, "stiffness": 0.0}
+    loose = {"gain": 0.0, "size": 4.0, "floor": 4.0, "stiffness": 0.0}
     assert stepped(monkeypatch, **loose)[1:] == (0.0, forward.NOT_HELD)
     assert stepped(monkeypatch, **loose, damping=0.5)[1:] == (0.0, going_on)
     tiny = 2.0 * 1e-9 * WEIGHED.size_m
@@ -429,3 +431,21 @@ def test_every_status_has_a_number_of_its_own_and_words():
     numbers = forward.FOUND, forward.NOT_CONVERGED, forward.NO_EQUILIBRIUM, forward.NOT_HELD, forward.FELL
     assert numbers == (0, 1, 2, 3, 4) and forward._GOING_ON not in numbers
     assert list(forward.STATUS) == list(numbers) and len(set(forward.STATUS.values())) == 5
+
+
+@pytest.mark.parametrize("aside", [1e-2, 1e-5, 1e-8])
+def test_a_saddle_is_left_in_as_many_steps_as_its_distance_has_doublings(aside):
+    """A platform on six parallel wires whose centre of mass stands too high above them: it turns over."""
+    robot = schema.read("robocrane")
+    turn = np.arange(6) * np.pi / 3
+    corners = 0.1 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(6)])
+    robot = replace(robot, exit_m=corners + [0.0, 0.0, 2.0], platform_m=corners, centre_of_mass_m=np.array([0, 0, 1.0]))
+    robot = replace(robot, mass_kg=4.0)
+    k1 = 300.0
+    wires = Wires("hooke", "saturating", {"k1": np.full((1, 1), k1)}, np.full((6, 1), 1000.0))
+    upright = np.array([[0.0, 0.0, 1.0 - robot.mass_kg * forward.GRAVITY / (6.0 * k1)]])
+    tilted = rotation.matrix(np.array([[aside, 0.3 * aside, 0.0]]))
+    found = forward.solve(robot, wires, np.ones((1, 6)), np.zeros(6), upright, tilted)
+    assert found.found.all()
+    assert found.rotation[0, 2, 2] < 0  # upside down
+    assert found.iterations[0] < np.log2(1.0 / aside) + 20

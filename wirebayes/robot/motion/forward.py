@@ -28,6 +28,7 @@ STATUS = {
     FELL: "fell: the equilibrium that was followed lost its stability",
 }
 _CHUNK, _QUICK = 2048, 7
+_LOOSE = 0.1  # of the robot's size with its wires: the longest step where the curvature does not bound one
 
 
 @dataclass(frozen=True)
@@ -268,18 +269,25 @@ def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArra
     for i in range(robot.degrees):
         damped[i, i] += damping * level
     step, positive = cholesky.solve(damped, -at.gradient)
+    indefinite = np.flatnonzero(~positive)
+    if indefinite.size:
+        part = damped[..., indefinite], at.gradient[:, indefinite], level[indefinite], cases.floor[indefinite]
+        step[:, indefinite] = _off_saddle(*part)
     np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
     length = np.sqrt((step * step).sum(0))
     # A step across the room is no Newton step; it is cut, the direction kept.
-    step *= np.minimum(1.0, 0.25 * reach / np.maximum(length, 1e-300))
+    longest = np.where(positive, 0.25 * reach, _LOOSE * cases.span)
+    cut = np.minimum(1.0, longest / np.maximum(length, 1e-300))
+    step *= cut
+    length *= cut
     new_x = cases.x + step[:3] * scale[:3]
     new_R = turning.compose(step[3:] * scale[3:], cases.R) if robot.degrees == 6 else cases.R
     new = _evaluate(robot, cases.wires, cases.zero, cases.offset, new_x, new_R, scale)
     downhill = (at.gradient * step).sum(0)
     noise = 1e-14 * (np.abs(at.energy) + robot.mass_kg * GRAVITY * cases.span)
-    accept = positive & (new.energy <= at.energy + 1e-4 * downhill + noise)
+    accept = new.energy <= at.energy + 1e-4 * downhill + noise
     accept |= positive & (damping == 0) & (new.size < 0.5 * at.size) & (length < 1e-3 * size)
-    # Uphill or indefinite: shorter, more cautious steps; as predicted: back towards pure Newton.
+    # Uphill: shorter, more cautious steps; as predicted: back towards pure Newton.
     predicted = 0.5 * (damping * level * length * length - downhill)
     as_predicted = at.energy - new.energy > 0.5 * predicted - noise
     calmer = np.where(as_predicted, np.where(damping < 2e-5, 0.0, damping / 100), damping)
@@ -293,6 +301,28 @@ def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArra
     lost, stuck = np.abs(x).max(0) > reach, next_damping > 1e12
     ended = np.select([lost, done, loose, stuck], [NO_EQUILIBRIUM, FOUND, NOT_HELD, NOT_CONVERGED], _GOING_ON)
     return replace(cases, x=x, R=R, at=at, damping=next_damping), ended
+
+
+def _off_saddle(H: Floats, gradient: Floats, level: Floats, floor: Floats) -> Floats:
+    """Newton's step with every curvature taken as positive: away from a saddle, twice as far each time.
+
+    Shifting the whole Hessian until it is positive instead takes ever smaller steps the nearer the saddle is.
+
+    Parameters
+    ----------
+    H : (d, d, n) array
+        Only the upper triangle is read.
+    gradient : (d, n) array
+    level : (n,) array
+        The stiffness if every wire were taut; less than its rounding is none.
+    floor : (n,) array
+        Force below which none can be trusted: it leads nowhere.
+    """
+    curvature, along = np.linalg.eigh(np.moveaxis(H, -1, 0), UPLO="U")
+    slope = np.einsum("nij,in->nj", along, gradient)
+    slope = np.where(np.abs(slope) > floor[:, None], slope, 0.0)
+    stiffness = np.maximum(np.abs(curvature), np.finfo(float).eps * level[:, None])
+    return np.asarray(-np.einsum("nij,nj->in", along, slope / stiffness))
 
 
 @dataclass(frozen=True)

@@ -92,10 +92,13 @@ def follow(
         hesitant[live] = ~held
         step[live[~held]] *= 0.5
         fell = ~held & (step[live] < _SMALLEST)
-        gone = live[fell]
-        whole.status[gone] = np.where(there.status[fell] == forward.NOT_CONVERGED, forward.NOT_CONVERGED, forward.FELL)
-        distance = np.linalg.norm(there.position_m - at[0], axis=1)[fell]
-        drop[gone] = np.where(there.found[fell], distance, np.inf)
+        if fell.any():  # downhill from where they hung
+            hung = [a[fell] for a in (*between, *at)]
+            caught = forward.solve(robot, part.part(np.flatnonzero(fell)), *hung)
+            distance = np.linalg.norm(caught.position_m - hung[2], axis=1)
+            lost = caught.status == forward.NOT_CONVERGED
+            whole.status[live[fell]] = np.where(lost, forward.NOT_CONVERGED, forward.FELL)
+            drop[live[fell]] = np.where(caught.found, distance, np.inf)
         live = live[~fell & (share[live] < 1.0)]
     return Followed(whole, share, drop)
 
@@ -103,10 +106,17 @@ def follow(
 def _step(
     robot: Robot, wires: Wires, start: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
 ) -> tuple[forward.Equilibria, NDArray[np.bool_]]:
-    """Solutions from starts, and whether each is where one Newton step says that it is."""
+    """Solutions from starts, and whether each is where one Newton step says that it is.
+
+    Where the step leads further than is believed, nothing is solved: no solution would be taken.
+    """
     near, ahead = mixed.approach(robot, wires, start, tension_N, lengths)
     predicted = mixed.moved(robot, start, ahead)
-    there = forward.solve(robot, wires, *lengths, *near)
+    # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
+    ahead = np.where(np.isfinite(ahead), ahead, 0.0)
+    close = np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
+    close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
+    there = forward.solve(robot, wires, np.where(close[:, None], lengths[0], np.nan), lengths[1], *near)
     loose = np.flatnonzero(there.status == forward.NOT_HELD)
     if loose.size:
         _let_go(robot, wires, there, loose, lengths)
@@ -114,11 +124,7 @@ def _step(
     off = np.maximum(
         np.linalg.norm(there.position_m - predicted[0], axis=1), robot.size_m * np.linalg.norm(turn, axis=(1, 2))
     )
-    # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
-    ahead = np.where(np.isfinite(ahead), ahead, 0.0)
-    close = off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
-    close &= np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
-    close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
+    close &= off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
     return there, np.asarray(there.found & close)
 
 
