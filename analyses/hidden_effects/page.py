@@ -161,13 +161,13 @@ def _left(parts: dict[str, Any]) -> str:
 
 
 def _calibration(bins: list[dict[str, Any]]) -> str:
-    """Stated probability of a remainder against how often something was left, 95 % intervals."""
+    """Stated probability against how often it came true, 95 % intervals."""
     rows = "".join(
         f"<tr><td>{b['from']:g} to {b['from'] + 0.2:g}</td><td>{_number(b['said'], 2)}</td>"
         f"<td>{escape(_interval(b['found']))}</td></tr>"
         for b in bins
     )
-    return f"<table><tr><th>bin</th><th>stated</th><th>something left, 95 % interval</th></tr>{rows}</table>"
+    return f"<table><tr><th>bin</th><th>stated</th><th>came true, 95 % interval</th></tr>{rows}</table>"
 
 
 def _section(how: str, result: dict[str, Any]) -> str:
@@ -202,6 +202,10 @@ def _section(how: str, result: dict[str, Any]) -> str:
             _calibration(result["remainder_calibration"]),
             "<p>The same with the kinds as frequent as the prior expects them:</p>",
             _calibration(result["remainder_calibration_as_expected"]),
+            *(
+                f"<h3>Inclusion of {of}, kinds as frequent as the prior expects them</h3>{_calibration(bins)}"
+                for of, bins in result["inclusion_calibration"].items()
+            ),
             *(_rates(f"Several wires, {kind}", found) for kind, found in result["several_wires"].items()),
             _rates("False alarms by protocol", result["clean_by_protocol"]),
             _rates("Held-out gap closed, pooled, by delta", result["gap_closed"]),

@@ -10,7 +10,8 @@ import argparse
 import json
 from pathlib import Path
 
-from .targets import Target, targets
+from .target import Target
+from .targets import targets
 
 SIGNS = {">= ": "≥ ", "<= ": "≤ ", "delta ": "δ = "}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,16 +78,27 @@ def closed_of_oracle(sums: Any, n: int) -> float:
     return closed(sums, n) / float(of_oracle) if of_oracle > 0 else float("nan")
 
 
-def against_optimal(rows: list[Row], draws: int = 400) -> dict[str, Any] | None:
-    """Rate of right names over the ideal judge's on the same detected cases, with a bootstrap interval."""
-    pairs = np.array([[r["right"], r["optimal"]["top1"]] for r in rows if "top1" in r["optimal"]], dtype=float)
+def against_optimal(rows: list[Row]) -> dict[str, Any] | None:
+    """Rate of right names over the ideal judge's on the same detected cases."""
+    seen = [r for r in rows if "top1" in r["optimal"]]
+    return share_of([r["right"] for r in seen], [r["optimal"]["top1"] for r in seen])
+
+
+def share_of(hits: Sequence[bool], possible: Sequence[float], draws: int = 400) -> dict[str, Any] | None:
+    """How often something is right over how often it could be, with a 90 % bootstrap interval over the cases.
+
+    Parameters
+    ----------
+    hits, possible : whether each case is right, and the probability with which a judge is.
+    """
+    pairs = np.array([hits, possible], dtype=float).T
     if not len(pairs) or pairs[:, 1].sum() == 0:
         return None
     rng = np.random.default_rng(0)
     ratios = []
     for _ in range(draws):
-        sums = pairs[rng.integers(len(pairs), size=len(pairs))].sum(axis=0)
-        ratios.append(sums[0] / max(sums[1], 1e-9))
+        right, could_be = pairs[rng.integers(len(pairs), size=len(pairs))].sum(axis=0)
+        ratios.append(right / max(could_be, 1e-9))
     low, high = np.quantile(ratios, [0.05, 0.95])
-    value = pairs[:, 0].sum() / pairs[:, 1].sum()
-    return {"value": float(value), "n": len(pairs), "low": float(low), "high": float(high)}
+    right, could_be = pairs.sum(axis=0)
+    return {"value": float(right / could_be), "n": len(pairs), "low": float(low), "high": float(high)}

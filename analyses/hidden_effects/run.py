@@ -23,7 +23,7 @@ from .fitting import held_out_mask, last_third, oracle
 from .optimal import judge
 from .truth import PROTOCOLS
 
-Job = tuple[Spec, str, str, int | None]
+Job = tuple[Spec, str, str, int | None]  # of asking the simulations, of judging the draws
 
 
 def read_lines(path: Path) -> dict[str, dict[str, Any]]:
@@ -62,10 +62,10 @@ def _ask(job: Job) -> dict[str, Any]:
 
 
 def _judge(job: Job) -> dict[str, Any]:
-    spec, *_ = job
+    spec, *_, draws = job
     case = build(spec)
     assert case is not None
-    result = judge(case)
+    result = judge(case) if draws is None else judge(case, draws)
     held = last_third(case.rig)
     result["held_out_holds"] = held
     if spec.kind in ("clean", "single"):
@@ -119,6 +119,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--output", type=Path, default=Path("out/hidden_effects"))
     p.add_argument("--workers", type=int, default=2)
     p.add_argument("--simulations", type=int, help="refitted data sets behind a p-value instead of the usual number")
+    p.add_argument("--judge-draws", type=int, help="data sets that the ideal judge sees of a case instead of 200")
     p.add_argument("--scheduler", help="address of a Dask scheduler; its workers share this checkout and --output")
     p.add_argument("--seed", type=int, default=0, help="another seed makes other cases of the same plan")
     return p
@@ -171,6 +172,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.stage == "ask":
         return 0
     judged = folder / "judged.jsonl"
+    jobs = [(s, f, how, options.judge_draws) for s, f, how, _ in jobs]
     work("judge", jobs, read_lines(judged), judged, _judge, options.workers, options.scheduler)
     keys = [spec.key for spec, *_ in jobs]
     truths = {key: json.loads((folder / "sealed" / f"{key}.json").read_text(encoding="utf-8")) for key in keys}

@@ -2,110 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery.settings import MORE, UNKNOWN_WEIGHT
-
+from . import stated
 from .cases import TOGETHER
-from .catalogue import EFFECTS
 from .optimal_sets import SEPARABLE
-from .rates import Row, closed, comparable, pooled, rate, weighted_rate
-
-NOTHING = "nothing-missing"
-CONDITIONAL = 8.0  # delta beside the other effects from which one is expected to be named
-BIN_LEVEL = 0.95  # of the intervals of a calibration
-VISIBLE = 0.8  # share of delta that must survive a refit of the plain model for a case to count as visible
-
-
-def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, Any]) -> Row:
-    """What the scores need of one case; the experiment that shows the effect most speaks for the file."""
-    answers = record["answer"]["experiments"]
-    spoken = answers[judged["bench"]]
-    names = [e["name"] for e in truth["effects"]]
-    groups = judged.get("groups", [])
-    best = spoken.get("best")
-    detected = spoken["verdict"] != NOTHING
-    unknown = detected and (spoken["verdict"] == "unknown" or best == "unknown")
-    chosen = "unknown" if unknown else best if detected else NOTHING
-    amplitudes = spoken.get("amplitudes") or {}
-    hold = truth["effects"][0]["hold"] if truth["effects"] else None
-    found_hold = (amplitudes.get(names[0]) or {}).get("hold") if names else None
-    return {
-        "key": truth["key"],
-        "kind": truth["kind"],
-        "protocol": truth["protocol"],
-        "delta": truth["delta"],
-        "names": names,
-        "effect": names[0] if names else None,
-        "law": truth["law"],
-        "detected": detected,
-        "any_alarm": any(a["verdict"] != NOTHING for a in answers.values()),
-        "innocent": [a["verdict"] != NOTHING for n, a in answers.items() if n not in _touched(truth)],
-        "chosen": chosen,
-        "right": bool(names) and chosen == names[0],
-        "right_group": any(chosen in group for group in groups[:1]),
-        "claimed_group": bool(names) and names[0] in (spoken.get("group") or []),
-        "in_set": bool(names) and names[0] in (spoken.get("set") or []),
-        "set_size": len(spoken.get("set") or []),
-        "accepted": list(spoken.get("accepted") or []),
-        "wires": _wires(truth, groups, answers),
-        "groups": groups,
-        "conditional": [e.get("conditional_delta") for e in truth["effects"]],
-        "remains": spoken["verdict"] in ("partial", "unknown"),
-        "verdict": spoken["verdict"],
-        "remainder": (spoken.get("remainder") or {}).get("probability"),
-        "optimal_two": judged.get("optimal_two") or {},
-        "optimal_three": judged.get("optimal_three") or {},
-        "optimal_mixed": judged.get("optimal_mixed") or {},
-        "left_over": judged.get("left_over") or {},
-        "blind": judged.get("blind") or {},
-        "right_hold": None if hold is None or found_hold is None else found_hold == hold,
-        "separable": judged.get("separable"),
-        "visible": not names or judged["delta_after_refit"] >= VISIBLE * truth["delta"],
-        "left": judged["delta_after_refit"] if names else None,
-        "optimal": judged.get("optimal") or {},
-        "held_out": _held_out(judged, spoken),
-        "seconds": record["seconds"],
-    }
-
-
-def _wires(truth: dict[str, Any], groups: list[list[str]], answers: dict[str, Any]) -> list[dict[str, bool]]:
-    """What was said of each experiment of a file: whether it carries an effect, and was given one's name or another."""
-    out = []
-    for name, answer in answers.items():
-        own = [g for e, g in zip(truth["effects"], groups, strict=False) if name in e["experiments"]]
-        accepted = list(answer.get("accepted") or [])
-        out.append(
-            {
-                "carries": bool(own),
-                "detected": answer["verdict"] != NOTHING,
-                "named": any(a in g for a in accepted for g in own),
-                "false_name": any(not any(a in g for g in own) for a in accepted),
-            }
-        )
-    return out
-
-
-def _touched(truth: dict[str, Any]) -> set[str]:
-    return {name for e in truth["effects"] for name in e["experiments"]} if truth["effects"] else set(truth["benches"])
-
-
-def _held_out(judged: dict[str, Any], spoken: dict[str, Any]) -> dict[str, float] | None:
-    """Held-out squared errors in units of the case's noise floor, so that no case with large tensions rules."""
-    reference, given = judged.get("held_out"), spoken.get("held_out")
-    if not reference or not given or not given.get("plain") or not given.get("final"):
-        return None
-    floor = reference["floor"] ** 2
-    return {
-        "plain": given["plain"]["rmse_N"] ** 2 / floor,
-        "final": given["final"]["rmse_N"] ** 2 / floor,
-        "judge_plain": reference["plain"] ** 2 / floor,
-        "oracle": reference["oracle"] ** 2 / floor,
-        "same_holds": float(list(given.get("holds", [])) == list(judged["held_out_holds"].get(judged["bench"], []))),
-    }
+from .rates import Row, closed, comparable, pooled, rate
+from .rows import accepted_of_group, case_row, false_names, visible_beside
+from .targets import targets
 
 
 def confusion(rows: list[Row]) -> dict[str, dict[str, int]]:
@@ -146,8 +53,6 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
     ----------
     truths, judged, answers : records of the cases by key: sealed truth, the judge's groups and ideal, what was said.
     """
-    from .targets import targets
-
     rows, failed = [], []
     for key, truth in truths.items():
         record = answers.get(key)
@@ -167,8 +72,12 @@ def score(truths: dict[str, Any], judged: dict[str, Any], answers: dict[str, Any
         "alone": {kind: left_over([r for r in rows if r["kind"] == kind]) for kind in ("without", "foreign")},
         "false_names": rate(bool(false_names(r)) for r in rows if r["kind"] != "without"),
         "partial_on_single": rate(r["verdict"] == "partial" for r in single),
-        "remainder_calibration": calibration(rows),
-        "remainder_calibration_as_expected": calibration(rows, prior_weights(rows)),
+        "remainder_calibration": stated.remainders(rows),
+        "remainder_calibration_as_expected": stated.remainders(rows, stated.prior_weights(rows)),
+        "inclusion_calibration": {
+            of: says(rows, stated.prior_weights(rows))
+            for of, says in (("names", stated.names), ("families", stated.families))
+        },
         "clean_by_protocol": {
             p: rate(r["any_alarm"] for r in rows if r["kind"] == "clean" and r["protocol"] == p)
             for p in dict.fromkeys(r["protocol"] for r in rows if r["kind"] == "clean")
@@ -198,21 +107,6 @@ def _pairs(rows: list[Row]) -> dict[str, Any]:
         "both_accepted": rate(set(r["names"]) <= set(r["accepted"]) for r in rows if r["detected"]),
         "something_else_accepted": rate(bool(set(r["accepted"]) - set(r["names"])) for r in rows if r["detected"]),
     }
-
-
-def false_names(row: Row) -> list[str]:
-    """Accepted names outside the group of everything that is hidden."""
-    return [name for name in row["accepted"] if not any(name in group for group in row["groups"])]
-
-
-def accepted_of_group(row: Row) -> list[bool]:
-    """For each hidden effect whether it, or one whose signature is nearly the same, was accepted."""
-    return [any(name in group for name in row["accepted"]) for group in row["groups"]]
-
-
-def visible_beside(row: Row) -> list[bool]:
-    """For each hidden effect whether enough of it is left beside the others for it to be named."""
-    return [d is not None and d >= CONDITIONAL for d in row["conditional"]]
 
 
 def _together(rows: list[Row]) -> dict[str, Any]:
@@ -269,53 +163,6 @@ def left_over(rows: list[Row]) -> dict[str, Any]:
         }
         for size in sizes
     }
-
-
-def calibration(rows: list[Row], weights: Mapping[str, float] = {}) -> list[dict[str, Any]]:
-    """How often something is left beside the names where its probability is said to lie in each of five bins.
-
-    Something is left where an effect is foreign, was removed, or is hidden and neither it nor one like it was accepted.
-
-    Parameters
-    ----------
-    weights : of the cases of each kind, where not all count the same; a kind that is missing counts nothing.
-
-    Returns
-    -------
-    What was said on average, and what was found with its 95 % interval, for each bin.
-    """
-    out = []
-    for low in (0.0, 0.2, 0.4, 0.6, 0.8):
-        part = [r for r in rows if r["detected"] and r["remainder"] is not None and r["names"]]
-        part = [r for r in part if low <= r["remainder"] < low + 0.2 or (low == 0.8 and r["remainder"] >= 1.0)]
-        w = [weights.get(r["kind"], 0.0) if weights else 1.0 for r in part]
-        left = [not all(accepted_of_group(r)) for r in part]
-        stated = float(np.average([r["remainder"] for r in part], weights=w)) if sum(w) > 0 else None
-        found = weighted_rate(left, w, BIN_LEVEL) if weights else rate(left, BIN_LEVEL)
-        out.append({"from": low, "said": stated, "found": found})
-    return out
-
-
-def prior_weights(rows: list[Row]) -> dict[str, float]:
-    """Weight of a case of each kind with which the kinds are as frequent as the prior of `discover` expects.
-
-    A single name has weight 1, so all n of them have n; all pairs together have `MORE` of that, all threes as
-    much of the pairs; a remainder beside one name has `MORE` of what the name has without, and a remainder
-    alone has `UNKNOWN_WEIGHT`. What the benchmark has no cases of, such as a remainder beside two names, is left out.
-    """
-    n = len(EFFECTS)
-    expected = {
-        ("single",): 1.0 * n,
-        ("pair", "two", "periodic"): MORE * n,
-        ("three",): MORE**2 * n,
-        ("mixed",): MORE * n,
-        ("without", "foreign"): UNKNOWN_WEIGHT,
-    }
-    out: dict[str, float] = {}
-    for kinds, share in expected.items():
-        count = sum(r["kind"] in kinds for r in rows)
-        out |= {kind: share / count for kind in kinds if count}
-    return out
 
 
 def _seconds(values: list[float]) -> dict[str, float] | None:

@@ -2,21 +2,34 @@
 
     python -m analyses.hidden_effects.several out/one/scores.json out/other/scores.json > docs/discover-several.inc
 
-The first table has the targets of names and remainders with 90 % intervals, the second a remainder's stated probability
-with 95 % intervals, as the cases are and as the prior expects them. A missed row is bold.
+The first table has the targets of names and remainders with 90 % intervals, the others the stated probabilities of a
+remainder, of names and of families with 95 % intervals, as the cases are and as the prior expects them. A missed row is
+bold.
 """
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 from .cases import LONG
 from .pooled import cell, signed
 from .rates import Row
-from .score import calibration, left_over, prior_weights
-from .targets import Target, targets
+from .score import left_over
+from .stated import Bins, families, names, prior_weights, remainders
+from .target import Target
+from .targets import targets
 
-LEFT_OUT = ("false alarms", "clean data", "detected", "a test that knew", "true effect in", "gap closed", "size of")
+LEFT_OUT = (
+    "false alarms",
+    "clean data",
+    "detected",
+    "a test that knew",
+    "true effect in",
+    "gap closed",
+    "size of",
+    "members of",
+)
 
 
 def parts(rows: list[Row]) -> dict[str, list[Row]]:
@@ -42,10 +55,16 @@ def _found(row: Target | None) -> str:
     return cell(row, row["passed"] is False) if row and row["found"] else ""
 
 
-def remainder_table(rows: list[Row]) -> list[list[str]]:
-    """Cells of the table of a remainder's stated probability, its head first."""
-    table = [["stated", "mean", "something was left", "mean, as the prior expects", "something was left"]]
-    for plain, expected in zip(calibration(rows), calibration(rows, prior_weights(rows)), strict=True):
+def stated_table(rows: list[Row], of: Callable[..., Bins], came_true: str) -> list[list[str]]:
+    """Cells of the table of a stated probability, its head first.
+
+    Parameters
+    ----------
+    of : one of `stated`'s functions.
+    came_true : what happened where it did.
+    """
+    table = [["stated", "mean", came_true, "mean, as the prior expects", came_true]]
+    for plain, expected in zip(of(rows), of(rows, prior_weights(rows)), strict=True):
         cells = [f"{plain['from']:g} to {plain['from'] + 0.2:g}"]
         for found in (plain, expected):
             if found["found"] is None:
@@ -89,7 +108,12 @@ def main() -> None:
         print("\n".join(left_lines(rows)))
         return
     print(listed(names_table(rows), "36 10 18 18 18"))
-    print(listed(remainder_table(rows), "16 12 26 16 30"), end="")
+    tables = (
+        stated_table(rows, remainders, "something was left"),
+        stated_table(rows, names, "the effect was there"),
+        stated_table(rows, families, "one of the family was there"),
+    )
+    print("\n".join(listed(table, "16 12 26 16 30") for table in tables), end="")
 
 
 if __name__ == "__main__":

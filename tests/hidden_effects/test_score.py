@@ -19,7 +19,8 @@ from analyses.hidden_effects.rates import (
     upper_bound,
     weighted_rate,
 )
-from analyses.hidden_effects.score import calibration, confusion, prior_weights, score
+from analyses.hidden_effects.score import confusion, score
+from analyses.hidden_effects.stated import families, names, prior_weights, remainders
 from analyses.hidden_effects.targets import targets
 
 HOLDS = {"sample-1": [9, 10]}
@@ -172,6 +173,8 @@ def several(kind, accepted, ideal, remains=False, groups=(("toe",), ("yield",)))
         "optimal_two": {"group": ideal} if kind == "two" else {},
         "optimal_three": {},
         "blind": {"all": 0.5, "known": 0.7, "named": 0.6, "remains": 0.2, "right": 0.8, "other": 0.1},
+        "remainder": 0.8 if remains else 0.2,
+        "families": [],
         "optimal_mixed": {"known": ideal, "remains": 0.5} if kind == "mixed" else {},
         "left_over": {"2": {"delta": 2.0, "power": 0.1}} if kind == "mixed" else {},
     }
@@ -195,6 +198,12 @@ def test_several_effects_are_measured_against_the_ideal_judge():
         (": a name of no group", 0.1),
     ):
         assert found[blind + what]["found"]["value"] == pytest.approx(value)
+    assert found["of the judge's rate: two effects: both accepted"]["found"]["value"] == pytest.approx(0.5 / 0.5)
+    assert found["of the judge's rate: beside a foreign effect: the known one accepted"]["found"][
+        "value"
+    ] == pytest.approx(1.0 / 0.7)
+    likely = found["of the judge's rate: beside a foreign effect: a remainder is likely"]
+    assert likely["found"]["value"] == pytest.approx(0.5 / 0.2)
     assert found["a test of what two names leave would see it"]["found"]["value"] == pytest.approx(0.1)
     assert found["an accepted name that is of no hidden effect's group"]["found"]["k"] == 2
     hidden = [several("mixed", [], 0.9) | {"conditional": [7.9, 10.0]}]
@@ -208,7 +217,7 @@ def said(kind, probability, accepted=("toe",)):
 
 def test_bins_of_a_stated_probability_with_their_95_percent_intervals():
     rows = [said("single", 0.05)] * 9 + [said("single", 0.15, ())] + [said("single", 1.0, ())]
-    first, *_, last = calibration(rows)
+    first, *_, last = remainders(rows)
     assert first["said"] == pytest.approx(0.06)
     assert (first["found"]["k"], first["found"]["n"]) == (1, 10)
     assert binom.cdf(1, 10, first["found"]["high"]) == pytest.approx(0.025, abs=1e-6)
@@ -221,9 +230,56 @@ def test_kinds_can_count_as_the_prior_expects_them():
     rows = [said("single", 0.05)] * 6 + [said("mixed", 0.05, ())] * 3 + [said("foreign", 0.05, ())] * 3
     weights = prior_weights(rows)
     assert weights == pytest.approx({"single": n / 6, "mixed": n / 6, "without": 1 / 3, "foreign": 1 / 3})
-    (bin_, *_) = calibration(rows, weights)
+    (bin_, *_) = remainders(rows, weights)
     assert bin_["found"]["value"] == pytest.approx((n / 2 + 1) / (n + n / 2 + 1))
-    assert calibration([said("pair", 0.05)], {"single": 1.0})[0]["found"] is None
+    assert remainders([said("pair", 0.05)], {"single": 1.0})[0]["found"] is None
+
+
+def in_family(members, inclusion, name="toe", established=False):
+    family = {"members": list(members), "inclusion": inclusion, "established": established}
+    return said("single", 0.05) | {
+        "names": [name],
+        "effect": name,
+        "families": [family],
+        "inclusion": {member: inclusion / len(members) for member in members},
+    }
+
+
+def test_inclusions_of_names_and_families_are_counted_by_themselves():
+    rows = [in_family(["toe", "ageing"], 1.0), in_family(["toe", "ageing"], 1.0, name="superposition")]
+    *_, last = families(rows)
+    assert (last["said"], last["found"]["k"], last["found"]["n"]) == (1.0, 1, 2)
+    _, _, middle, *_ = names(rows)
+    assert (middle["said"], middle["found"]["k"], middle["found"]["n"]) == (0.5, 1, 4)
+
+
+def test_families_and_what_is_said_beside_them_have_their_rows():
+    def row(**changes):
+        base = several("single", ["toe"], 0.9) | {"effect": "toe", "separable": True, "right_group": True}
+        family = {"members": ["toe", "ageing", "yield"], "inclusion": 0.95, "established": True}
+        return (
+            base | {"families": [family], "in_set": True, "claimed_group": True, "set_size": 1, "left": 10.0} | changes
+        )
+
+    rows = [row(), row(effect="superposition", verdict="unknown"), row(effect="superposition", right=True)]
+    rows += [row(accepted=["screw_error"])]
+    by_name = {r["target"]: r for r in targets(rows)}
+    assert by_name["the first family holds the true effect, delta 10"]["found"]["k"] == 2
+    assert by_name["members of the first family, delta 10"]["found"]["value"] == 3.0
+    unknown = by_name["unknown, although a family is established"]
+    assert unknown["found"]["k"] == 1 and not unknown["passed"]
+    assert by_name["superposition told apart from the name nearest to it"]["found"]["value"] == 0.5
+    screw = by_name["a screw error named where there is none"]
+    assert screw["found"]["value"] == 0.25 and not screw["passed"]
+    first = by_name["of the judge's rate: one of the true group first, delta 10"]
+    assert first["found"]["value"] == pytest.approx(1.0 / 0.6) and first["passed"]
+
+
+def test_clean_files_with_an_alarm_are_also_shown_apart():
+    truths = {k: truth(k, "clean") for k in "abc"}
+    answers = {"a": answer("toe", final=1.5), "b": answer("toe", final=6.0), "c": answer(None, final=3.0)}
+    apart = found(score(truths, dict.fromkeys("abc", judged()), answers), "clean data: that ratio")
+    assert (apart["found"]["value"], apart["found"]["n"]) == (pytest.approx((0.5 + 2.0) / 2), 2)
 
 
 def test_unequal_weights_are_worth_fewer_cases():
@@ -278,15 +334,16 @@ def test_tables_for_the_docs_have_a_column_for_each_protocol(tmp_path, capsys, m
     (tmp_path / "scores.json").write_text(json.dumps({"api": result}), encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["several", str(tmp_path / "scores.json")])
     names_and_remainders.main()
-    names, remainders = capsys.readouterr().out.split(".. list-table::")[1:]
-    both = next(c for c in names.split("\n   * - ") if c.startswith("two effects: both accepted"))
+    named, left, *included = capsys.readouterr().out.split(".. list-table::")[1:]
+    both = next(c for c in named.split("\n   * - ") if c.startswith("two effects: both accepted"))
     assert both.splitlines()[1:] == ["     - ≥ 85 %", *(f"     - {c}" for c in ["**50 %** [3, 97] of 2"] * 2), "     -"]
-    assert "seen beside the best name (foreign)\n     - no more, in %\n     - 10 %" in names
-    assert "effect in no catalogue" in names and "false alarms" not in names
-    bins = [c.splitlines() for c in remainders.split("\n   * - ")[2:]]
+    assert "seen beside the best name (foreign)\n     - no more, in %\n     - 10 %" in named
+    assert "effect in no catalogue" in named and "false alarms" not in named
+    bins = [c.splitlines() for c in left.split("\n   * - ")[2:]]
     assert bins[0][1:3] == ["     - 10 %", "     - 0.0 % [0.0, 97.5] of 1"]
     assert bins[1][1:3] == ["     - 30 %", "     - 100 % [3, 100] of 1"]
     assert bins[2][1:] == ["     -"] * 4
+    assert ["the effect was there" in included[0], "one of the family was there" in included[1]] == [True, True]
     monkeypatch.setattr("sys.argv", ["several", "--left", str(tmp_path / "scores.json")])
     names_and_remainders.main()
     assert capsys.readouterr().out == "foreign, the best 1: less than 3.3 left in 100 % [5, 100] of 1, power 10 %\n"
