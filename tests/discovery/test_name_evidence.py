@@ -14,6 +14,7 @@ from wirebayes.discovery.power import amplitude_80
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.search import discover
 from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.modes import Optimum
 from wirebayes.simulation.synthetic import Bench, Truth
 
 NORM = 25.0  # δ per unit of amplitude in these scans
@@ -70,6 +71,7 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
 
     class Curve:
         prior = stats.uniform(low, 40.0 * per_delta - low)  # of δ up to 40
+        common = ()
 
         def __init__(self, block: Any, effect: Any) -> None:
             pass
@@ -77,9 +79,10 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
         def starts(self, shapes: Any) -> np.ndarray:
             return np.zeros((1, 1))
 
-        def climb(self, start: np.ndarray, amplitude: np.ndarray) -> SimpleNamespace:
+        def climb(self, start: np.ndarray, amplitude: np.ndarray) -> Optimum:
             ratio = 0.5 * 9.0**2 - 0.5 * ((amplitude - top) / per_delta) ** 2
-            return SimpleNamespace(converged=np.ones(len(start), bool), log_evidence=ratio, z=start)
+            curvature = np.ones((len(start), 1, 1))
+            return Optimum(start, ratio - 0.5 * np.log(2.0 * np.pi), curvature, np.ones(len(start), dtype=bool))
 
         def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
             return z

@@ -1,7 +1,7 @@
 """A refit on evidence that is a known curve of the amplitude: its top is found wherever it lies, and its width."""
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -27,6 +27,17 @@ class Flat:
         return float(amplitude > 0)
 
 
+class Ends(NamedTuple):
+    """Where climbs ended."""
+
+    converged: np.ndarray
+    log_evidence: np.ndarray
+    z: np.ndarray
+
+    def rows(self, which: np.ndarray) -> "Ends":
+        return Ends(*(part[which] for part in self))
+
+
 def refitted(
     monkeypatch: pytest.MonkeyPatch,
     tops: list[float],
@@ -40,6 +51,8 @@ def refitted(
     """
 
     class Curve:
+        common = ()
+
         def __init__(self, block: Any, effect: Any) -> None:
             self.top = block.top
             main = effect.amplitudes[0]
@@ -55,7 +68,7 @@ def refitted(
                 value[1::2] -= 5.0
             end = (amplitude / 1e-3)[:, None]
             near = np.abs(end - start[:, :1])[:, 0] <= leap
-            return SimpleNamespace(converged=near, log_evidence=value, z=end)
+            return Ends(near, value, end)
 
         def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
             assert z[:, 0] == pytest.approx(amplitude / 1e-3)
@@ -238,13 +251,13 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
 
     def block(value: list[float], converged: list[bool]) -> Any:
         ends = np.arange(float(len(value)))[:, None]
-        found = SimpleNamespace(converged=np.array(converged), log_evidence=np.array(value), z=ends)
+        found = Ends(np.array(converged), np.array(value), ends)
 
         def climb(start: np.ndarray, amplitude: np.ndarray) -> Any:
             assert amplitude.tolist() == list(np.repeat([5.0, 6.0], len(value) // 2))
             return found
 
-        return SimpleNamespace(climb=climb)
+        return SimpleNamespace(climb=climb, common=())
 
     blocks = [block([1.0, 9.0, 4.0, 3.0], [True, False, True, True]), block([10.0, 20.0], [True, False])]
     starts = [np.zeros((4, 1)), np.zeros((2, 1))]

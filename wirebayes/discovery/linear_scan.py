@@ -54,12 +54,12 @@ class Probe:
 
 
 def probes(effect: Effect) -> list[Probe]:
-    """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it is one-sided."""
+    """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it need not be."""
     column, amplitude = effect.columns()[0], effect.amplitudes[0]
     low, high = amplitude.prior.support()
     scale = float(amplitude.prior.std())
     one_sided = bool(low >= amplitude.neutral)
-    steps = [0.1 * scale] if not one_sided else [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
+    steps = [0.1 * scale] if effect.nearly_linear or not one_sided else [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
     steps = [s for s in steps if amplitude.neutral + s <= high] or [0.5 * (high - amplitude.neutral)]
     return [
         Probe(effect, form | {column: amplitude.neutral + s}, s, one_sided)

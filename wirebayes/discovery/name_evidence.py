@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, projected
 from wirebayes.discovery.refit import LARGEST, Refit, refit
-from wirebayes.discovery.screening import Candidate, log_bayes
+from wirebayes.discovery.screening import Candidate, best_probes, log_bayes
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
@@ -17,6 +17,7 @@ from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
 
 _Place = tuple[str, tuple[int, ...]]  # key of the effect, blocks that share its amplitude
+_Task = tuple[Effect, float, float, float, list[Mapping[str, float]]]  # what `refit` is given after the blocks
 _MARGIN, _SHARE = 5.0, 0.5  # linear screening errs, and errs more for a large effect
 _WAVE = 4  # names refitted at once, whatever the number of cores
 _HOPELESS = -2.0  # nats: a block whose scan speaks against an effect is not refitted with it
@@ -24,12 +25,12 @@ _HOPELESS = -2.0  # nats: a block whose scan speaks against an effect is not ref
 
 @dataclass(frozen=True)
 class _Form:
-    """One variant of an effect: its places, a linear log Bayes factor each, and the probe that has it."""
+    """One variant of an effect: its places, a linear log Bayes factor each, and the candidate that has it."""
 
     effect: Effect
     places: tuple[_Place, ...]
     linear: tuple[float, ...]
-    probes: tuple[int, ...]
+    candidates: tuple[Candidate, ...]
     promise: float
 
 
@@ -115,15 +116,16 @@ def weigh_names(
 
 def _tasks(
     forms: Sequence[_Form], trials: Sequence[Probe], scans: Sequence[Scan], reach: Mapping[_Place, float]
-) -> dict[_Place, tuple[Effect, float, float, float, Mapping[str, float]]]:
+) -> dict[_Place, _Task]:
     """What is refitted of some forms: at each place the effect, the amplitude per δ, a guess, its reach, and shapes."""
-    tasks: dict[_Place, tuple[Effect, float, float, float, Mapping[str, float]]] = {}
+    tasks: dict[_Place, _Task] = {}
     for form in forms:
         best = max(form.linear)
-        for place, value, probe in zip(form.places, form.linear, form.probes, strict=True):
+        for place, value, candidate in zip(form.places, form.linear, form.candidates, strict=True):
             if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
-                _, guess, per_delta = log_bayes(Candidate(probe, form.effect.name, place[1], True), scans)
-                own = trials[probe].own
+                _, guess, per_delta = log_bayes(candidate, scans)
+                chosen = best_probes(candidate, scans)
+                own: list[Mapping[str, float]] = [trials[int(number[0])].own for number in chosen]
                 tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf), own
     return tasks
 
@@ -132,7 +134,7 @@ def _forms(
     trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan], further: Mapping[Candidate, float]
 ) -> list[_Form]:
     """The variants of every effect, each place with the probe that the linear scan likes best there."""
-    best: dict[_Place, tuple[float, int]] = {}
+    best: dict[_Place, tuple[float, Candidate]] = {}
     effects: dict[str, Effect] = {}
     promise: dict[str, float] = {}
     for c in candidates:
@@ -142,7 +144,7 @@ def _forms(
         promise[effect.key] = max(promise.get(effect.key, -np.inf), value, further.get(c, -np.inf))
         if c.shared:
             place = effect.key, c.blocks
-            best[place] = max(best.get(place, (-np.inf, 0)), (value, c.probe), key=lambda item: item[0])
+            best[place] = max(best.get(place, (-np.inf, c)), (value, c), key=lambda item: item[0])
     out = []
     for key, effect in effects.items():
         places = [place for place in best if place[0] == key]

@@ -7,11 +7,14 @@ possible does. Fits with the effect inside, folds, samples and predictions have 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
+from wirebayes.inference.modes import Optimum
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 
@@ -96,7 +99,7 @@ def refit(
     per_delta: float,
     guess: float,
     reach: float = np.inf,
-    shapes: Mapping[str, float] = {},
+    shapes: Sequence[Mapping[str, float]] = (),
 ) -> Refit:
     """Refit one effect with one amplitude shared by the blocks `which`.
 
@@ -111,8 +114,8 @@ def refit(
         The linear scan's best distance from neutral.
     reach : float
         Distance from neutral at which the effect has δ = `LARGEST` in the noise of the plain fit.
-    shapes : mapping of column to float
-        Shape constants to begin with; their medians where left out.
+    shapes : sequence of mappings of column to float
+        Shape constants to begin with, a block each; their medians where left out.
     """
     main = effect.amplitudes[0]
     low, high = (float(v) for v in main.prior.support())
@@ -128,7 +131,8 @@ def refit(
     steps = np.concatenate([_DELTAS, [max(abs(guess) / per_delta, 0.3)]]) * per_delta
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
-    profile = _climbed(pinned, added, grid, [np.tile(p.starts(shapes), (len(grid), 1)) for p in pinned]).known()
+    starts = [p.starts(own) for p, own in zip(pinned, shapes or [{}] * len(pinned), strict=True)]
+    profile = _climbed(pinned, added, grid, [np.tile(start, (len(grid), 1)) for start in starts]).known()
     outward = refined = 0
     while refined < 2:
         at = float(profile.amplitude[profile.best])
@@ -180,8 +184,20 @@ def _climbed(
         value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
         pick = np.argmax(value, axis=1)
         total = total + value[rows, pick]
-        ends.append(found.z.reshape(len(amplitudes), k, -1)[rows, pick])
-    return _Profile(amplitudes, total + added(amplitudes), ends)
+        ends.append(found.rows(rows * k + pick))
+    if len(pinned) > 1 and pinned[0].common:
+        total = total + _one_value_each(pinned, ends, amplitudes)
+    return _Profile(amplitudes, total + added(amplitudes), [end.z for end in ends])
+
+
+def _one_value_each(pinned: Sequence[Pinned], ends: Sequence[Optimum], amplitudes: Array) -> Array:
+    """(a,) log evidence that the blocks have each shape constant alike, over each having its own."""
+    known = [block.shapes(end, amplitudes) for block, end in zip(pinned, ends, strict=True)]
+    total = np.zeros(len(amplitudes))
+    for number in range(len(pinned[0].common)):
+        means, sds = (np.array([part[:, number] for part in parts]) for parts in zip(*known, strict=True))
+        total += alike(means, sds, partial(pinned[0].log_prior_of_shape, number))
+    return total
 
 
 def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:

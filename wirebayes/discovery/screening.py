@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, plain_reference, probes, scan
@@ -21,6 +22,7 @@ from wirebayes.model.problem import LENGTH_EXPONENT
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.protocol import Protocol
 
 _ROWS = 100  # replicates linearised at once, at most
 _NUMBERS = 4e6  # signatures of these, readings times probes: some copies of them have to fit into memory
@@ -43,19 +45,22 @@ class Candidate:
     blocks : tuple of int
     shared : bool
         One amplitude for all its blocks, rather than one each.
+    others : tuple of int
+        Probes that differ from it only in what each test has for itself; a block takes the one that explains it best.
     """
 
     probe: int
     name: str
     blocks: tuple[int, ...]
     shared: bool
+    others: tuple[int, ...] = ()
 
 
 def candidate_probes(
     blocks: Sequence[LaplaceFit], kinds: Mapping[str, type[Effect]]
 ) -> tuple[list[Probe], list[Candidate]]:
     """Every form of every effect that these blocks could show."""
-    several = sum(len(b.experiments) for b in blocks) > 1
+    tests = [e.protocol() for b in blocks for e in b.experiments]
     trials: list[Probe] = []
     candidates: list[Candidate] = []
     for kind in kinds.values():
@@ -64,49 +69,74 @@ def candidate_probes(
             accepted = {e.name for e in block.effects}
             if kind.name in accepted and not issubclass(kind, EventEffect):
                 continue
-            for effect in _variants(kind, block, several):
+            for effect in _variants(kind, block, tests):
                 where.setdefault(effect.key, (effect, []))[1].append(at)
         for effect, on in where.values():
-            for probe in probes(effect):
-                number = len(trials)
-                trials.append(probe)
-                if effect.scope in FILE_WIDE and len(on) > 1:
-                    candidates.append(Candidate(number, effect.name, tuple(on), True))
-                    continue
+            first = len(trials)
+            trials += probes(effect)
+            numbers = range(first, len(trials))
+            if effect.scope in FILE_WIDE and len(on) > 1:
+                groups = _but_for_each_test(effect, {k: trials[k] for k in numbers})
+                candidates += [Candidate(k, effect.name, tuple(on), True, tuple(others)) for k, *others in groups]
+                continue
+            for number in numbers:
                 candidates += [Candidate(number, effect.name, (b,), True) for b in on]
                 if len(on) > 1:
                     candidates.append(Candidate(number, effect.name, tuple(on), False))
     return trials, candidates
 
 
-def _variants(kind: type[Effect], block: LaplaceFit, several: bool) -> list[Effect]:
+def _but_for_each_test(effect: Effect, numbered: Mapping[int, Probe]) -> list[list[int]]:
+    """Numbers of probes that differ in nothing but the shape constants that every test has for itself."""
+    common = effect.common_shapes()
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for number, probe in numbered.items():
+        groups.setdefault((probe.step, *(probe.own[name] for name in common)), []).append(number)
+    return list(groups.values())
+
+
+def _variants(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) -> list[Effect]:
+    """The forms of an effect that a block could show; what all tests share has the form that it has for all of them."""
     if kind.needs_saturation and block.history == "additive":
         return []
     if not issubclass(kind, EventEffect):
         found_by_all = kind.variants([e.protocol() for e in block.experiments])
         learned = any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names)
+        if kind.scope in FILE_WIDE:
+            found_by_all = [v.on(tests) for v in found_by_all]
         return [v for v in found_by_all if not (learned and v.key == _LEARNED_EXPONENT)]
     taken = {e.key for e in block.effects}
     if kind.name in {e.name for e in block.effects}:
         return []
     found = [(e.name, v) for e in block.experiments for v in kind.variants([e.protocol()])]
-    out = [replace(v, test=name) if several else v for name, v in found]  # type: ignore[type-var]
+    out = [replace(v, test=name) if len(tests) > 1 else v for name, v in found]  # type: ignore[type-var]
     return [v for v in out if v.key not in taken]
 
 
 def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
     """(n,) log Bayes factor with the same prior on every amplitude, best amplitude, and amplitude per δ."""
-    i = candidate.probe
-    one_sided = bool(scans[candidate.blocks[0]].pieces.one_sided[i])
-    lr = np.array([scans[b].effects[:, i] for b in candidate.blocks])
-    a = np.array([scans[b].amplitude[:, i] for b in candidate.blocks])
-    norm = np.array([scans[b].norm[:, i] for b in candidate.blocks])
+    one_sided = bool(scans[candidate.blocks[0]].pieces.one_sided[candidate.probe])
+    chosen = [(scans[b], own) for b, own in zip(candidate.blocks, best_probes(candidate, scans), strict=True)]
+    lr = np.array([_each(found.effects, own) for found, own in chosen])
+    a = np.array([_each(found.amplitude, own) for found, own in chosen])
+    norm = np.array([_each(found.norm, own) for found, own in chosen])
     if one_sided:
         a = np.maximum(a, 0.0)
     if not candidate.shared or len(candidate.blocks) == 1:
         return lr.sum(axis=0) + occam(one_sided) * len(candidate.blocks), a[0], 1.0 / np.maximum(norm[0], 1e-300)
     value, mean = shared_amplitude(lr, a, norm)
     return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
+
+
+def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[NDArray[np.int64]]:
+    """(n,) numbers of the probes that explain most in each of the candidate's blocks."""
+    numbers = np.array([candidate.probe, *candidate.others])
+    return [numbers[np.argmax(scans[b].effects[:, numbers], axis=1)] for b in candidate.blocks]
+
+
+def _each(values: Array, columns: NDArray[np.int64]) -> Array:
+    """(n,) of every row the value in its own column."""
+    return np.asarray(np.take_along_axis(values, columns[:, None], axis=1)[:, 0])
 
 
 def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:

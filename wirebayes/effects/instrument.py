@@ -105,6 +105,7 @@ class _NeedsReversal(Effect):
 
 
 _SHORTEST = 2.0  # steps: a shorter period looks like a longer one (Nyquist)
+_OFF = 0.05  # steps: what a thread or a dial is off by
 
 
 @dataclass(frozen=True)
@@ -118,33 +119,42 @@ class ScrewError(Effect):
     ----------
     longest : float
         Where the log-uniform prior of P ends, in steps.
+    of_several : bool
+        Whether it is for several tests, which share a and P and have a phase each.
     """
 
     longest: float = 6.0
+    of_several: bool = False
     name = "screw_error"
     place = "position"
     formula = "screw"
     scope = "instrument"
     sentence = "The position has a periodic error, as of a screw's thread."
     shows = "level of holds alternates or beats with displacement"
+    nearly_linear = True
     # a few per cent of a step; with either sign half a turn of phase is enough
     amplitudes = (
-        Amplitude("a", "mm", 0.0, stats.norm(0.0, 0.05)),
+        Amplitude("a", "mm", 0.0, stats.norm(0.0, _OFF)),
         Amplitude("P", "mm", 4.0, stats.loguniform(_SHORTEST, 6.0), is_shape=True),
         Amplitude("phi", "-", 0.0, stats.uniform(-0.5 * np.pi, np.pi), is_shape=True, of_each_test=True),
     )
 
     def __post_init__(self) -> None:
         size, period, phase = type(self).amplitudes
-        within = stats.loguniform(_SHORTEST, self.longest)
-        object.__setattr__(self, "amplitudes", (size, replace(period, prior=within), phase))
+        period = replace(period, prior=stats.loguniform(_SHORTEST, self.longest))
+        if self.of_several:  # one sign for all of them, so each test needs the whole turn
+            size = replace(size, prior=stats.halfnorm(0.0, _OFF))
+            phase = replace(phase, prior=stats.uniform(-np.pi, 2.0 * np.pi))
+        object.__setattr__(self, "amplitudes", (size, period, phase))
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
         return value + own["a"] * np.cos(2.0 * np.pi / own["P"] * hold.displacement_mm + own["phi"])
 
     def on(self, protocols: Sequence[Protocol]) -> Effect:
         longest = max((_half_range(p) for p in protocols), default=0.0)
-        return type(self)(longest) if longest >= _LEAST * _SHORTEST else self
+        if self.of_several or longest < _LEAST * _SHORTEST:
+            return self
+        return type(self)(longest, len(protocols) > 1)
 
     def shapes_tried(self) -> list[dict[str, float]]:
         """Periods so near that no other fits much better between two, and a phase every sixth of a turn."""
@@ -152,13 +162,14 @@ class ScrewError(Effect):
         count = 1 + min(int(np.ceil(4.0 * self.longest * (shortest - longest))), _MOST_PERIODS)
         turns = np.linspace(longest, shortest, count)
         period, phase = self.columns()[1:]
-        return [{period: float(1.0 / t), phase: p} for t in turns for p in (-np.pi / 3.0, 0.0, np.pi / 3.0)]
+        sixths = np.arange(-2, 4) if self.of_several else np.arange(-1, 2)
+        return [{period: float(1.0 / t), phase: float(p)} for t in turns for p in sixths * (np.pi / 3.0)]
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
         """One where half the range is longer than two steps."""
         longest = max((_half_range(p) for p in protocols), default=0.0)
-        return [cls(longest)] if longest >= _LEAST * _SHORTEST else []
+        return [cls(longest, len(protocols) > 1)] if longest >= _LEAST * _SHORTEST else []
 
 
 _LEAST = 1.5  # of the longest period to the shortest: seven holds at even steps have it

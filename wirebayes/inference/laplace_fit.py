@@ -68,16 +68,27 @@ class LaplaceFit:
         own = problem.parameters(natural, problem.samples[self.names.index(name)])
         return {key: float(value[0]) for key, value in own.items()}
 
-    def along(self, effect: Effect, deviations: Sequence[float]) -> Array:
+    def along(self, effect: Effect, deviations: Sequence[float], amplitude: int = 0) -> Array:
         """An effect's amplitude so many standard deviations from its best, by the normal approximation as sampled.
 
-        In its natural unit.
+        Parameters
+        ----------
+        effect : Effect
+        deviations : sequence of float
+        amplitude : int
+            Its number; the shape constants come after the amplitude itself.
+
+        Returns
+        -------
+        array
+            In its natural unit.
         """
-        column = column_of(self.target.problem, effect)
+        name = effect.columns()[amplitude]
+        column = _column(self.target.problem, name)
         z = np.repeat(self.modes.z[:1], len(deviations), axis=0)
         z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
         amplitudes = self.target.coordinates.to_natural(z)[:, column]
-        return amplitudes * self.target.problem.units.of(self.unit(effect))
+        return amplitudes * self.target.problem.units.of(self._unit(effect, name))
 
     def problem_with(self, effect: Effect) -> Problem:
         """The same samples with one more effect, nothing integrated out."""
@@ -94,9 +105,12 @@ class LaplaceFit:
 
     def unit(self, effect: Effect) -> str:
         """The natural unit of an effect's amplitude, which depends on what is read."""
+        return self._unit(effect, effect.columns()[0])
+
+    def _unit(self, effect: Effect, column: str) -> str:
         problem = self.target.problem
         with_effect = [replace(s, model=replace(s.model, effects=(effect,))) for s in problem.samples]
-        return unit_of_column(effect.columns()[0], with_effect)
+        return unit_of_column(column, with_effect)
 
     def natural_amplitude(self, effect: Effect, amplitude: float) -> float:
         """An amplitude as the block counts it, in its natural unit."""
@@ -166,6 +180,9 @@ class Pinned:
         problem = block.problem_with(effect)
         self.column = column_of(problem, effect)
         self.prior = problem.prior.distributions[problem.names[self.column]]
+        self.common = [_column(problem, name) for name in effect.common_shapes()]
+        named_units = [unit_of_column(problem.names[column], problem.samples) for column in self.common]
+        self._units = np.array([problem.units.of(unit) for unit in named_units])
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
         self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
         self._plain = block
@@ -204,6 +221,34 @@ class Pinned:
 
         return climb(density, start, residuals, iterations=40, tolerance=1e-3, reach=_HOPELESS)
 
+    def shapes(self, ends: Optimum, amplitude: Array) -> tuple[Array, Array]:
+        """(n, s) logarithms of the shape constants that all tests have alike, and their standard deviations.
+
+        Parameters
+        ----------
+        ends : Optimum
+            Where n climbs ended.
+        amplitude : (n,) array
+            With which.
+        """
+        own = [column - (column > self.column) for column in self.common]
+        sd = np.sqrt(np.diagonal(ends.covariance, axis1=1, axis2=2)[:, own])
+        return np.log(self.natural(ends.z, amplitude)[:, self.common] * self._units), sd
+
+    def log_prior_of_shape(self, number: int, log_value: Array) -> Array:
+        """(n,) log density of the logarithm of one of these constants.
+
+        Parameters
+        ----------
+        number : int
+            Of the constant.
+        log_value : (n,) array
+            Of mm, N or s.
+        """
+        log_own = log_value - np.log(self._units[number])
+        prior = self.target.problem.prior.distributions[self.target.problem.names[self.common[number]]]
+        return np.asarray(prior.logpdf(np.exp(log_own)) + log_own)
+
     def natural(self, z: Array, amplitude: Array) -> Array:
         """(n, d) parameters of all columns."""
         return self.target.coordinates.to_natural(self._insert(z, amplitude))
@@ -217,5 +262,9 @@ class Pinned:
 
 def column_of(problem: Problem, effect: Effect) -> int:
     """The column of an effect's amplitude."""
-    main = effect.columns()[0]
-    return next(i for i, name in enumerate(problem.names) if name.split("[")[0] == main)
+    return _column(problem, effect.columns()[0])
+
+
+def _column(problem: Problem, name: str) -> int:
+    """The column of a parameter of an effect, whichever material has it."""
+    return next(i for i, own in enumerate(problem.names) if own.split("[")[0] == name)

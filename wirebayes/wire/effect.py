@@ -160,6 +160,7 @@ class Effect:
     no_creep_below: ClassVar[str] = ""  # the parameter that is a tension below which nothing creeps, where it has one
     in_series: ClassVar[bool] = False  # its amplitude is a compliance in series with the wire
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
+    nearly_linear: ClassVar[bool] = False  # of one sign, yet its signature has the same form at any size
     needs_saturation: ClassVar[bool] = False  # has no meaning where creep is added anew in every hold
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
@@ -199,6 +200,11 @@ class Effect:
     def columns(self) -> tuple[str, ...]:
         """Parameter names as they appear in a posterior: ``effect_name.parameter``."""
         return tuple(f"{self.name}.{a.name}" for a in self.amplitudes)
+
+    def common_shapes(self) -> tuple[str, ...]:
+        """Columns of the shape constants that all tests have alike."""
+        shapes = zip(self.columns(), self.amplitudes, strict=True)
+        return tuple(column for column, a in shapes if a.is_shape and not a.of_each_test)
 
     def in_units(self, tension: float, time: float) -> "Effect":
         """The effect where tensions and times are multiplied by these numbers; itself unless it has such constants."""
