@@ -8,7 +8,11 @@ import pytest
 
 from wirebayes.cli import answer
 from wirebayes.sentences import p_in_words
-from wirebayes.workflows.results import Calibration, Comparison, Findings, Place, Pose
+from wirebayes.views.calibration import Calibration
+from wirebayes.views.comparison import Comparison
+from wirebayes.views.findings import Findings
+from wirebayes.views.pose import Pose
+from wirebayes.views.result import ResultFolder
 
 HELD_OUT = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": 0.05}}
 SLIP = {
@@ -26,7 +30,7 @@ CLEAN = {"verdict": "nothing-missing", "effects": [], "set": [], "probabilities"
 def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
     """A result whose folder holds just this."""
     (folder / name).write_text(json.dumps(content))
-    return kind(Place(folder))
+    return kind(ResultFolder(folder))
 
 
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
@@ -38,7 +42,7 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
         "  held-out holds: rmse 0.25 -> 0.05 N",
         "b: nothing is missing (p = 0.4)",
     ]
-    assert answer.next_step(found) == "a: Unload. b: Hold longer."
+    assert found.next_step() == "a: Unload. b: Hold longer."
     few = {"warnings": [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]}
     two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"b": CLEAN | few}})
     assert two.lines() == ["b: nothing stands out (p = 0.4)"]
@@ -132,23 +136,23 @@ def test_a_pose_that_no_draw_keeps_to_the_end_is_said_to_be_none(tmp_path: Path)
 
 def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:
     found = {"robot": "r", "feasible": False, "sentence": "No.", "wires": {}}
-    assert answer.next_step(stored(Pose, tmp_path, "pose.json", found)).startswith("another pose or payload")
+    assert stored(Pose, tmp_path, "pose.json", found).next_step().startswith("another pose or payload")
     held = stored(Pose, tmp_path, "pose.json", found | {"feasible": True})
-    assert answer.next_step(held).startswith("wirebayes calibrate")
+    assert held.next_step().startswith("wirebayes calibrate")
 
 
 def test_lengths_that_did_not_converge_are_not_for_the_controller(tmp_path: Path) -> None:
     known = {"converged": False, "length_m": {"mean": [1.0], "q05": [0.9], "q95": [1.1]}}
     content = {"robot": "r", "with_creep_model": known, "usable": False, "warnings": []}
     bad = stored(Calibration, tmp_path, "calibration.json", content)
-    assert answer.next_step(bad).startswith("wirebayes calibrate FILE.toml with more poses")
+    assert bad.next_step().startswith("wirebayes calibrate FILE.toml with more poses")
     known = known | {"converged": True}
     content = {"robot": "r", "with_creep_model": known, "warnings": [], **NAMED}
     good = stored(Calibration, tmp_path, "calibration.json", content)
-    assert answer.next_step(good) == f"set the lengths of {tmp_path / 'calibration.json'} in the controller"
+    assert good.next_step() == f"set the lengths of {tmp_path / 'calibration.json'} in the controller"
     content = content | {"usable": False}
     wrong = stored(Calibration, tmp_path, "calibration.json", content)
-    assert answer.next_step(wrong).startswith("wirebayes calibrate FILE.toml with more poses")
+    assert wrong.next_step().startswith("wirebayes calibrate FILE.toml with more poses")
 
 
 @pytest.mark.parametrize(
@@ -166,7 +170,7 @@ def test_corrections_are_offered_only_where_there_are_some(
     band = {"q05": [0.0, end], "q50": [0.0, end], "q95": [0.0, end]}
     drift = {"distance_mm": band, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
     found = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}}
-    assert answer.next_step(stored(Pose, tmp_path, "pose.json", found)).startswith(begins)
+    assert stored(Pose, tmp_path, "pose.json", found).next_step().startswith(begins)
     (tmp_path / "corrections.csv").unlink()
-    alone = answer.next_step(stored(Pose, tmp_path, "pose.json", found))
+    alone = stored(Pose, tmp_path, "pose.json", found).next_step()
     assert alone.startswith("wirebayes calibrate" if end else "another pose or payload")

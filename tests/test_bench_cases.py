@@ -12,7 +12,7 @@ import pytest
 import wirebayes as wb
 from wirebayes.io import data_checks
 from wirebayes.io.experiment import Experiment, read_experiments
-from wirebayes.workflows.results import Posterior
+from wirebayes.views.posterior import Posterior
 
 CASES = Path(__file__).parent / "data" / "bench"
 FEW = wb.Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)

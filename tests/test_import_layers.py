@@ -24,13 +24,14 @@ LAYERS: list[set[str]] = [
     {"answers"},
     {"report"},
     {"paper"},
-    {"workflows"},
+    {"views"},
+    {"commands"},
     {"app"},
     {"cli"},
 ]
 NEUTRAL = {"errors", "notice", "json_files", "numeric", "sentences", "strict"}
 ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
-MAY_USE_ROBOT = {"report", "paper", "workflows", "app", "cli", "__init__"}
+MAY_USE_ROBOT = {"report", "paper", "commands", "app", "cli", "__init__"}
 
 
 def imports() -> set[tuple[str, str, str]]:

@@ -10,6 +10,27 @@ from typing import TYPE_CHECKING, Any
 from wirebayes._version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from wirebayes.commands.batch import batch as batch
+    from wirebayes.commands.calibrate import calibrate as calibrate
+    from wirebayes.commands.check import check as check
+    from wirebayes.commands.compare import compare as compare
+    from wirebayes.commands.discover import discover as discover
+    from wirebayes.commands.export import export as export
+    from wirebayes.commands.fit import fit as fit
+    from wirebayes.commands.import_bench import import_bench as import_bench
+    from wirebayes.commands.import_robot import import_robot as import_robot
+    from wirebayes.commands.list_effects import EffectDescription as EffectDescription
+    from wirebayes.commands.list_effects import list_effects as list_effects
+    from wirebayes.commands.live import live as live
+    from wirebayes.commands.load import load as load
+    from wirebayes.commands.new_experiment import new_experiment as new_experiment
+    from wirebayes.commands.plan import plan as plan
+    from wirebayes.commands.pose import pose as pose
+    from wirebayes.commands.predict import predict as predict
+    from wirebayes.commands.reproduce_paper import reproduce_paper as reproduce_paper
+    from wirebayes.commands.simulate_tests import simulate_tests as simulate_tests
+    from wirebayes.commands.wires import read_robot as read_robot
+    from wirebayes.commands.write_report import write_report as write_report
     from wirebayes.errors import InputError as InputError
     from wirebayes.inference.policy import Policy as Policy
     from wirebayes.io.arrays import from_arrays as from_arrays
@@ -19,83 +40,62 @@ if TYPE_CHECKING:
     from wirebayes.robot.history.live import LiveEstimator as LiveEstimator
     from wirebayes.robot.history.live import LivePose as LivePose
     from wirebayes.robot.mechanics.description import Robot as Robot
-    from wirebayes.workflows.batch import batch as batch
-    from wirebayes.workflows.calibrate import calibrate as calibrate
-    from wirebayes.workflows.check import check as check
-    from wirebayes.workflows.compare import compare as compare
-    from wirebayes.workflows.discover import discover as discover
-    from wirebayes.workflows.export import export as export
-    from wirebayes.workflows.fit import fit as fit
-    from wirebayes.workflows.import_bench import import_bench as import_bench
-    from wirebayes.workflows.import_robot import import_robot as import_robot
-    from wirebayes.workflows.list_effects import EffectDescription as EffectDescription
-    from wirebayes.workflows.list_effects import list_effects as list_effects
-    from wirebayes.workflows.live import live as live
-    from wirebayes.workflows.load import load as load
-    from wirebayes.workflows.new_experiment import new_experiment as new_experiment
-    from wirebayes.workflows.plan import plan as plan
-    from wirebayes.workflows.pose import pose as pose
-    from wirebayes.workflows.predict import predict as predict
-    from wirebayes.workflows.reproduce_paper import reproduce_paper as reproduce_paper
-    from wirebayes.workflows.results import Batch as Batch
-    from wirebayes.workflows.results import Calibration as Calibration
-    from wirebayes.workflows.results import Check as Check
-    from wirebayes.workflows.results import Comparison as Comparison
-    from wirebayes.workflows.results import Export as Export
-    from wirebayes.workflows.results import Findings as Findings
-    from wirebayes.workflows.results import ImportedTests as ImportedTests
-    from wirebayes.workflows.results import Plan as Plan
-    from wirebayes.workflows.results import Pose as Pose
-    from wirebayes.workflows.results import Posterior as Posterior
-    from wirebayes.workflows.results import Posteriors as Posteriors
-    from wirebayes.workflows.results import Reproduction as Reproduction
-    from wirebayes.workflows.results import SimulatedTests as SimulatedTests
-    from wirebayes.workflows.simulate_tests import simulate_tests as simulate_tests
-    from wirebayes.workflows.wires import read_robot as read_robot
-    from wirebayes.workflows.write_report import write_report as write_report
+    from wirebayes.views.batch import Batch as Batch
+    from wirebayes.views.calibration import Calibration as Calibration
+    from wirebayes.views.check import Check as Check
+    from wirebayes.views.comparison import Comparison as Comparison
+    from wirebayes.views.export import Export as Export
+    from wirebayes.views.findings import Findings as Findings
+    from wirebayes.views.imported_tests import ImportedTests as ImportedTests
+    from wirebayes.views.plan import Plan as Plan
+    from wirebayes.views.pose import Pose as Pose
+    from wirebayes.views.posterior import Posterior as Posterior
+    from wirebayes.views.posterior import Posteriors as Posteriors
+    from wirebayes.views.reproduction import Reproduction as Reproduction
+    from wirebayes.views.simulated_tests import SimulatedTests as SimulatedTests
 
 _PLACES = {
     "read_experiments": "wirebayes.io.experiment",
     "from_arrays": "wirebayes.io.arrays",
-    "import_bench": "wirebayes.workflows.import_bench",
-    "new_experiment": "wirebayes.workflows.new_experiment",
-    "check": "wirebayes.workflows.check",
-    "fit": "wirebayes.workflows.fit",
-    "compare": "wirebayes.workflows.compare",
-    "discover": "wirebayes.workflows.discover",
-    "batch": "wirebayes.workflows.batch",
-    "plan": "wirebayes.workflows.plan",
-    "predict": "wirebayes.workflows.predict",
-    "simulate_tests": "wirebayes.workflows.simulate_tests",
-    "load": "wirebayes.workflows.load",
-    "read_robot": "wirebayes.workflows.wires",
-    "import_robot": "wirebayes.workflows.import_robot",
-    "pose": "wirebayes.workflows.pose",
-    "live": "wirebayes.workflows.live",
-    "calibrate": "wirebayes.workflows.calibrate",
-    "export": "wirebayes.workflows.export",
-    "list_effects": "wirebayes.workflows.list_effects",
-    "write_report": "wirebayes.workflows.write_report",
-    "reproduce_paper": "wirebayes.workflows.reproduce_paper",
+    "import_bench": "wirebayes.commands.import_bench",
+    "new_experiment": "wirebayes.commands.new_experiment",
+    "check": "wirebayes.commands.check",
+    "fit": "wirebayes.commands.fit",
+    "compare": "wirebayes.commands.compare",
+    "discover": "wirebayes.commands.discover",
+    "batch": "wirebayes.commands.batch",
+    "plan": "wirebayes.commands.plan",
+    "predict": "wirebayes.commands.predict",
+    "simulate_tests": "wirebayes.commands.simulate_tests",
+    "load": "wirebayes.commands.load",
+    "read_robot": "wirebayes.commands.wires",
+    "import_robot": "wirebayes.commands.import_robot",
+    "pose": "wirebayes.commands.pose",
+    "live": "wirebayes.commands.live",
+    "calibrate": "wirebayes.commands.calibrate",
+    "export": "wirebayes.commands.export",
+    "list_effects": "wirebayes.commands.list_effects",
+    "write_report": "wirebayes.commands.write_report",
+    "reproduce_paper": "wirebayes.commands.reproduce_paper",
     "Experiment": "wirebayes.io.experiment",
-    "Posterior": "wirebayes.workflows.results",
-    "Posteriors": "wirebayes.workflows.results",
-    "Batch": "wirebayes.workflows.results",
+    "Posterior": "wirebayes.views.posterior",
+    "Posteriors": "wirebayes.views.posterior",
+    "Batch": "wirebayes.views.batch",
     "Prediction": "wirebayes.prediction.table",
-    "Findings": "wirebayes.workflows.results",
-    "Plan": "wirebayes.workflows.results",
-    "Comparison": "wirebayes.workflows.results",
-    "ImportedTests": "wirebayes.workflows.results",
-    "Check": "wirebayes.workflows.results",
-    "SimulatedTests": "wirebayes.workflows.results",
+    "Findings": "wirebayes.views.findings",
+    "Plan": "wirebayes.views.plan",
+    "Comparison": "wirebayes.views.comparison",
+    "ImportedTests": "wirebayes.views.imported_tests",
+    "Check": "wirebayes.views.check",
+    "SimulatedTests": "wirebayes.views.simulated_tests",
     "Robot": "wirebayes.robot.mechanics.description",
     "LiveEstimator": "wirebayes.robot.history.live",
     "LivePose": "wirebayes.robot.history.live",
-    "Pose": "wirebayes.workflows.results",
-    "Calibration": "wirebayes.workflows.results",
-    "Export": "wirebayes.workflows.results",
-    "Reproduction": "wirebayes.workflows.results",
-    "EffectDescription": "wirebayes.workflows.list_effects",
+    "Pose": "wirebayes.views.pose",
+    "Calibration": "wirebayes.views.calibration",
+    "Export": "wirebayes.views.export",
+    "Reproduction": "wirebayes.views.reproduction",
+    "EffectDescription": "wirebayes.commands.list_effects",
     "Policy": "wirebayes.inference.policy",
     "InputError": "wirebayes.errors",
 }

@@ -26,6 +26,7 @@ import numpy as np
 
 from analyses.hidden_effects.truth import draw_wire
 from analyses.resumable import records
+from wirebayes.commands.wires import wire_draws
 from wirebayes.discovery.search import final_models, investigate
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import CATALOGUE
@@ -46,7 +47,6 @@ from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
-from wirebayes.workflows.wires import wire_draws
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0)
 SIMULATIONS = 199  # behind p, here; the command makes 999

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from wirebayes.commands.import_bench import import_bench
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
@@ -21,7 +22,6 @@ from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import build
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Array
-from wirebayes.workflows.import_bench import import_bench
 
 RAW = Path(__file__).parents[2] / "tests" / "data" / "bench" / "tendon_fresh1.csv"
 LENGTH_MM = 14.33

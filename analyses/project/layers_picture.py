@@ -33,7 +33,8 @@ ABOUT = {
     "robot": "statics, drift, calibration",
     "report": "pages, pictures",
     "paper": "its reproduction",
-    "workflows": "one module a command",
+    "views": "what functions return",
+    "commands": "one module a command",
     "cli": "parses and prints",
 }
 

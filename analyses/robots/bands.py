@@ -25,6 +25,7 @@ from analyses.hidden_effects.rig import Rig
 from analyses.hidden_effects.truth import draw_rig
 from analyses.resumable import records
 from tests.robot import independent
+from wirebayes.commands.wires import read_wires
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import read_experiments
@@ -33,7 +34,6 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import for_robot
 from wirebayes.robot.motion import claim, drift, inverse
-from wirebayes.workflows.wires import read_wires
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=1000.0)
 PROTOCOLS = ("paper", "unloading", "uneven", "dense")

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from wirebayes.commands.wires import read_wires
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
-from wirebayes.workflows.wires import read_wires
 
 LINES = ("roc-line-1m", "roc-line-1.71m", "nylon-1.5m", "kite-1.5m")
 ROBOTS = ("linear-7", "cogiro-desk", "segesta-8", "hangprinter-4")

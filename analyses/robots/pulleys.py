@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from wirebayes.commands.wires import read_wires
 from wirebayes.robot.mechanics import draws, rotation, schema, statics
 from wirebayes.robot.mechanics.description import Pulleys
 from wirebayes.robot.motion import claim, forward, inverse
-from wirebayes.workflows.wires import read_wires
 
 ROBOTS = ("linear-7", "cogiro-desk", "segesta-8", "hangprinter-4")
 RADII_M = (0.01, 0.025, 0.05)

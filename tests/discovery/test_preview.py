@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from wirebayes.commands.check import check
 from wirebayes.discovery.preview import preview
 from wirebayes.effects import CATALOGUE
 from wirebayes.simulation.synthetic import Bench, Truth, draw
-from wirebayes.workflows.check import check
 
 WIRE = {"k1": 700.0, "B": 0.5, "U": 0.8, "k2": 0.03, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tests.conftest import CSV, TOML
+from wirebayes.commands.import_robot import import_robot
 from wirebayes.io import plan_file
 from wirebayes.io.bench.convert import About, convert
 from wirebayes.io.bench.undecided import Choices
@@ -16,7 +17,6 @@ from wirebayes.io.readings import protocol_holds, protocol_table
 from wirebayes.model.problem import build
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.self_calibration import session_file
-from wirebayes.workflows.import_robot import import_robot
 
 ROOT = Path(__file__).parents[2]
 PRIOR = """

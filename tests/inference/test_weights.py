@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.simulated import simulated_tests
+from wirebayes.commands.discover import check_one_control
 from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference import rough_draws
@@ -14,7 +15,6 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build
 from wirebayes.model.scales import NATURAL
 from wirebayes.simulation.synthetic import Bench, Truth
-from wirebayes.workflows.discover import check_one_control
 
 TIMES = (0.0, 15.0, 30.0, 60.0, 120.0, 300.0)
 WIRE = {"k1": 900.0, "B": 0.2, "U": 0.8, "k2": 0.03, "N": 0.8}

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from wirebayes import cli
+from wirebayes.commands.wires import read_robot, wire_draws
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.problem import build
 from wirebayes.results.store import load, save
 from wirebayes.robot.mechanics.draws import warnings
-from wirebayes.workflows.wires import read_robot, wire_draws
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
 TRAINED = 8

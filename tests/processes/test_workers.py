@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from wirebayes.commands.check import check
 from wirebayes.effects import catalogue
 from wirebayes.io import paper
 from wirebayes.processes.workers import computing, workers
-from wirebayes.workflows.check import check
 
 OWN = Path(__file__).parents[2] / "docs" / "own_effect.py"
 
@@ -114,7 +114,7 @@ def test_a_script_that_loaded_numpy_first_computes_with_one_thread(monkeypatch: 
         seen.extend(library["num_threads"] for library in threadpool_info())
         raise InterruptedError
 
-    monkeypatch.setattr("wirebayes.workflows.check.preview", look)
+    monkeypatch.setattr("wirebayes.commands.check.preview", look)
     with threadpool_limits(2), pytest.raises(InterruptedError):
         check(paper.experiments()[2])
     assert set(seen) == {1}

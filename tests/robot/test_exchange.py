@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from tests.robot import cases
 from wirebayes.cli import main
+from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import rotation, schema
 from wirebayes.robot.motion import inverse
-from wirebayes.workflows.import_robot import import_robot
 
 BODIES = """<?xml version="1.0" encoding="utf-8"?>
 <!DOCTYPE bodies_system SYSTEM "../../../../templates/bodies.dtd">

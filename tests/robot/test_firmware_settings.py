@@ -5,9 +5,9 @@ import pytest
 
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
+from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import schema
-from wirebayes.workflows.import_robot import import_robot
 
 RRF = """; a printer
 M669 K6 A0:-1620:-150 B1800:900:-150 C-1620:900:-150 D0:0:2350 ; anchors, mm

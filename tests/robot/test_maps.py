@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.robot.test_calibration import _line
+from wirebayes.commands.pose import _slices
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import claim, drift, inverse
 from wirebayes.robot.pose import maps
-from wirebayes.workflows.pose import _slices
 
 
 def test_a_turned_platform_drifts_in_the_map_as_it_does_alone():

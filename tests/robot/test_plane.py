@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from wirebayes.commands.pose import _refuse_off_plane
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import plane, rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
@@ -13,7 +14,6 @@ from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.pose import on_plane
 from wirebayes.robot.pose.answer import _why_not
 from wirebayes.robot.pose.orientation import Orientation
-from wirebayes.workflows.pose import _refuse_off_plane
 
 G = 9.80665
 

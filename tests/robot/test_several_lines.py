@@ -10,6 +10,7 @@ import pytest
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from tests.robot.test_drift import _line
 from wirebayes.cli import main
+from wirebayes.commands.wires import draws_of, named_lines
 from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
@@ -22,7 +23,6 @@ from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import drift
 from wirebayes.robot.self_calibration.session import Prior
-from wirebayes.workflows.wires import draws_of, named_lines
 
 THIN, THICK = ("default", "thick")
 

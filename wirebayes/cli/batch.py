@@ -53,9 +53,10 @@ def batch(
     from wirebayes.processes.workers import load_early
 
     load_early()
-    from wirebayes.cli.answer import Given, conclude
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.batch import batch as run
+    from wirebayes.commands.batch import batch as run
+    from wirebayes.views.result import Given
 
     with progress() as report:
         many = run(

@@ -26,9 +26,10 @@ def check(
 
     Exit code 0 means that the file can be used, 2 that it cannot. With --output: DIR/check.json and DIR/NAME.svg.
     """
-    from wirebayes.cli.answer import Given, print_answer
+    from wirebayes.cli.answer import print_answer
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.check import check as run
+    from wirebayes.commands.check import check as run
+    from wirebayes.views.result import Given
 
     with progress() as report:
         checked = run(

@@ -47,9 +47,10 @@ def compare(
     from wirebayes.processes.workers import load_early
 
     load_early()
-    from wirebayes.cli.answer import Given, conclude
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.compare import carry_out, plan
+    from wirebayes.commands.compare import carry_out, plan
+    from wirebayes.views.result import Given
 
     planned = plan(
         file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,

@@ -37,9 +37,10 @@ def discover(
     from wirebayes.processes.workers import load_early
 
     load_early()
-    from wirebayes.cli.answer import Given, conclude
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.discover import discover as run
+    from wirebayes.commands.discover import discover as run
+    from wirebayes.views.result import Given
 
     with progress() as report:
         findings = run(

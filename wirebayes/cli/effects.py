@@ -11,8 +11,8 @@ Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Describe thi
 
 def effects(name: Name = None, own_effects: OwnEffects = None) -> None:
     """List the effects that a model may be missing; with NAME, describe one in full."""
+    from wirebayes.commands.list_effects import list_effects
     from wirebayes.effects import catalogue, named
-    from wirebayes.workflows.list_effects import list_effects
 
     known = list_effects(own_effects)
     if name is None:

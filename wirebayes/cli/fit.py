@@ -54,9 +54,10 @@ def fit(
 
     if check:
         load_early()
-    from wirebayes.cli.answer import Given, conclude
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.fit import fit as run
+    from wirebayes.commands.fit import fit as run
+    from wirebayes.views.result import Given
 
     with progress() as report:
         fitted = run(

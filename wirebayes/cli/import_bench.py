@@ -72,7 +72,7 @@ def import_bench(
     recordings are divided into holds. Ambiguous input leads to a question on a terminal and to an error elsewhere.
     """
     from wirebayes.cli.answer import print_answer
-    from wirebayes.workflows.import_bench import import_bench as run
+    from wirebayes.commands.import_bench import import_bench as run
 
     imported = run(
         raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,

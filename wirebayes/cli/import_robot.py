@@ -31,9 +31,9 @@ def import_robot(
     quiet: Quiet = False,
 ) -> None:
     """Turn a robot of CASPR or WireX, or the settings of a Hangprinter, into a robot file."""
-    from wirebayes.workflows.import_robot import holds_home
-    from wirebayes.workflows.import_robot import import_robot as run
-    from wirebayes.workflows.wires import read_robot
+    from wirebayes.commands.import_robot import holds_home
+    from wirebayes.commands.import_robot import import_robot as run
+    from wirebayes.commands.wires import read_robot
 
     file = run(files, output, tension=tension, position=position, cable_set=cable_set, pulleys=pulleys)
     robot = read_robot(file)

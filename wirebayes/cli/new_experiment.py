@@ -13,7 +13,7 @@ def new_experiment(
     quiet: Quiet = False,
 ) -> None:
     """Write a commented experiment file and a small CSV to replace: DIR/my-wire.toml and DIR/my-wire.csv."""
-    from wirebayes.workflows.new_experiment import new_experiment as run
+    from wirebayes.commands.new_experiment import new_experiment as run
 
     file = run(directory)
     if not quiet:

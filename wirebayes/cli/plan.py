@@ -45,9 +45,10 @@ def plan(
     quiet: Quiet = False,
 ) -> None:
     """Predict what tests would teach before they are done, and rank them: DIR/plan.json."""
-    from wirebayes.cli.answer import Given, conclude
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.plan import plan as run
+    from wirebayes.commands.plan import plan as run
+    from wirebayes.views.result import Given
 
     with progress() as report:
         planned = run(

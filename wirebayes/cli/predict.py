@@ -47,9 +47,9 @@ def predict(
     training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
     fit's. A first reading in tension_N conditions its hold and those after it.
     """
+    from wirebayes.commands.predict import as_json as json_of
+    from wirebayes.commands.predict import predict as run
     from wirebayes.json_files.plain import plain
-    from wirebayes.workflows.predict import as_json as json_of
-    from wirebayes.workflows.predict import predict as run
 
     table = protocol.with_name(f"{protocol.stem}-predicted.csv") if output is None else output
     predicted = run(

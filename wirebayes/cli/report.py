@@ -10,6 +10,6 @@ def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by another command.")],
 ) -> None:
     """Write one self-contained page from a folder of results: DIR/report.html."""
-    from wirebayes.workflows.write_report import write_report
+    from wirebayes.commands.write_report import write_report
 
     print(write_report(directory))

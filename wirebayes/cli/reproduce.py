@@ -12,7 +12,7 @@ def reproduce(output: Output = None, seed: Seed = 0) -> None:
 
     load_early()
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.reproduce_paper import reproduce_paper
+    from wirebayes.commands.reproduce_paper import reproduce_paper
 
     folder = Path("reproduce") if output is None else output
     with progress() as report:

@@ -88,10 +88,11 @@ def pose(
     finds the drift. Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects
     are worth.
     """
-    from wirebayes.cli.answer import Given, conclude
+    from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.workflows.pose import pose as run
-    from wirebayes.workflows.wires import named_lines
+    from wirebayes.commands.pose import pose as run
+    from wirebayes.commands.wires import named_lines
+    from wirebayes.views.result import Given
 
     with progress() as report:
         found = run(
@@ -157,9 +158,10 @@ def calibrate(
     --anchor-sd and the like the robot's geometry is estimated too, and robot.toml holds what was found:
     wirebayes calibrate robot.toml log.csv --wires DIR --anchor-sd 50 --output out/anchors
     """
-    from wirebayes.cli.answer import Given, conclude
-    from wirebayes.workflows.calibrate import calibrate as run
-    from wirebayes.workflows.wires import named_lines
+    from wirebayes.cli.answer import conclude
+    from wirebayes.commands.calibrate import calibrate as run
+    from wirebayes.commands.wires import named_lines
+    from wirebayes.views.result import Given
 
     found = run(
         robot, readings, named_lines(wires), tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
@@ -184,8 +186,8 @@ def export(
     seed: Seed = 0,
 ) -> None:
     """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
-    from wirebayes.workflows.export import export as run
-    from wirebayes.workflows.wires import named_lines
+    from wirebayes.commands.export import export as run
+    from wirebayes.commands.wires import named_lines
 
     exported = run(
         robot, named_lines(wires), tensions=tensions, times=times, draws=draws, experiment=experiment,

@@ -62,8 +62,8 @@ def simulate(
     history: HistoryOption = "saturating",
 ) -> None:
     """Write synthetic tests: DIR/experiments.toml, a CSV for each test, and DIR/truth.json."""
+    from wirebayes.commands.simulate_tests import simulate_tests
     from wirebayes.simulation.synthetic import number
-    from wirebayes.workflows.simulate_tests import simulate_tests
 
     chosen = {}
     for text in parameter or ():

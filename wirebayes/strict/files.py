@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 import re
 import stat
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from wirebayes.errors import InputError
 
+PathLike = str | os.PathLike[str]
 _NEWLINE = re.compile(r"\r\n|\n|\r")
 
 

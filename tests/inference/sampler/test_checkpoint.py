@@ -215,7 +215,7 @@ def test_the_command_ends_in_one_line_and_goes_on_once_the_file_is_gone(
 
 def test_nothing_in_the_package_reads_pickles() -> None:
     # a batch packs work for its own processes and unpacks it there, as the pool itself does; nothing of it is stored
-    sent = PACKAGE / "workflows" / "one_experiment.py"
+    sent = PACKAGE / "commands" / "one_experiment.py"
     texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py") if path != sent}
     assert re.findall(r"pickle\.load\w*\(\w*\)", sent.read_text(encoding="utf-8")) == ["pickle.loads(work)"]
     forbidden = re.compile(r"(import|from) (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|allow_pickle\s*=\s*True")

@@ -1,0 +1,289 @@
+"""Many experiments, each by itself: fitted, searched for missing effects, in one table that marks outliers."""
+
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError, Executor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
+
+from wirebayes._version import __version__
+from wirebayes.commands.one_experiment import QUANTITIES, Done, Task, do, first_columns, packed
+from wirebayes.commands.options import Progress, check_choice, check_seed, check_train_holds, path_of, silent, words
+from wirebayes.discovery.search import catalogue_without
+from wirebayes.discovery.settings import SIMULATIONS
+from wirebayes.effects import catalogue, source_of
+from wirebayes.errors import InputError
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
+from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
+from wirebayes.model.problem import MATERIAL, SAMPLE, build
+from wirebayes.notice import Notice, from_json, named, to_json
+from wirebayes.processes.workers import as_finished, computing, executor
+from wirebayes.results.outliers import outliers
+from wirebayes.strict.files import PathLike
+from wirebayes.views.batch import Batch
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.laws import ElasticLaw, History
+
+TABLE, PARQUET = "summary.csv", "summary.parquet"
+_ROW = "row.json"  # an experiment's row, written behind all its other files: with it, the experiment is done
+_SCRATCH = ".computing"
+_LISTED = 5  # unreadable files named in an error: as many as a person mends at once
+_TRIES = 3  # times that a dead process may take the others of its pool with it; more is no accident
+_FIRST = ("name", "material", "file", "length_mm", "holds", "readings", "converged")
+_LAST = ("verdict", "effects", "best_effect", "p_global", "check", "outlier", "warnings", "error")
+
+Sources = PathLike | Experiment | Iterable[PathLike | Experiment]
+
+
+def batch(
+    sources: Sources,
+    *,
+    discover: bool = True,
+    check: bool = True,
+    posteriors: bool = True,
+    keep_going: bool = False,
+    train_holds: int | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    without: str | Sequence[str] = (),
+    own_effects: PathLike | None = None,
+    scheduler: str | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+    policy: Policy | None = None,
+    simulations: int | None = None,
+) -> Batch:
+    """Fit and discover many experiments, each on its own, and tabulate them.
+
+    Parameters
+    ----------
+    sources : path, Experiment, or sequence of them
+        Experiment files, all of whose experiments count. Where several have one name, the name of the file is put
+        before it.
+    discover : bool
+        Find what the plain model is missing in each; otherwise fit the plain model only.
+    check : bool
+        Where nothing is discovered: check each fit against refitted simulations. (A discovery includes the check.)
+    posteriors : bool
+        Store the draws of each experiment, some 3 MB a fit; otherwise only the summaries.
+    keep_going : bool
+        Give an unreadable file a row that says what is wrong with it; otherwise it is an error, before any work.
+    train_holds : int, optional
+        Use the first so many recorded holds only.
+    elastic_law, history
+        As in `fit`.
+    without : sequence of str
+        Effects to leave out of the catalogue.
+    own_effects : path, optional
+        A Python file with effects of your own; workers of a cluster must find it under the same path.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work; the processes of this machine when left out.
+    seed : int
+        Every experiment has a seed of its own, made of this and its name: results do not depend on who computes what.
+    output : path, optional
+        Folder for the results, resumed or refused as by `fit`.
+    progress : function of (name, done, total), optional
+    policy : Policy, optional
+        How many walkers and draws the fits have.
+    simulations : int, optional
+        Refitted data sets behind each p-value, half of them where these decide; 999 when left out.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong; nothing was computed.
+
+    Examples
+    --------
+    >>> tests = wb.simulate_tests(tests=2, displacements=range(1, 6), times=[0, 30, 60], seed=1)
+    >>> many = wb.batch(tests.experiments, discover=False, check=False, policy=few, output="out/batch")
+    >>> many
+    Batch(2 experiments, 2 converged, 0 outliers, 0 failed)
+    >>> [row["name"] for row in many.rows]
+    ['wire-1', 'wire-2']
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
+    own, left_out = path_of(own_effects), words(without)
+    catalogue_without(left_out, catalogue(own))
+    read, unreadable = _read(sources, train_holds, keep_going)
+    task = Task(
+        discover, check, elastic_law, history, seed, policy or DEFAULT, left_out, own, simulations or SIMULATIONS,
+        posteriors,
+    )  # fmt: skip
+    configuration = {
+        "command": "batch", "version": __version__, "seed": seed, "discover": discover, "check": check,
+        "posteriors": posteriors, "elastic_law": elastic_law, "history": history, "without": sorted(left_out),
+        "own_effects": source_of(own), "train_holds": train_holds,
+        "priors": {e.name: e.priors for e, _ in read}, "data_sha256": {e.name: e.data_hash for e, _ in read},
+        "unreadable": unreadable,
+    }  # fmt: skip
+    configuration |= {} if policy is None else {"policy": vars(policy)}
+    configuration |= {} if simulations is None else {"simulations": simulations}
+    place = ResultFolder.at(output)
+    if check_run(place.path, configuration) == "done":
+        return Batch(place, own, computed=False)
+    with computing():
+        _compute(read, task, place.path, configuration, scheduler, progress or silent)
+    with open_run(place.path, configuration) as run:
+        rows: list[Row] = [read_json(place.path / e.name / _ROW) for e, _ in read]
+        rows += [_empty(file, error) for file, error in unreadable.items()]
+        _tabulate(rows, outliers(rows), place.path)
+        run.finish()
+    return Batch(place, own)
+
+
+def _read(
+    sources: Sources, train_holds: int | None, keep_going: bool
+) -> tuple[list[tuple[Experiment, str]], dict[str, str]]:
+    """Every experiment with the file it came from, and what is wrong with the files that cannot be read."""
+    given = [sources] if isinstance(sources, str | os.PathLike | Experiment) else list(sources)
+    read: list[tuple[Experiment, str]] = []
+    wrong: dict[str, str] = {}
+    for source in given:
+        if not isinstance(source, str | os.PathLike | Experiment):
+            raise InputError(f"sources: found {type(source).__name__}, expected paths of files or Experiments")
+        file = source.source.name if isinstance(source, Experiment) else str(source)
+        try:
+            found = [source] if isinstance(source, Experiment) else read_experiments(Path(source))
+            found = found if train_holds is None else [e.first(train_holds) for e in found]
+            for e in found:
+                build([e])  # checks priors
+        except InputError as error:
+            wrong[file] = str(error)
+            continue
+        read += [(e, file) for e in found]
+    if wrong and not (keep_going and read):
+        more = f"; and {len(wrong) - _LISTED} more files" if len(wrong) > _LISTED else ""
+        raise InputError("; ".join(list(wrong.values())[:_LISTED]) + more)
+    if not read:
+        raise InputError("sources: found no experiments, expected one or more")
+    return _distinct(read), wrong
+
+
+def _distinct(read: list[tuple[Experiment, str]]) -> list[tuple[Experiment, str]]:
+    """The experiments, those of one name with the name of their file before it."""
+    times: dict[str, int] = {}
+    for e, _ in read:
+        times[e.name] = times.get(e.name, 0) + 1
+    out, by_name = list[tuple[Experiment, str]](), dict[str, str]()
+    for e, file in read:
+        name = e.name if times[e.name] == 1 else f"{Path(file).stem}.{e.name}"
+        if name in by_name or name in (TABLE, PARQUET):
+            taken = f"a second time (first in {by_name[name]})" if name in by_name else "which is a file of the results"
+            raise InputError(f"{file}: found the experiment {name} {taken}, expected another name")
+        by_name[name] = file
+        out.append((e if name == e.name else replace(e, name=name), file))
+    return out
+
+
+def _compute(
+    read: Sequence[tuple[Experiment, str]], task: Task, folder: Path, configuration: Mapping[str, Any],
+    scheduler: str | None, progress: Progress,
+) -> None:  # fmt: skip
+    """Do whatever has no row yet; a process that dies takes no result with it."""
+    for left in reversed(range(_TRIES)):
+        todo = [(e, file) for e, file in read if not (folder / e.name / _ROW).is_file()]
+        if not todo:
+            return
+        try:
+            # the folder is opened when there is somebody to do the work
+            with (
+                executor(scheduler, len(todo)) as pool,
+                open_run(folder, configuration),
+                _scratch(folder, scheduler) as scratch,
+            ):
+                progress("experiments", len(read) - len(todo), len(read))
+                results = _results(pool, todo, replace(task, scratch=scratch))
+                for done, (name, result) in enumerate(results, len(read) - len(todo) + 1):
+                    _store(result, folder / name)
+                    progress("experiments", done, len(read))
+            return
+        except BrokenProcessPool:
+            if not left:
+                lost = "processes died again and again, perhaps for want of memory"
+                raise InputError(f"{folder}: {lost}; run the same command again to go on") from None
+        except CancelledError:
+            lost = f"the scheduler {scheduler} is gone"
+            raise InputError(f"{folder}: {lost}; start another and run the same command again to go on") from None
+
+
+@contextmanager
+def _scratch(folder: Path, scheduler: str | None) -> Iterator[Path | None]:
+    """Where processes of this machine compute, so that what they leave when they are killed is found and removed."""
+    path = folder.absolute() / _SCRATCH
+    shutil.rmtree(path, ignore_errors=True)
+    if scheduler is not None:
+        yield None
+        return
+    path.mkdir()
+    try:
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _results(pool: Executor, todo: Sequence[tuple[Experiment, str]], task: Task) -> Iterator[tuple[str, Done]]:
+    """Name and result of each experiment as they end."""
+    work = (((e, file), packed(e, file, task)) for e, file in todo)
+    for (experiment, file), future in as_finished(pool, do, work):
+        error = future.exception()
+        if error is not None and type(error).__name__ != "KilledWorker":
+            raise error
+        if error is not None:  # Dask's, for work whose workers died again and again
+            yield experiment.name, Done(first_columns(experiment, file) | {"error": f"KilledWorker: {error}"}, {})
+        else:
+            yield experiment.name, future.result()
+
+
+def _store(done: Done, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for name, content in done.files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(path, content)
+    write_json(folder / _ROW, done.row)
+
+
+def _empty(file: str, error: str) -> Row:
+    """The row of a file that could not be read."""
+    return {
+        "name": Path(file).stem, "material": None, "file": file, "length_mm": None, "holds": None, "readings": None,
+        "converged": None, "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None,
+        "check": None, "warnings": [], "error": error,
+    }  # fmt: skip
+
+
+def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> None:
+    """``batch.json``, ``summary.csv`` and, where pyarrow is installed, ``summary.parquet``."""
+    names = [n for n in (*MATERIAL, *SAMPLE) if any(n in row["parameters"] for row in rows)]
+    header = [*_FIRST, *(f"{n}_{q}" for n in names for q in QUANTITIES), *_LAST]
+    outlying: dict[str, list[str]] = {}
+    for outlier in far:
+        outlying.setdefault(outlier["experiment"], []).append(outlier["parameter"])
+    table = []
+    for row in rows:
+        own: dict[str, Any] = dict(row["parameters"])
+        texts = [notice["text"] for notice in row["warnings"]]
+        listed = {"effects": row["effects"], "outlier": outlying.get(row["name"], []), "warnings": texts}
+        cells = {**row, **{key: "; ".join(value) or None for key, value in listed.items()}}
+        values = [own.get(n, {}).get(q) for n in names for q in QUANTITIES]
+        table.append([*(cells[c] for c in _FIRST), *values, *(cells[c] for c in _LAST)])
+    write_csv(folder / TABLE, header, table)
+    write_parquet(folder / PARQUET, header, table)
+    failed = [Notice("failed", f"{row['name']}: {row['error']}") for row in rows if row["error"]]
+    warnings = to_json([*failed, *from_json(named({row["name"]: row for row in rows}))])
+    content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far), "warnings": warnings}
+    write_json(folder / Batch._content, content)

@@ -1,0 +1,131 @@
+"""What was understood of an experiment file, what is suspicious in it, and what such a test can determine."""
+
+import numpy as np
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import Progress, Source, check_seed, experiments_of, path_of, silent
+from wirebayes.discovery.preview import preview
+from wirebayes.effects import catalogue, source_of
+from wirebayes.inference.fit import seed_of
+from wirebayes.io import data_checks
+from wirebayes.io.experiment import Experiment, Hold
+from wirebayes.io.run_folder import open_run, write_json
+from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
+from wirebayes.json_files.read_units import in_unit
+from wirebayes.notice import named, to_json
+from wirebayes.processes.workers import computing
+from wirebayes.strict.files import PathLike
+from wirebayes.views.check import CHECKED, Check
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.control import READ_UNIT
+
+
+def check(
+    source: Source,
+    *,
+    experiment: str | None = None,
+    own_effects: PathLike | None = None,
+    drop_breaks: bool = False,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+) -> Check:
+    """Say what was understood of an experiment, what is suspicious, and what such a test can and cannot determine.
+
+    The plain model is fitted roughly, in a few seconds an experiment; `fit` and `discover` give the numbers to rely on.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+        What was measured; a path names an experiment file.
+    experiment : str, optional
+        This experiment only.
+    own_effects : path, optional
+        A Python file with effects of your own.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
+    seed : int
+    output : path, optional
+        Folder for ``check.json`` and a picture of each experiment, ``NAME.svg``; a temporary one when left out.
+    progress : function of (name, done, total), optional
+        Called as the work goes on.
+
+    Returns
+    -------
+    Check
+
+    Raises
+    ------
+    InputError
+        The file is bad: says where, what was found and what was expected.
+
+    Examples
+    --------
+    >>> checked = wb.check("experiments.toml", experiment="kite-1.5m")
+    >>> checked
+    Check(kite-1.5m: 8 holds, 40 readings)
+    >>> found = checked.summary()["experiments"]["kite-1.5m"]
+    >>> found["holds"][0]["displacement_mm"], found["unrecorded_holds"], found["duration_s"]
+    (1.0, 1, 1080.0)
+    >>> found["parameters"]["k1"]["determined_by"]
+    'data'
+    >>> found["effects"]["guide_friction"]["shows"]  # needs unloading
+    'no'
+    """
+    seed, own, report = check_seed(seed), path_of(own_effects), progress or silent
+    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
+    kinds = catalogue(own)
+    configuration = {
+        "command": "check", "version": __version__, "seed": seed, "own_effects": source_of(own),
+        "priors": {e.name: e.priors for e in experiments}, "data_sha256": {e.name: e.data_hash for e in experiments},
+    }  # fmt: skip
+    place = ResultFolder.at(output)
+    with open_run(place.path, configuration) as run:
+        if run.state != "done":
+            from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
+
+            found: dict[str, CheckedExperiment] = {}
+            for done, e in enumerate(experiments):
+                report("check", done, len(experiments))
+                with computing():
+                    previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
+                warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings])
+                found[e.name] = {
+                    **_understood(e), "warnings": warnings, "parameters": previewed.parameters,
+                    "effects": previewed.effects, "hold_ends": previewed.hold_ends,
+                }  # fmt: skip
+                understood(e, place.path / f"{e.name}.svg")
+            report("check", len(experiments), len(experiments))
+            content: CheckJson = {"experiments": found, "warnings": named(found)}
+            write_json(place.path / CHECKED, content)
+            run.finish()
+    return Check(place, own, computed=run.state != "done")
+
+
+def _understood(e: Experiment) -> Understood:
+    """What the files say, as plain values."""
+    holds = [_hold(hold) for hold in e.holds]
+    recorded = e.recorded_holds
+    temperatures = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
+    found: Understood = {
+        "material": e.material, "length_mm": e.length_mm, "control": e.control, "resolution_N": e.resolution or None,
+        "holds": holds, "recorded_holds": len(recorded), "unrecorded_holds": len(e.holds) - len(recorded),
+        "readings": sum(hold.time_s.size for hold in recorded),
+        "duration_s": sum(hold.duration_s for hold in e.holds),
+        "temperature_C": [float(min(map(np.min, temperatures))), float(max(map(np.max, temperatures)))]
+        if temperatures else None,
+    }  # fmt: skip
+    return in_unit(found, READ_UNIT[e.control])
+
+
+def _hold(hold: Hold) -> HoldUnderstood:
+    out: HoldUnderstood = {
+        "number": hold.number, "start_s": hold.start_s,
+        "duration_s": hold.duration_s, "readings": int(hold.time_s.size),
+        "first_s": float(hold.time_s[0]) if hold.recorded else None,
+        "first_N": float(hold.readings[0]) if hold.recorded else None,
+        "last_N": float(hold.readings[-1]) if hold.recorded else None,
+    }  # fmt: skip
+    if hold.control == "force":
+        return {**out, "tension_N": hold.setting}
+    return {**out, "displacement_mm": hold.setting}

@@ -1,0 +1,230 @@
+"""Laws, histories, likelihoods and effects side by side."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import (
+    Progress,
+    Source,
+    check_choice,
+    check_seed,
+    check_train_holds,
+    experiments_of,
+    path_of,
+    silent,
+    words,
+)
+from wirebayes.comparison.candidates import BASE, Candidate, candidates, problem_of
+from wirebayes.comparison.compare import POLICY, Task, run, side_by_side
+from wirebayes.effects import catalogue, source_of
+from wirebayes.errors import InputError
+from wirebayes.inference.policy import Policy
+from wirebayes.io.data_checks import of_experiment
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
+from wirebayes.json_files.comparison import ComparisonJson, ModelJson
+from wirebayes.model.problem import Likelihood
+from wirebayes.notice import Notice, named
+from wirebayes.processes.workers import computing
+from wirebayes.sentences import counted
+from wirebayes.strict.files import PathLike
+from wirebayes.views.comparison import Comparison
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.laws import ElasticLaw, History
+
+
+def compare(
+    source: Source,
+    *,
+    experiment: str | None = None,
+    train_holds: int | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    likelihood: Likelihood = "chain",
+    only: str | Sequence[str] = (),
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+    policy: Policy | None = None,
+) -> Comparison:
+    """Compare models on readings that their fits have not seen.
+
+    Every model is judged twice: each hold left out in turn, and the last third of the holds predicted from the rest.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+        What was measured; a path names an experiment file.
+    experiment : str, optional
+        This experiment only.
+    train_holds : int, optional
+        Fit the first so many recorded holds only, and predict all after them.
+    elastic_law, history, likelihood
+        Of the plain model, as in `fit`.
+    only : sequence of str
+        Compare only these models with the plain one.
+    own_effects : path, optional
+        A Python file with effects of your own, which join the comparison.
+    seed : int
+    output : path, optional
+        Folder for the results, resumed or refused as by `fit`.
+    progress : function of (name, done, total), optional
+    policy : Policy, optional
+        How many walkers and draws; what the command uses when left out.
+
+    Returns
+    -------
+    Comparison
+        Its `summary` is the content of ``comparison.json``.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong, or a test has fewer than three recorded holds.
+
+    Examples
+    --------
+    >>> comparison = wb.compare(made.experiments, only="exponential", policy=few, output="out/compare")
+    >>> sorted(row["name"] for row in comparison.summary()["experiments"]["wire"]["models"])
+    ['exponential', 'plain']
+    """
+    planned = plan(
+        source, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
+        likelihood=likelihood, only=only, own_effects=own_effects, seed=seed, policy=policy,
+    )  # fmt: skip
+    return carry_out(planned, output, progress)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A comparison whose every part was checked, and of which nothing is computed yet.
+
+    Attributes
+    ----------
+    tasks : list of Task
+    experiments : list of Experiment
+    configuration : dict
+        Everything that decides the results.
+    seed : int
+    policy : Policy
+    own_effects : Path or None
+    """
+
+    tasks: list[Task]
+    experiments: list[Experiment]
+    configuration: dict[str, Any]
+    seed: int
+    policy: Policy
+    own_effects: Path | None
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What is suspicious about the readings, worth knowing before the work begins."""
+        return tuple(notice.of(one.name) for one in self.experiments for notice in of_experiment(one))
+
+
+def plan(
+    source: Source,
+    *,
+    experiment: str | None,
+    train_holds: int | None,
+    elastic_law: ElasticLaw,
+    history: History,
+    likelihood: Likelihood,
+    only: str | Sequence[str],
+    own_effects: PathLike | None,
+    seed: int,
+    policy: Policy | None = None,
+) -> Plan:
+    """Check what `compare` is given.
+
+    Parameters
+    ----------
+    source, experiment, train_holds, elastic_law, history, likelihood, only, own_effects, seed
+        As for `wirebayes.compare`.
+    policy : Policy, optional
+        Another one than that of every comparison, for tests and studies.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        If an option, an experiment, its priors or the name of a model is not usable.
+    """
+    for option, value, choices in (
+        ("elastic_law", elastic_law, get_args(ElasticLaw)),
+        ("history", history, get_args(History)),
+        ("likelihood", likelihood, get_args(Likelihood)),
+    ):
+        check_choice(option, value, choices)
+    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
+    own, names = path_of(own_effects), words(only)
+    experiments = experiments_of(source, experiment)
+    base = Candidate(BASE, "", "The plain model.", elastic_law, history, likelihood)
+    known = catalogue(own)
+    tasks = []
+    for one in experiments:
+        recorded = len(one.recorded_holds)
+        one.first(recorded if train_holds is None else train_holds)  # complains where there are not so many
+        if recorded < 3:
+            holds = counted(recorded, "recorded hold")
+            found = f"found {holds}, expected 3 or more: some are held out, and the others tell the models apart"
+            raise InputError(f"{one.source}, experiment {one.name}: {found}")
+        problem_of(base, one, [])  # checks the file's priors
+        chosen = candidates(one, base, known, names or None)
+        missing = set(names) - {c.name for c in chosen}
+        if missing:
+            possible = ", ".join(c.name for c in candidates(one, base, known))
+            raise InputError(f"--only {min(missing)}: no such model for {one.name}, expected one of {possible}")
+        tasks += [Task(one, candidate, train_holds, own) for candidate in chosen]
+    configuration = {
+        "command": "compare", "version": __version__, "seed": seed, "train_holds": train_holds,
+        "elastic_law": elastic_law, "history": history, "likelihood": likelihood,
+        "own_effects": source_of(own),
+        "models": {one.name: [t.candidate.name for t in tasks if t.experiment is one] for one in experiments},
+        "priors": {one.name: one.priors for one in experiments},
+        "data_sha256": {one.name: one.data_hash for one in experiments},
+    } | ({} if policy is None else {"policy": vars(policy)})  # fmt: skip
+    return Plan(tasks, experiments, configuration, seed, policy or POLICY, own)
+
+
+def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) -> Comparison:
+    """Fit and judge all models of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+    output : path, optional
+        Folder of the results; a temporary one when left out. Models judged there already are not judged again.
+    progress : callable or None
+        Called with a name, what is done and the total.
+
+    Returns
+    -------
+    Comparison
+    """
+    place = ResultFolder.at(output)
+    with open_run(place.path, plan.configuration) as opened:
+        if opened.state == "done":
+            return Comparison(place, plan.own_effects, computed=False)
+        with computing():
+            run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
+        from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
+
+        content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}, "warnings": []}
+        for one in plan.experiments:
+            with stored_results(place.path / one.name):
+                models: list[ModelJson] = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
+                content["experiments"][one.name] = side_by_side(models, BASE, of_experiment(one))
+            pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
+        content["warnings"] = named(content["experiments"])
+        write_json(place.path / "comparison.json", content)
+        opened.finish()
+    return Comparison(place, plan.own_effects)

@@ -1,0 +1,274 @@
+"""What the plain model is missing, added to it where it has a name."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import get_args
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import (
+    Progress,
+    Source,
+    check_choice,
+    check_seed,
+    check_train_holds,
+    experiments_of,
+    path_of,
+    silent,
+    words,
+)
+from wirebayes.discovery import search
+from wirebayes.discovery.search import (
+    JointModel,
+    alternative_models,
+    catalogue_without,
+    final_models,
+    investigate,
+)
+from wirebayes.discovery.settings import SIMULATIONS, Settings
+from wirebayes.effects import catalogue, source_of
+from wirebayes.errors import InputError
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import open_run, read_json, write_json
+from wirebayes.json_files.discovery import Interval
+from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.notice import from_json, named, to_json
+from wirebayes.processes.workers import computing, workers
+from wirebayes.results.jobs import Job, run
+from wirebayes.results.mixture import write_mixture
+from wirebayes.results.store import load
+from wirebayes.strict.files import PathLike
+from wirebayes.views.findings import Findings
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.laws import ElasticLaw, History
+
+_OTHERS = "undecided"  # folder of the models that a final one shares the probability with
+
+
+def discover(
+    source: Source,
+    *,
+    experiment: str | None = None,
+    train_holds: int | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    without: str | Sequence[str] = (),
+    own_effects: PathLike | None = None,
+    drop_breaks: bool = False,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+    policy: Policy | None = None,
+    simulations: int | None = None,
+) -> Findings:
+    """Find which physical effect the model is missing.
+
+    The experiments are judged together.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+        What was measured; a path names an experiment file.
+    experiment : str, optional
+        This experiment only.
+    train_holds : int, optional
+        Use the first so many recorded holds only.
+    elastic_law, history
+        Of the plain model, as in `fit`.
+    without : sequence of str
+        Effects to leave out of the catalogue.
+    own_effects : path, optional
+        A Python file with effects of your own, which join the catalogue.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
+    seed : int
+    output : path, optional
+        Folder for the results, resumed or refused as by `fit`.
+    progress : function of (name, done, total), optional
+    policy : Policy, optional
+        How many walkers and draws the fits have; what the command uses when left out.
+    simulations : int, optional
+        Refitted data sets behind the p-value, half of them where these decide; 999 when left out.
+
+    Returns
+    -------
+    Findings
+        ``report`` is the content of ``discovery.json``; ``plain[name]`` and ``final[name]`` are posteriors.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong.
+
+    Examples
+    --------
+    >>> findings = wb.discover(made.experiments, policy=few, simulations=99, output="out/discover")
+    >>> findings.report["experiments"]["wire"]["verdict"]
+    'nothing-missing'
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
+    own, left_out = path_of(own_effects), words(without)
+    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
+    if train_holds is not None:
+        experiments = [e.first(train_holds) for e in experiments]
+    check_one_control(experiments)
+    kinds = catalogue_without(left_out, catalogue(own))
+    configuration = {
+        "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
+        "without": sorted(left_out), "own_effects": source_of(own),
+        "train_holds": train_holds, "priors": {e.name: e.priors for e in experiments},
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }  # fmt: skip
+    configuration |= {} if policy is None else {"policy": vars(policy)}
+    configuration |= {} if simulations is None else {"simulations": simulations}
+    place = ResultFolder.at(output)
+    with open_run(place.path, configuration) as opened:
+        if opened.state == "done":
+            return Findings(place, own, computed=False)
+        settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
+        with computing():
+            with workers(prepare=partial(catalogue, own)) as parallel_map:
+                found = investigate(experiments, settings, seed, progress or silent, parallel_map)
+            jobs = jobs_of(found, elastic_law, history, own)
+            run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+        write_findings(found, place.path, own)
+        opened.finish()
+    return Findings(place, own)
+
+
+def write_findings(found: search.Findings, output: Path, own_effects: Path | None) -> None:
+    """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes.
+
+    Parameters
+    ----------
+    found : Findings
+        Of the search; its report gains the amplitudes.
+    output : Path
+        Folder of the results, which holds the fits already.
+    own_effects : Path or None
+        File of a user's own effects.
+    """
+    _mixtures(found, output)
+    _pictures(found, output, own_effects)
+    _posterior_amplitudes(found, output)
+    _parameters(found, output)
+    _warnings(found, output)
+    write_json(output / "discovery.json", found.report)
+
+
+def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
+    """Plain fit of every experiment, and the final ones.
+
+    Parameters
+    ----------
+    found : Findings
+        Of the search.
+    law : {"hooke", "modified"}
+    history : {"saturating", "additive"}
+    own_effects : Path or None
+        File of a user's own effects, which the workers load again.
+
+    Returns
+    -------
+    list of Job
+        Where the findings are ambiguous, one for each effect that could be the missing one.
+    """
+    models = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
+    models += [("final", model) for model in final_models(found)]
+    models += [(f"final/{_OTHERS}/{k}", m) for k, m in _others(found)]
+    out = []
+    for kind, model in models:
+        folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
+        keys = tuple(f.key for f in model.effects)
+        provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
+        out.append(Job(folders[0], model.experiments, keys, own_effects, law, history, "chain", 1.0, provenance,
+                       model.near, folders))  # fmt: skip
+    return out
+
+
+def _others(found: search.Findings) -> list[tuple[int, JointModel]]:
+    """The undecided models beside the final ones, each with its number among those of its experiments."""
+    out, count = [], dict[str, int]()
+    for models in alternative_models(found):
+        k = 1 + count.get(models[0].experiments[0].name, 0)
+        count |= {e.name: k for model in models for e in model.experiments}
+        out += [(k, model) for model in models]
+    return out
+
+
+def _mixtures(found: search.Findings, output: Path) -> None:
+    """Say beside each final posterior which other models it shares the probability with."""
+    for block, others in zip(found.final, found.undecided, strict=True):
+        for e in block.experiments if others else ():
+            keys = [[f.key for f in other.block.effects] + ["discrepancy"] * other.remains for other in others]
+            folders = [".", *(f"{_OTHERS}/{k}" for k in range(1, len(others)))]
+            weights = [other.probability for other in others]
+            write_mixture(output / e.name / "final", list(zip(folders, weights, keys, strict=True)))
+
+
+def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
+    """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
+    for e in (e for block in found.final for e in block.experiments):
+        summary: SummaryJson = read_json(output / e.name / "final" / "summary.json")
+        parameters = summary["parameters"]
+        for name, amplitude in found.report["experiments"][e.name]["amplitudes"].items():
+            column = next(c for c in parameters if c.startswith(f"{name}."))
+            of_posterior = parameters[column]
+            amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
+
+
+def _parameters(found: search.Findings, output: Path) -> None:
+    """Every parameter before and after, as the two posteriors have it."""
+    for name, report in found.report["experiments"].items():
+        plain, final = (read_json(output / name / model / "summary.json")["parameters"] for model in ("plain", "final"))
+        units = {column: entry["unit"] for column, entry in (plain | final).items()}
+        report["parameters"] = {
+            column: {"unit": unit, "plain": _interval(plain.get(column)), "final": _interval(final.get(column))}
+            for column, unit in units.items()
+        }
+
+
+def _interval(entry: Parameter | None) -> Interval | None:
+    """A parameter of a model, None where the model has no such parameter."""
+    return None if entry is None else {"mean": entry["mean"], "q05": entry["q05"], "q95": entry["q95"]}
+
+
+def _warnings(found: search.Findings, output: Path) -> None:
+    """What the fits say against themselves joins what the search says; of the same readings it is said once."""
+    reports = found.report["experiments"]
+    for name, report in reports.items():
+        fits: list[SummaryJson] = [read_json(output / name / model / "summary.json") for model in ("plain", "final")]
+        plain, final = (from_json(summary["warnings"]) for summary in fits)
+        alone = [notice.of("the final model") for notice in final if notice not in plain]
+        report["warnings"] = to_json([*from_json(report["warnings"]), *plain, *alone])
+    found.report["warnings"] = named(reports)
+
+
+def _pictures(found: search.Findings, output: Path, own_effects: Path | None) -> None:
+    """Before and after, hold by hold, and one of each finding."""
+    from wirebayes.report.pictures.discover import (  # matplotlib only where it is needed
+        before_and_after,
+        pictures_of_findings,
+    )
+
+    for e in (e for block in found.final for e in block.experiments):
+        verdict = found.report["experiments"][e.name]
+        plain, final = (load(output / e.name / model, own_effects=own_effects) for model in ("plain", "final"))
+        before_and_after(plain, final, verdict, output / f"{e.name}.svg")
+        pictures_of_findings(plain, verdict, output / e.name)
+
+
+def check_one_control(experiments: Sequence[Experiment]) -> None:
+    """Refuse steps and weights in one search: effects of their instruments are not the same.
+
+    Raises
+    ------
+    InputError
+    """
+    names = {control: [e.name for e in experiments if e.control == control] for control in ("displacement", "force")}
+    if all(names.values()):
+        found = f"steps ({', '.join(names['displacement'])}) and weights ({', '.join(names['force'])})"
+        raise InputError(f"{experiments[0].source}: found {found}, expected one of the two, chosen with --experiment")

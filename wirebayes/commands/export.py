@@ -1,0 +1,112 @@
+"""A robot with its wires for other programs."""
+
+from collections.abc import Mapping
+
+from wirebayes.commands.options import Numbers, check_seed, numbers, path_of, rising_times, text_of
+from wirebayes.commands.wires import RobotLike, Wires, configuration, draws_for, posterior_of, robot_of
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
+from wirebayes.json_files.export import ExportSummary
+from wirebayes.notice import Notice, to_json
+from wirebayes.robot.export import files
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws, doubts
+from wirebayes.strict.files import PathLike
+from wirebayes.views.export import Export
+from wirebayes.views.result import ResultFolder
+
+TABLE = "creep-table.csv"
+TENSIONS_N = (1.0, 2.0, 4.0, 8.0)  # an option; doubling, because creep goes as a power of the tension
+# an option; a minute to a day, because creep goes as a power of the time at first
+TIMES_S = (60.0, 600.0, 3600.0, 86400.0)
+
+
+def export(
+    robot: RobotLike,
+    wires: Wires,
+    *,
+    tensions: Numbers = TENSIONS_N,
+    times: Numbers = TIMES_S,
+    draws: int = 1000,
+    experiment: str | None = None,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> Export:
+    """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model.
+
+    Parameters
+    ----------
+    robot : Robot, name of a shipped robot, or path
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
+    tensions : sequence of float
+        Tensions of the creep table, N.
+    times : sequence of float
+        Rising times of the creep table, s.
+    draws : int
+        Posterior draws used, evenly thinned.
+    experiment : str, optional
+        Which one, where several were fitted.
+    own_effects : path, optional
+        A Python file with effects of your own, where the fit used one and is read from a folder.
+    seed : int
+    output : path, optional
+        Folder for the results.
+
+    Returns
+    -------
+    Export
+        ``files`` holds the content of each file by name.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong, or the line cannot carry the robot.
+
+    Examples
+    --------
+    >>> exported = wb.export("hangprinter-4", posterior, draws=100)
+    >>> sorted(exported.files)
+    ['creep-table.csv', 'klipper.cfg', 'reprapfirmware.g', 'robot.sdf', 'robot.urdf', 'robot.xml']
+    """
+    own, seed = path_of(own_effects), check_seed(seed)
+    machine = robot_of(robot)
+    loads, moments = numbers("--tensions", tensions), rising_times(times)
+    if loads.min() <= 0:
+        raise InputError(f"--tensions: found {text_of(tensions)!r}; expected numbers above 0")
+    line = draws_for(machine, wires, draws, experiment, own)
+    contents: dict[str, str] = {}
+    if files.is_hangprinter(machine):
+        contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
+        contents["klipper.cfg"] = files.klipper(machine, line)
+    contents |= files.simulators(machine, line)
+    header, table = files.creep_tables(machine, line, loads, moments)
+    rows = [dict(zip(header, row, strict=True)) for row in table]
+    summary: ExportSummary = {
+        "files": sorted([*contents, TABLE]),
+        "creep_table": rows,
+        "warnings": to_json(_warnings(machine, line, contents)),
+    }
+    place = ResultFolder.at(output)
+    options = {"--experiment": experiment, "--tensions": text_of(tensions), "--times": text_of(times)}
+    posterior = posterior_of(wires, experiment)
+    with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, options)) as run:
+        if run.state != "done":
+            write_csv(run.directory / TABLE, header, table)
+            for name, text in contents.items():
+                write_text(run.directory / name, text)
+            write_json(run.directory / Export._content, summary)
+            run.finish()
+    return Export(place, own, computed=run.state != "done")
+
+
+def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> list[Notice]:
+    """What speaks against the fits, and what could not be exported."""
+    out = doubts(robot, line)
+    if "klipper.cfg" not in contents:
+        text = "no firmware settings: they exist for four or five drums with a position-only platform"
+        out.append(Notice("left-out", text))
+    if "robot.xml" not in contents:
+        text = "no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose"
+        out.append(Notice("unheld", text))
+    return out

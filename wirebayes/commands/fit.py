@@ -1,0 +1,218 @@
+"""The posterior of each experiment, or of all samples of a material together."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import get_args
+
+from scipy import stats
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import (
+    Progress,
+    Source,
+    check_choice,
+    check_seed,
+    check_train_holds,
+    experiments_of,
+    path_of,
+    silent,
+    words,
+)
+from wirebayes.discovery.model_check import checked_meanwhile, write_checks
+from wirebayes.effects import catalogue, named, source_of
+from wirebayes.errors import InputError
+from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import open_run
+from wirebayes.model.problem import Likelihood, build
+from wirebayes.processes.workers import computing
+from wirebayes.results.jobs import Job, run
+from wirebayes.strict.files import PathLike
+from wirebayes.views.posterior import Posterior, Posteriors
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.laws import ElasticLaw, History
+
+
+def fit(
+    source: Source,
+    *,
+    experiment: str | None = None,
+    train_holds: int | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    likelihood: Likelihood = "chain",
+    effects: str | Sequence[str] = (),
+    own_effects: PathLike | None = None,
+    drop_breaks: bool = False,
+    together: str | None = None,
+    check: bool = True,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+    policy: Policy | None = None,
+) -> Posterior | Posteriors:
+    """Posterior of a wire's parameters.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+        What was measured; a path names an experiment file.
+    experiment : str, optional
+        This experiment only.
+    train_holds : int, optional
+        Fit the first so many recorded holds only.
+    elastic_law : {"hooke", "modified"}
+        Strain relative to the zero-tension length, eq (1), or to the stretched length, eq (3).
+    history : {"saturating", "additive"}
+        Creep saturates towards one total amount, or adds a new amount in every hold.
+    likelihood : {"chain", "hold"}
+        Treat the holds as one history, or each hold separately.
+    effects : sequence of str
+        Effects to add, by name; ``grip_slip@7`` names its hold. See `list_effects`.
+    own_effects : path, optional
+        A Python file with effects of your own.
+    together : str, optional
+        Fit all samples of this material at once.
+    check : bool
+        Check each fit against up to 999 refitted simulations, half of them where these decide.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
+    seed : int
+        Same seed, same machine: same draws.
+    output : path, optional
+        Folder for the results. It resumes an interrupted fit of the same configuration and refuses another. Without it,
+        the results lie in a temporary folder, which lasts as long as the posterior.
+    progress : function of (name, done, total), optional
+        Called as the work goes on.
+    policy : Policy, optional
+        How many walkers and draws; what the command uses when left out.
+
+    Returns
+    -------
+    Posterior, or Posteriors where there are several experiments
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong: says where, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import wirebayes as wb
+    >>> few = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+    >>> posterior = wb.fit(
+    ...     "experiments.toml", experiment="kite-1.5m", train_holds=5, check=False, policy=few, output="out/fit"
+    ... )
+    >>> posterior
+    Posterior(kite-1.5m, chain hooke saturating, converged)
+    >>> posterior.draws()["k1"].ndim
+    1
+    """
+    for option, value, known in (
+        ("elastic_law", elastic_law, get_args(ElasticLaw)),
+        ("history", history, get_args(History)),
+        ("likelihood", likelihood, get_args(Likelihood)),
+    ):
+        check_choice(option, value, known)
+    seed, train_holds = check_seed(seed), check_train_holds(train_holds)
+    own, keys = path_of(own_effects), words(effects)
+    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
+    file = experiments[0].source
+    if train_holds is not None:
+        experiments = [e.first(train_holds) for e in experiments]
+    known_effects = catalogue(own)
+    added = [named(key, known_effects) for key in keys]
+    if len({e.name for e in added}) < len(added):
+        raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
+    groups = _groups(experiments, together, file)
+    exponent = stats.norm(1.0, 1.0) if together is not None else 1.0
+    jobs = []
+    for folder, members in groups.items():
+        for effect in added:
+            _check_possible(effect, members, file, known_effects, history)
+        # checks priors
+        build(members, added, law=elastic_law, history=history, likelihood=likelihood, length_exponent=exponent)
+        hashes = {e.name: e.data_hash for e in members}
+        provenance = {"data_file": file.name, "version": __version__, "data_sha256": hashes}
+        jobs.append(Job(folder, members, keys, own, elastic_law, history, likelihood, exponent, provenance))
+    configuration = {
+        "command": "fit", "version": __version__, "seed": seed, "likelihood": likelihood, "elastic_law": elastic_law,
+        "history": history, "effects": list(keys), "own_effects": source_of(own),
+        "train_holds": train_holds, "together": together, "check": check,
+        "priors": {e.name: e.priors for members in groups.values() for e in members},
+        "data_sha256": {e.name: e.data_hash for members in groups.values() for e in members},
+    } | ({} if policy is None else {"policy": vars(policy)})  # fmt: skip
+    place = ResultFolder.at(output)
+    with open_run(place.path, configuration) as opened:
+        if opened.state != "done":
+            with computing():
+                alone = check and len(jobs) == 1
+                with checked_meanwhile(jobs[0], place.path, seed) if alone else nullcontext():
+                    run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+                if check and not alone:
+                    write_checks(jobs, place.path, seed, progress or silent)
+            opened.finish()
+    return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
+
+
+def fits_in(
+    place: ResultFolder, folders: Sequence[str], own_effects: Path | None = None, *, computed: bool = False
+) -> Posterior | Posteriors:
+    """What `fit` returns of a folder that holds these fits.
+
+    Parameters
+    ----------
+    place : ResultFolder
+        The folder.
+    folders : sequence of str
+        Names of the fits within it.
+    own_effects : Path, optional
+        File of a user's own effects.
+    computed : bool
+        True where they were computed now, not found done.
+
+    Returns
+    -------
+    Posterior or Posteriors
+        The first where there is one fit.
+    """
+    alone = len(folders) == 1
+    members = {name: Posterior(place, own_effects, computed, name, name, alone) for name in folders}
+    return next(iter(members.values())) if alone else Posteriors(place, own_effects, computed, members)
+
+
+def _groups(experiments: Sequence[Experiment], together: str | None, file: Path) -> dict[str, tuple[Experiment, ...]]:
+    """The experiments of each fit, by its folder."""
+    if together is None:
+        return {e.name: (e,) for e in experiments}
+    members = tuple(e for e in experiments if e.material == together)
+    if not members:
+        materials = ", ".join(sorted({e.material for e in experiments}))
+        raise InputError(f"--together {together}: no such material in {file}; it has {materials}")
+    return {members[0].material_folder: members}
+
+
+def _check_possible(
+    effect: Effect, members: Sequence[Experiment], file: Path, known: Mapping[str, type[Effect]], history: History
+) -> None:
+    """An effect that these holds cannot show at all is an error of the user's, not a prior-shaped posterior."""
+    if effect.needs_saturation and history == "additive":
+        raise InputError(
+            f"--effect {effect.key}: found --history additive, expected saturating: "
+            "creep that is added anew in every hold has no total"
+        )
+    protocols = [e.protocol() for e in members]
+    if effect.name not in known:
+        return  # the flexible discrepancy shows anywhere
+    variants = [v.key for v in type(effect).variants(protocols)]
+    if effect.key in variants:
+        return
+    if isinstance(effect, EventEffect):
+        raise InputError(
+            f"--effect {effect.key}: no recorded hold {effect.hold} in experiment {members[0].name} of {file}"
+        )
+    raise InputError(
+        f"--effect {effect.key}: the holds of {', '.join(e.name for e in members)} cannot show it ({effect.shows})"
+    )

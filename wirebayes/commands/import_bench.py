@@ -1,0 +1,201 @@
+"""Raw files of benches turned into experiment files."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import above_zero, check_choice, without_breaks, words
+from wirebayes.errors import InputError
+from wirebayes.io import data_checks, gross_events
+from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
+from wirebayes.io.bench.undecided import Choices, Decimal, TimeSince, Undecided
+from wirebayes.io.readings import READ
+from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
+from wirebayes.json_files.imported import ImportJson
+from wirebayes.notice import named, to_json
+from wirebayes.strict.files import PathLike, read_bytes
+from wirebayes.views.imported_tests import IMPORTED, ImportedTests
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.protocol import Control
+
+TOGETHER = "experiments"  # the file of all, where there are several
+
+
+def import_bench(
+    raw: PathLike | Sequence[PathLike],
+    *,
+    length_mm: float,
+    material: str | None = None,
+    name: str | None = None,
+    mapping: str | Sequence[str] = (),
+    decimal: Decimal | None = None,
+    time_since: TimeSince | None = None,
+    sheet: str | None = None,
+    zero_mm: float | None = None,
+    area_mm2: float | None = None,
+    control: Control | None = None,
+    drop_breaks: bool = False,
+    output: PathLike | None = None,
+    ask: Callable[[Undecided], str] | None = None,
+) -> ImportedTests:
+    """Turn what benches write into experiments.
+
+    Delimiter, decimal sign, encoding, preamble, units and the meaning of the columns are recognised; readings are cut
+    into holds. What can be read in two ways is refused.
+
+    Parameters
+    ----------
+    raw : path, or sequence of paths
+        Text with columns (CSV and its kin) or xlsx workbooks: one experiment each.
+    length_mm : float
+        Zero-tension length of the samples before the test.
+    material : str, optional
+        Samples of one material may be fitted together; the name of each experiment when left out.
+    name : str, optional
+        Of the experiment, where there is one file; else each has the name of its file.
+    mapping : sequence of str
+        ``HEADER=COLUMN`` with COLUMN one of hold, displacement, time, tension, temperature, or ignore. The unit is
+        read from the header, from the row under it, or from here: ``HEADER=tension [N]``. A minus turns the sign:
+        ``HEADER=tension [-N]``.
+    decimal : {"point", "comma"}, optional
+        The decimal sign, where the file leaves it open.
+    time_since : {"hold", "test"}, optional
+        What times count from, where the file leaves it open.
+    sheet : str, optional
+        Of a workbook with readings in several sheets.
+    zero_mm : float, optional
+        Reading of the displacement where the wire has its zero-tension length.
+    area_mm2 : float, optional
+        Cross-section of the samples, which turns stresses into tensions.
+    control : {"displacement", "force"}, optional
+        What was set in each hold, where the readings leave it open.
+    drop_breaks : bool
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
+    output : path, optional
+        Folder for ``NAME.toml``, ``NAME.csv`` and the picture ``NAME.svg``; a temporary one when left out.
+    ask : function of an undecided question that returns one of its answers, optional
+        Asks a person instead of refusing.
+
+    Returns
+    -------
+    ImportedTests
+
+    Raises
+    ------
+    InputError
+        With the file, line and column, what was found and what was expected.
+
+    Examples
+    --------
+    >>> rows = ["Weg [mm];Zeit [s];Kraft [N]", "1,5;0;2,12", "1,5;30;1,91", "1,5;60;1,86", "3,0;0;4,02", "3,0;45;3,88"]
+    >>> with open("bench.csv", "w") as file:
+    ...     _ = file.write("\\n".join(rows))
+    >>> imported = wb.import_bench("bench.csv", length_mm=1000, material="Dyneema 1 mm")
+    >>> imported
+    ImportedTests(bench: 2 holds, 5 readings)
+    >>> imported.experiments[0].tension().shape
+    (2, 3)
+    """
+    if decimal is not None:
+        check_choice("decimal", decimal, get_args(Decimal))
+    if time_since is not None:
+        check_choice("time_since", time_since, get_args(TimeSince))
+    if control is not None:
+        check_choice("control", control, get_args(Control))
+    above_zero(("--length-mm", length_mm), *([] if area_mm2 is None else [("--area-mm2", area_mm2)]))
+    paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
+    names = _names(paths, name)
+    choices = Choices(words(mapping), decimal, time_since, sheet, None if zero_mm is None else float(zero_mm), control)
+    tests: list[Converted] = []
+    for path, called in zip(paths, names, strict=True):
+        about = About(called, material or called, float(length_mm), None if area_mm2 is None else float(area_mm2))
+        test, choices = _decided(path, about, choices, ask)
+        tests.append(_without_breaks(test) if drop_breaks else test)
+    configuration = {
+        "command": "import", "version": __version__,
+        "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
+        "names": names, "length_mm": float(length_mm), "material": material, "area_mm2": area_mm2,
+        "drop_breaks": drop_breaks,
+        **vars(choices),
+    }  # fmt: skip
+    place = ResultFolder.at(output)
+    with open_run(place.path, configuration) as run:
+        if run.state != "done":
+            _write(place.path, paths, tests)
+            run.finish()
+    return ImportedTests(place, computed=run.state != "done")
+
+
+def _names(paths: Sequence[Path], name: str | None) -> list[str]:
+    if not paths:
+        raise InputError("raw: found nothing, expected at least one file")
+    if name is not None:
+        if len(paths) > 1:
+            raise InputError(f"--name: found {name!r} for {len(paths)} files, expected it with one file only")
+        return [name]
+    names = [default_name(path) for path in paths]
+    for i, called in enumerate(names):
+        if called.casefold() in [other.casefold() for other in names[:i]]:
+            raise InputError(f"{paths[i]}: found the name {called} a second time, expected files of different names")
+        if len(names) > 1 and called == TOGETHER:
+            raise InputError(f"{paths[i]}: found the name {called}, expected another: that file holds all experiments")
+    return names
+
+
+def _decided(
+    path: Path, about: About, choices: Choices, ask: Callable[[Undecided], str] | None
+) -> tuple[Converted, Choices]:
+    """A file read, and the choices made for it, which hold for the files after it too."""
+    while True:
+        try:
+            return convert(path, about, choices), choices
+        except Undecided as question:
+            if ask is None:
+                raise
+            choices = choices.with_option(ask(question))
+
+
+def _without_breaks(test: Converted) -> Converted:
+    """A test without the readings of its gross events: their rows say that the hold went on, and no more."""
+    events = gross_events.of_experiment(test.experiment)
+    kept = without_breaks(test.experiment)
+    dropped = {int(i) for event in events for i in event.readings}
+    read = test.header.index(READ[test.experiment.control])
+    rows, count = [], 0
+    for row in test.rows:
+        gone = row[read] is not None and count in dropped
+        count += row[read] is not None
+        rows.append([None if gone and column == read else value for column, value in enumerate(row)])
+    while count - 1 in dropped and rows[-1][read] is None:
+        rows.pop()
+    return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *(f"left out: {e.text}" for e in events)])
+
+
+def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> None:
+    from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
+
+    tables: list[str] = []
+    content: ImportJson = {"experiments": {}, "warnings": []}
+    for path, test in zip(paths, tests, strict=True):
+        experiment = test.experiment
+        write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
+        sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {path.name}", *test.notes)]
+        tables.append(toml_of(experiment, sentences))
+        understood(experiment, folder / f"{experiment.name}.svg", test.recording)
+        steps = experiment.control == "displacement"
+        content["experiments"][experiment.name] = {
+            "raw": path.name, "length_mm": experiment.length_mm, "material": experiment.material,
+            "control": experiment.control,
+            "resolution_N": (experiment.resolution or None) if steps else None,
+            "resolution_mm": None if steps else (experiment.resolution or None),
+            "holds": len(experiment.recorded_holds), "readings": sum(h.time_s.size for h in experiment.holds),
+            "notes": test.notes, "warnings": to_json(data_checks.of_experiment(experiment)),
+        }  # fmt: skip
+        write_text(folder / f"{experiment.name}.toml", tables[-1])
+    if len(tests) > 1:
+        write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))
+    content["warnings"] = named(content["experiments"])
+    write_json(folder / IMPORTED, content)

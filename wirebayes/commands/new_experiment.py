@@ -1,0 +1,50 @@
+"""A file to start from for one's own measurements."""
+
+from pathlib import Path
+
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import write_text
+from wirebayes.io.start import CSV, NAME, TOML
+from wirebayes.strict.files import PathLike
+
+
+def new_experiment(folder: PathLike) -> Path:
+    """Write a commented experiment file and a small CSV, to be replaced by one's own.
+
+    Both are valid as they stand.
+
+    Parameters
+    ----------
+    folder : path
+        Made where it is absent.
+
+    Returns
+    -------
+    Path
+        Of the TOML file.
+
+    Raises
+    ------
+    InputError
+        One of the files is there already, or the folder cannot be written.
+
+    Examples
+    --------
+    >>> file = wb.new_experiment("my-test")
+    >>> file.name
+    'my-wire.toml'
+    >>> wb.read_experiments(file)[0].tension().shape
+    (8, 5)
+    """
+    target = Path(folder)
+    toml, readings = target / f"{NAME}.toml", target / f"{NAME}.csv"
+    for path in (toml, readings):
+        if path.exists():
+            raise InputError(f"{path}: found a file of this name, expected a folder without it; nothing is overwritten")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        write_text(readings, CSV)
+        write_text(toml, TOML)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}), expected a writable folder") from None
+    return toml

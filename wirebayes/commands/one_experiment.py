@@ -1,0 +1,190 @@
+"""One experiment of a batch: fitted, or searched for missing effects, in a folder of its own that comes back as files.
+
+The worker needs no folder in common with the machine that runs the batch, so it may be another machine. Work is sent as
+bytes, also within one machine: then arrays have the same memory layout everywhere, and results agree to the last bit.
+"""
+
+import pickle
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Lock
+
+from wirebayes._version import __version__
+from wirebayes.commands.discover import jobs_of, write_findings
+from wirebayes.discovery.model_check import write_checks
+from wirebayes.discovery.search import catalogue_without, investigate
+from wirebayes.discovery.settings import ALPHA, Settings
+from wirebayes.effects import catalogue
+from wirebayes.inference.policy import Policy
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.run_folder import read_json
+from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
+from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.values import Statistics
+from wirebayes.processes.workers import one_thread_each
+from wirebayes.results.jobs import Job, fitted, store
+from wirebayes.views.posterior import POSTERIOR, SUMMARY
+from wirebayes.wire.laws import ElasticLaw, History
+
+QUANTITIES = ("mean", "sd", "q05", "q50", "q95")
+_ALONE = Lock()  # a worker with several threads still draws one picture at a time
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be done with each experiment.
+
+    Attributes
+    ----------
+    discover : bool
+        Look for what the model is missing; otherwise fit.
+    check : bool
+        Check the fit's model, where nothing is looked for.
+    law, history, seed, policy
+        As for a fit.
+    without : tuple of str
+        Effects left out of the catalogue.
+    own_effects : Path or None
+        Must be there under the same path wherever the work is done.
+    simulations : int
+        Refitted data sets behind the p-value.
+    posteriors : bool
+        Keep the draws, not only their summaries.
+    scratch : Path or None
+        Folder for what is being computed; the system's where it is left out.
+    """
+
+    discover: bool
+    check: bool
+    law: ElasticLaw
+    history: History
+    seed: int
+    policy: Policy
+    without: tuple[str, ...]
+    own_effects: Path | None
+    simulations: int
+    posteriors: bool
+    scratch: Path | None = None
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of one experiment: its row of the table and the content of its files by their path."""
+
+    row: Row
+    files: dict[str, bytes]
+
+
+def packed(experiment: Experiment, file: str, task: Task) -> bytes:
+    """A piece of work for `do`.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    file : str
+        Where it was read, for the table.
+    task : Task
+        What to do with it.
+
+    Returns
+    -------
+    bytes
+    """
+    return pickle.dumps((experiment, file, task))
+
+
+def do(work: bytes) -> Done:
+    """Do one experiment; whatever goes wrong with it stands in its row."""
+    one_thread_each()
+    with _ALONE:
+        experiment, file, task = pickle.loads(work)
+        row = first_columns(experiment, file)
+        with TemporaryDirectory(prefix="wirebayes-", dir=task.scratch) as scratch:
+            folder = Path(scratch)
+            try:
+                if task.discover:
+                    row = {**row, **_discovered(experiment, task, folder)}
+                else:
+                    row = {**row, **_fitted(experiment, task, folder)}
+            except OSError:  # a full disk is not the specimen's fault
+                raise
+            except Exception as error:  # no specimen may lose the others
+                message = f"{type(error).__name__}: {error}".replace(f"{folder}/", "")
+                return Done(row | {"error": message}, {})
+            return Done(row, _files(folder, experiment.name, task.posteriors))
+
+
+def first_columns(experiment: Experiment, file: str) -> Row:
+    """A row before anything is known of its posterior."""
+    recorded = experiment.recorded_holds
+    return {
+        "name": experiment.name, "material": experiment.material, "file": file, "length_mm": experiment.length_mm,
+        "holds": len(recorded), "readings": sum(hold.time_s.size for hold in recorded), "converged": None,
+        "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None, "check": None,
+        "warnings": [], "error": None,
+    }  # fmt: skip
+
+
+def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
+    about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
+    job = Job(experiment.name, (experiment,), (), task.own_effects, task.law, task.history, provenance=about)
+    _fit_and_store(job, folder, task, draws=task.posteriors)
+    if task.check:
+        write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
+    summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
+    check = summary.get("model_check")
+    return _columns(summary, check and check["p"], check and check["passed"])
+
+
+def _fit_and_store(job: Job, folder: Path, task: Task, *, draws: bool) -> None:
+    """Fit and store; nothing would go on from a checkpoint in a folder that is gone afterwards."""
+    for place in job.folders:
+        (folder / place).mkdir(parents=True)
+    store(job, fitted(job, task.seed, task.policy), folder, task.seed, task.policy, draws=draws)
+
+
+def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryColumns:
+    kinds = catalogue_without(task.without, catalogue(task.own_effects))
+    found = investigate([experiment], Settings(task.law, task.history, kinds, task.simulations), task.seed)
+    for job in jobs_of(found, task.law, task.history, task.own_effects):
+        _fit_and_store(job, folder, task, draws=True)  # pictures show them
+    write_findings(found, folder, task.own_effects)
+    report = found.report["experiments"][experiment.name]
+    # the check of a fit is this global test
+    p = report["p_global"]
+    return {
+        **_columns(read_json(folder / experiment.name / "plain" / SUMMARY), p, p > ALPHA),
+        "verdict": report["verdict"], "effects": report["effects"], "best_effect": report["best"],
+        "warnings": report["warnings"],
+    }  # fmt: skip
+
+
+def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitColumns:
+    parameters: dict[str, Statistics] = {
+        n: {"mean": v["mean"], "sd": v["sd"], "q05": v["q05"], "q50": v["q50"], "q95": v["q95"]}
+        for n, v in summary["parameters"].items()
+    }
+    check = None if passed is None else "passed" if passed else "failed"
+    return {
+        "converged": summary["converged"],
+        "parameters": parameters,
+        "warnings": summary["warnings"],
+        "p_global": p,
+        "check": check,
+    }
+
+
+def _hash(experiment: Experiment) -> dict[str, str]:
+    return {experiment.name: experiment.data_hash}
+
+
+def _files(folder: Path, name: str, posteriors: bool) -> dict[str, bytes]:
+    """The files by their path below the experiment's own folder."""
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    kept = [path for path in paths if posteriors or path.name != POSTERIOR]
+    inside = folder / name
+    return {
+        (path.relative_to(inside) if path.is_relative_to(inside) else path.relative_to(folder)).as_posix():
+        path.read_bytes() for path in kept
+    }  # fmt: skip

@@ -1,0 +1,212 @@
+"""The arguments of the public functions, checked and brought into one form."""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io import gross_events
+from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, read_experiments, select
+from wirebayes.strict.files import PathLike
+from wirebayes.strict.hint import hint
+
+Source = PathLike | Experiment | Sequence[Experiment]
+Progress = Callable[[str, float, float], None]
+Numbers = (
+    str | float | Sequence[float] | Sequence[float | None]
+)  # text is what the command line was given: it stands in the configuration
+
+
+def silent(name: str, done: float, total: float) -> None:
+    """Nobody watches the progress.
+
+    Parameters
+    ----------
+    name : str
+    done, total : float
+        What a progress function is called with.
+    """
+
+
+def path_of(value: PathLike | None) -> Path | None:
+    """A path, where there is one."""
+    return None if value is None else Path(value)
+
+
+def words(value: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Names, of which one may stand alone."""
+    return (value,) if isinstance(value, str) else tuple(value or ())
+
+
+def experiments_of(source: Source, name: str | None = None, *, drop_breaks: bool = False) -> list[Experiment]:
+    """The experiments of a file, or those given, or the named one of them.
+
+    Parameters
+    ----------
+    source : path, Experiment, or sequence of Experiment
+    name : str, optional
+    drop_breaks : bool
+        Whether readings of breaks, limits and dropouts are left out.
+
+    Raises
+    ------
+    InputError
+        The file is wrong, there is no such experiment, or two have one name; what is left out leaves too few readings.
+    """
+    experiments = _experiments_of(source, name)
+    return [without_breaks(e) for e in experiments] if drop_breaks else experiments
+
+
+def without_breaks(experiment: Experiment) -> Experiment:
+    """The experiment without the readings of its gross events.
+
+    Raises
+    ------
+    InputError
+        There are too few others.
+    """
+    kept = gross_events.without(experiment, gross_events.of_experiment(experiment))
+    if not enough(kept.holds):
+        found = f"{holds_and_readings(kept.holds)} beside breaks, limits and dropouts"
+        raise InputError(f"{experiment.source}, experiment {experiment.name}: found {found}, expected {ENOUGH}")
+    return kept
+
+
+def _experiments_of(source: Source, name: str | None) -> list[Experiment]:
+    if isinstance(source, str | os.PathLike):
+        return select(read_experiments(Path(source)), name)
+    if isinstance(source, Experiment):
+        return select([source], name)
+    experiments = list(source) if isinstance(source, Iterable) else [source]
+    for value in experiments:
+        if not isinstance(value, Experiment):
+            raise InputError(f"source: found {type(value).__name__}, expected the path of a file or Experiments")
+    names = [e.name for e in experiments]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"source: found {', '.join(names) or 'nothing'}, expected experiments of different names")
+    return select(experiments, name)
+
+
+def check_seed(seed: int) -> int:
+    """The seed as a Python integer, 0 or more."""
+    return check_whole("seed", seed, 0)
+
+
+def check_whole(option: str, value: int, least: int) -> int:
+    """A whole number as a Python integer.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    value, least : int
+        What was given, and the smallest that it may be.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{option}: found {value!r}, expected a whole number, {least} or more")
+    return int(value)
+
+
+def check_train_holds(holds: int | None) -> int | None:
+    """How many holds to learn from, as a Python integer."""
+    if holds is not None and (isinstance(holds, bool) or not isinstance(holds, int | np.integer)):
+        raise InputError(f"train_holds: found {holds!r}, expected a whole number of holds or None")
+    return None if holds is None else int(holds)
+
+
+def check_choice(option: str, value: str, known: Sequence[str]) -> None:
+    """Refuse a value that an option does not have.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    value : str
+    known : sequence of str
+        The values that it may have.
+
+    Raises
+    ------
+    InputError
+        With the nearest known value as a hint.
+    """
+    if value not in known:
+        meant = hint(value, known) if isinstance(value, str) else ""
+        raise InputError(f"{option}: found {value!r}{meant}, expected {' or '.join(known)}")
+
+
+def text_of(values: Numbers) -> str:
+    """Numbers as the command line spells them."""
+    if isinstance(values, str):
+        return values
+    return ",".join(map(_spelled, np.atleast_1d(np.asarray(values, dtype=object))))
+
+
+def _spelled(value: Any) -> str:
+    """A number as the command line has it; anything else as it shows itself, for the message that refuses it."""
+    try:
+        return repr(float(value)).removesuffix(".0")
+    except (TypeError, ValueError):
+        return str(value)
+
+
+def numbers(option: str, values: Numbers, count: int | None = None) -> Any:
+    """Finite numbers, `count` of them where it is given; text has commas between them.
+
+    Parameters
+    ----------
+    option : str
+        Its name, for the message.
+    values : str, number or sequence of numbers
+    count : int, optional
+
+    Returns
+    -------
+    (count,) array
+
+    Raises
+    ------
+    InputError
+    """
+    text = text_of(values)
+    try:
+        found = np.array([float(word) for word in text.split(",")])
+    except ValueError:
+        found = np.array([np.nan])
+    if not np.isfinite(found).all() or (count is not None and len(found) != count):
+        raise InputError(f"{option}: found {text!r}; expected {count or 'some'} finite numbers separated by commas")
+    return found
+
+
+def rising_times(values: Numbers) -> Any:
+    """Seconds that rise, from ``times``."""
+    found = numbers("--times", values)
+    if found[0] < 0 or np.any(np.diff(found) <= 0):
+        raise InputError(f"--times: found {text_of(values)!r}; expected rising times from 0 on")
+    return found
+
+
+def check_spread(value: float, *, alike: bool = True) -> float:
+    """A relative difference between specimens, below 1; above 0 where they may not be `alike`."""
+    value = float(value)
+    if not 0.0 <= value < 1.0 or (value == 0.0 and not alike):
+        above = "from 0" if alike else "above 0"
+        raise InputError(f"--specimen-spread: found {value:g}; expected a number {above} and below 1, 0.05 for 5 %")
+    return value
+
+
+def above_zero(*options: tuple[str, float]) -> None:
+    """Refuse what is not a finite number above zero."""
+    for name, value in options:
+        if not 0 < value < float("inf"):
+            raise InputError(f"{name}: found {value:g}; expected a finite number above 0")
+
+
+def from_zero(*options: tuple[str, float]) -> None:
+    """Refuse what is not a finite number of at least zero."""
+    for name, value in options:
+        if not 0 <= value < float("inf"):
+            raise InputError(f"{name}: found {value:g}; expected a finite number of at least 0")

@@ -1,0 +1,375 @@
+"""What a test would teach before it is done."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import Progress, above_zero, check_choice, check_seed, path_of, silent
+from wirebayes.commands.predict import find_posterior
+from wirebayes.commands.wires import RobotLike, content, hash_of, robot_of
+from wirebayes.discovery.next_measurement import alternatives
+from wirebayes.effects import catalogue, source_of
+from wirebayes.errors import InputError
+from wirebayes.inference.fit import seed_of
+from wirebayes.io.experiment import Experiment, read_experiments, select
+from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
+from wirebayes.io.readings import Hold
+from wirebayes.io.run_folder import open_run, read_json, write_json
+from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.json_files.plain import plain
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
+from wirebayes.json_files.values import Statistics
+from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
+from wirebayes.notice import Notice, to_json
+from wirebayes.numeric.frozen import frozen
+from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
+from wirebayes.planning.ranking import Judged, ranked, too_long
+from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
+from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
+from wirebayes.processes.workers import computing
+from wirebayes.results import store
+from wirebayes.robot.mechanics import draws as robot_draws
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import drift
+from wirebayes.simulation.synthetic import Bench
+from wirebayes.strict.files import PathLike
+from wirebayes.views.plan import Plan
+from wirebayes.views.result import ResultFolder
+from wirebayes.wire.laws import ElasticLaw, History
+
+TESTS = 120  # simulated of each protocol: a mean width is then known to some 5 %
+_ROBOT_TESTS, _ROBOT_DRAWS = 5, 60  # simulated tests whose posteriors move a robot, and draws of each
+REPEAT = "again"
+
+Aim = Literal["parameters", "creep"] | Sequence[str]
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What is to be judged."""
+
+    tests: list[tuple[Experiment, str]]
+    guess: GuessedWire
+    aim: tuple[str, ...]
+    budget_min: float | None
+    robot: RobotLike | None
+    about: dict[str, Any]
+
+
+def plan(
+    source: PathLike | Experiment,
+    *,
+    experiment: str | None = None,
+    budget_min: float | None = None,
+    robot: RobotLike | None = None,
+    aim: Aim | None = None,
+    tests: int = TESTS,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress | None = None,
+) -> Plan:
+    """Find what a test would teach before it is done.
+
+    Parameters
+    ----------
+    source : path, or Experiment
+        A plan file with ``[[protocol]]`` tables; or an experiment or its file, then the same test again is compared
+        with tests like it; or the folder of a ``fit`` or ``discover``, then its posterior is the guess.
+    experiment : str, optional
+        Which one, where there are several.
+    budget_min : float, optional
+        Time there is, minutes; longer tests come last.
+    robot : Robot, name or path, optional
+        Whose drift within an hour is to be known.
+    aim : "parameters", "creep", or two effects, optional
+        What the tests are ranked by: how much they say about the material, how well the creep after an hour is known,
+        or how well two effects would be distinguished. Left out, it is the plan file's; for a ``discover`` that could
+        not decide, the two effects it ranks first; else the parameters.
+    tests : int
+        Simulated tests of each protocol.
+    elastic_law, history
+        Of the plain model, as in `fit`.
+    own_effects : path, optional
+        A Python file with effects of your own.
+    seed : int
+    output : path, optional
+        Folder for the results, resumed or refused as by `fit`.
+    progress : function of (name, done, total), optional
+
+    Returns
+    -------
+    Plan
+        Its `summary` is the content of ``plan.json``.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong.
+
+    Examples
+    --------
+    >>> planned = wb.plan(kite.first(5), tests=20, output="out/plan")
+    >>> planned
+    Plan(5 protocols, best unload-dense)
+    >>> planned.best["parameters"]["k1"]["sd"] < planned.summary()["guess"]["parameters"]["k1"]["sd"]
+    True
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    seed, own = check_seed(seed), path_of(own_effects)
+    if isinstance(tests, bool) or not isinstance(tests, int) or tests < 2:
+        raise InputError(f"tests: found {tests!r}, expected a whole number, 2 or more")
+    if budget_min is not None:
+        above_zero(("--budget-min", budget_min))
+    kinds = catalogue(own)
+    rng = np.random.default_rng(seed_of(seed, "guess"))
+    request = _request(source, experiment, tests, list(kinds), elastic_law, history, own, rng)
+    request = replace(
+        request,
+        aim=request.aim if aim is None else _checked_aim(aim, list(kinds)),
+        budget_min=request.budget_min if budget_min is None else float(budget_min),
+        robot=request.robot if robot is None else robot,
+    )
+    machine = None if request.robot is None else robot_of(request.robot)
+    configuration = {
+        "command": "plan", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
+        "own_effects": source_of(own), "tests": tests, "aim": list(request.aim), "budget_min": request.budget_min,
+        "robot": _identity(request.robot),
+    } | request.about  # fmt: skip
+    place = ResultFolder.at(output)
+    with open_run(place.path, configuration) as opened:
+        if opened.state == "done":
+            return Plan(place, own, computed=False)
+        report = progress or silent
+        judged: list[Judged] = []
+        tension: float | None = None  # of the first test: all state their creep for it
+        with computing():
+            for done, (test, words) in enumerate(request.tests):
+                report("protocols", done, len(request.tests))
+                guess = request.guess.at(test.length_mm)
+                test = at_centre(test, guess, elastic_law, history)
+                tension = typical_tension(test) if tension is None else tension
+                one = np.random.default_rng(seed_of(seed, "plan", test.name))
+                try:
+                    expected = expected_widths(
+                        test, guess, one, law=elastic_law, history=history, tension_N=tension,
+                        length_mm=request.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
+                    )  # fmt: skip
+                except ValueError as error:
+                    raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
+                seen = sensitivity(test, guess, kinds, one, law=elastic_law, history=history, simulations=SIMULATIONS)
+                judged.append(Judged(test, words, expected, seen))
+        report("protocols", len(request.tests), len(request.tests))
+        order = ranked(judged, request.aim, request.budget_min)
+        rows = [_row(j, request, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
+        summary = _summary(rows, request, machine)
+        write_json(opened.directory / "plan.json", summary)
+        from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
+
+        widths_and_effects(plain(summary), opened.directory / "plan.svg")
+        opened.finish()
+    return Plan(place, own)
+
+
+def _identity(robot: RobotLike | None) -> str | None:
+    """What decides a robot's part in the results: a hash of its content."""
+    if robot is None:
+        return None
+    return hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot))
+
+
+def _request(
+    source: PathLike | Experiment, name: str | None, n: int, effects: list[str], law: ElasticLaw, history: History,
+    own: Path | None, rng: np.random.Generator,
+) -> _Request:  # fmt: skip
+    """Tests and guess of whatever was given."""
+    if not isinstance(source, str | os.PathLike | Experiment):
+        raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
+    if not isinstance(source, Experiment) and Path(source).is_dir():
+        return _of_folder(Path(source), name, n, effects, own)
+    if not isinstance(source, Experiment) and is_plan(Path(source)):
+        return _of_plan(read_plan(Path(source), effects), name, n, own, rng)
+    experiments = [source] if isinstance(source, Experiment) else select(read_experiments(Path(source)), name)
+    if len(experiments) > 1:
+        names = ", ".join(e.name for e in experiments)
+        raise InputError(f"{source}: found the experiments {names}; expected one of them as --experiment")
+    (measured,) = experiments
+    build([measured], law=law, history=history)  # checks priors
+    guess = from_readings(measured, n, rng, law, history)
+    about = {"data_sha256": measured.data_hash, "priors": measured.priors}
+    return _Request(_like(measured), guess, ("parameters",), None, None, about)
+
+
+def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np.random.Generator) -> _Request:
+    tests = [(_experiment(test, file), "") for test in file.tests]
+    for test, _ in tests:
+        build([test])  # checks priors
+    if file.posterior is None:
+        planned = [test for test, _ in tests]
+        guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
+        about: dict[str, Any] = {}
+    else:
+        guess, about, _ = _posterior(file.posterior, name, n, own)
+    about |= {
+        "guess": file.guess, "priors": file.priors, "material": file.material,
+        "protocols": [vars(test) for test in file.tests],
+    }  # fmt: skip
+    return _Request(tests, guess, file.aim, file.budget_min, file.robot, about)
+
+
+def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> _Request:
+    """The folder of a fit or discover: the same test again, and others like it."""
+    guess, about, sample = _posterior(folder, name, n, own)
+    aim: tuple[str, ...] = ("parameters",)
+    findings = folder / "discovery.json"
+    if findings.is_file():
+        report: DiscoveryJson = read_json(findings)
+        if sample.name in report["experiments"]:
+            found = report["experiments"][sample.name]
+            rivals = list(dict.fromkeys(e for e in (*found["set"], *found["group"]) if e in effects))
+            aim = tuple(rivals[:2]) if len(rivals) > 1 else aim
+    return _Request(_like(_measured(sample, folder)), guess, aim, None, None, about)
+
+
+def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
+    discovered = bool(list(folder.glob("**/plain/posterior.nc")))
+    which, place = find_posterior(folder, name, "plain" if discovered else None)
+    stored = store.load(place, which, own)
+    if stored.likelihood == "hold":
+        message = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
+        raise InputError(f"{folder}: {message}")
+    sample = stored.sample
+    source = f"the posterior of {sample.name} in {folder.name}"
+    guess = from_posterior(stored.draws, sample.protocol.length_mm, source, n)
+    guess = replace(guess, doubts=stored.doubts)
+    return guess, {"posterior": hash_of(guess.draws)}, sample
+
+
+def _experiment(test: PlannedTest, file: PlanFile) -> Experiment:
+    bench = Bench(
+        test.name, file.material, test.length_mm, times_s=test.times_s, temperatures_C=test.temperatures_C
+    ).setting(test.control, test.settings, test.resolution)
+    return replace(bench.experiment(), source=file.source, priors=file.priors, prior_lines=file.prior_lines)
+
+
+def _like(measured: Experiment) -> list[tuple[Experiment, str]]:
+    """The same test again, and what else could be done with such a sample."""
+    out = [(replace(measured, name=REPEAT), "repeat the test")]
+    short = ("unload", "dense", "unload-dense", "half-steps")
+    for name, other in zip(short, alternatives(measured.protocol(), alone=True), strict=True):
+        bench = Bench(name, measured.material, measured.length_mm, times_s=tuple(other.times_s.tolist())).setting(
+            measured.control, tuple(other.setting.tolist()), measured.resolution
+        )
+        out.append((replace(bench.experiment(), source=measured.source, priors=measured.priors), other.words))
+    return out
+
+
+def _measured(sample: Sample, folder: Path) -> Experiment:
+    """The experiment of a stored posterior, without its readings' temperatures."""
+    p = sample.protocol
+    holds = []
+    for i, mask in enumerate(p.mask):
+        number = int(p.number[i]) if mask.any() else None
+        times, read = p.time_s[i][mask].tolist(), sample.readings[i, :, 0][mask].tolist()
+        log = None
+        if p.warming_K is not None and p.reference_C is not None and mask.any():
+            log = frozen((p.warming_K[i][mask] + p.reference_C).tolist())
+        holds.append(Hold(number, float(p.setting[i]), float(p.duration_s[i]), frozen(times), frozen(read),
+                          log, float(p.start_s[i]), p.control))  # fmt: skip
+    return Experiment(
+        sample.name, sample.material, p.length_mm, sample.resolution, tuple(holds), folder, control=p.control
+    )
+
+
+def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
+    words = (aim,) if isinstance(aim, str) else tuple(aim)
+    if words in (("parameters",), ("creep",)) or (len(set(words)) == len(words) == 2 and set(words) <= set(effects)):
+        return words
+    expected = "parameters, creep, or two different effects of the catalogue"
+    raise InputError(f"--aim: found {', '.join(map(str, words))}; expected {expected}")
+
+
+def _row(
+    judged: Judged, request: _Request, rank: int, machine: Robot | None, law: ElasticLaw, history: History
+) -> JudgedProtocol:
+    """A protocol as it stands in ``plan.json``."""
+    test, expected, seen = judged.test, judged.expected, judged.sensitivity
+    widths = expected.widths
+    cosines = {f"{a} {b}": cos for (a, b), cos in seen.cosines.items() if a < b}
+    recorded = test.recorded_holds
+    return {
+        "rank": rank, "name": test.name, "words": judged.words, "length_mm": test.length_mm, "holds": len(recorded),
+        "readings": sum(hold.time_s.size for hold in recorded), "duration_min": judged.duration_min,
+        "within_budget": not too_long(judged, request.budget_min), "score": judged.score(request.aim),
+        "information_bits": expected.information_bits, "simulated_tests": expected.tests,
+        "parameters": {n: q for n, q in widths.items() if n in (*MATERIAL, *SAMPLE)},
+        "creep": {
+            "tension_N": expected.tension_N, "length_mm": expected.length_mm,
+            "longest_hold_s": expected.longest_hold_s, "creep_longest_hold_mm": widths["creep_longest_hold_mm"],
+            "creep_1h_mm": widths["creep_1h_mm"],
+        },
+        "effects": seen.effects, "cosines": cosines, "not_identifiable": list(seen.hidden),
+        "robot": None if machine is None else _drift(judged, request.guess, machine, law, history),
+    }  # fmt: skip
+
+
+def _summary(rows: list[JudgedProtocol], request: _Request, machine: Robot | None) -> PlanJson:
+    """The content of ``plan.json``."""
+    guess = request.guess
+    return {
+        "version": 1,
+        "aim": list(request.aim),
+        "budget_min": request.budget_min,
+        "best": rows[0]["name"],
+        "guess": {
+            "source": guess.source,
+            "length_mm": guess.length_mm,
+            "parameters": {n: _statistics(v) for n, v in guess.draws.items()},
+        },
+        "robot": None if machine is None else machine.name,
+        "protocols": rows,
+        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *guess.doubts]),
+    }
+
+
+def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]:
+    """That no test is done within the time there is, if so."""
+    if best["within_budget"]:
+        return []
+    return [Notice("budget", f"no test is done within {budget_min:g} min")]
+
+
+def _drift(judged: Judged, guess: GuessedWire, machine: Robot, law: ElasticLaw, history: History) -> RobotDrift:
+    """How well the drift of a robot within an hour would be known, and how well it is at the guess."""
+
+    def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
+        few = {n: parameters[n][:_ROBOT_DRAWS] for n in MATERIAL}
+        wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, law, history))
+        course = drift.from_command(
+            machine, wires, machine.home_m, matrix(machine.home_rotation_rad), np.array([0.0, HOUR_S])
+        )
+        far = 1e3 * np.linalg.norm(course.position_m[:, -1] - machine.home_m, axis=1)[course.found]
+        return (float(np.median(far)), float(far.std())) if len(far) > 1 else (np.nan, np.nan)
+
+    after = [sd(d, judged.test.length_mm) for d in judged.expected.draws]
+    return {
+        "time_s": HOUR_S, "drift_mm": float(np.nanmedian([m for m, _ in after])),
+        "drift_sd_mm": float(np.nanmedian([s for _, s in after])),
+        "drift_sd_guess_mm": sd(guess.draws, guess.length_mm)[1],
+    }  # fmt: skip
+
+
+def _statistics(values: Any) -> Statistics:
+    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    return {"mean": float(values.mean()), "sd": float(values.std()), "q05": float(low), "q50": float(middle),
+            "q95": float(high)}  # fmt: skip

@@ -1,0 +1,292 @@
+"""A pose of a robot on creeping wires."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.commands.options import (
+    Numbers,
+    Progress,
+    above_zero,
+    check_seed,
+    check_spread,
+    numbers,
+    path_of,
+    rising_times,
+    silent,
+    text_of,
+)
+from wirebayes.commands.pose_history import calibrated_errors, checked_errors, pose_history
+from wirebayes.commands.wires import (
+    RobotLike,
+    Wires,
+    configuration,
+    content,
+    draws_for,
+    folder_of,
+    posterior_of,
+    robot_of,
+)
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.json_files.plain import plain
+from wirebayes.numeric.typing import Floats
+from wirebayes.processes.workers import computing
+from wirebayes.robot.history.history import with_payload
+from wirebayes.robot.mechanics import plane
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import typical_spread
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.pose.answer import Answer, answer
+from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
+from wirebayes.robot.pose.orientation import orientation
+from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.strict.files import PathLike
+from wirebayes.views.calibration import Calibration
+from wirebayes.views.pose import Pose
+from wirebayes.views.posterior import POSTERIOR
+from wirebayes.views.result import ResultFolder
+
+# an option; closest in the minute that the paper speaks of, and on to an hour
+TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
+DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed through every row
+
+
+def pose(
+    robot: RobotLike,
+    wires: Wires,
+    *,
+    position: Numbers | None = None,
+    rotation: Numbers | None = None,
+    times: Numbers = TIMES_S,
+    tolerance: float = 0.3,
+    tolerance_tilt: float = 0.055,
+    specimen_spread: float = 0.05,
+    map_heights: Numbers | None = None,
+    map_rotations: Sequence[Numbers] | None = None,
+    other_fit: Wires | None = None,
+    joints: Any = None,
+    trajectory: Any = None,
+    payload: float = 0.0,
+    payload_at: Numbers | None = None,
+    tension_sd: float = 0.02,
+    tilt_sd: float = 1e-3,
+    reference_sd: float = 0.0,
+    calibration: PathLike | Calibration | None = None,
+    draws: int | None = None,
+    experiment: str | None = None,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+    progress: Progress = silent,
+) -> Pose:
+    """Kinematics of a robot on creeping wires; drift and pose error with uncertainty bands.
+
+    Of one pose; of measured joint values over time (`joints`), for where the platform was; or of commanded poses and
+    loads over time (`trajectory`). Over time it also writes ``poses.csv`` and ``corrections.csv``.
+
+    Parameters
+    ----------
+    robot : Robot, name of a shipped robot, or path
+    wires : Posterior, Findings, or path of a folder with a ``posterior.nc``; or a mapping of wire name to one of them
+        The line that the wires are cut from; of findings the final model. A list of several: tests of one line, from
+        which the spread of its specimens is estimated.
+    position : (3,) array, optional
+        Of the platform in m; the robot's home pose when left out. With `joints`: about where it starts.
+    rotation : (3,) array, optional
+        Rotation vector in rad, None for a component that balance decides. When left out: of the home pose where the
+        wires can command and hold it, else as the platform hangs in balance.
+    times : sequence of float
+        Rising times after the command, s.
+    tolerance : float
+        Allowed pose error, mm.
+    tolerance_tilt : float
+        Allowed rotation, degrees.
+    specimen_spread : float
+        Relative difference between wires of one line, where it is not estimated from several tests.
+    map_heights : sequence of float, optional
+        Heights of the workspace's slices that are mapped, m; three through the robot's box when left out.
+    map_rotations : sequence of (3,) arrays, optional
+        Rotation vectors, rad, of the platforms that are mapped; level when left out.
+    other_fit : Posterior or path, optional
+        Another fit of the line, which one more controller uses.
+    joints : path of a CSV, DataFrame, or mapping of name to (t,) array, optional
+        Joint values over time, and tensions, roll and pitch, payload and commanded poses where they are known.
+    trajectory : path of a CSV, DataFrame, or mapping of name to (t,) array, optional
+        Commanded poses over time, and payload.
+    payload : float
+        Carried beside the platform's own mass, kg.
+    payload_at : (3,) array, optional
+        Its centre of mass in the platform's frame, m; the platform's own when left out.
+    tension_sd, tilt_sd : float
+        Standard errors of measured tensions, N, and of roll and pitch, rad.
+    reference_sd : float
+        Standard error of the lengths that measured joint values stand for, mm.
+    calibration : Calibration or path of its folder, optional
+        What `calibrate` found for this robot: with `joints` or `trajectory`, which then go on where its session ended.
+    draws : int, optional
+        Posterior draws used, evenly thinned; 1000 when left out, 200 over time.
+    experiment : str, optional
+        Which one, where several were fitted.
+    own_effects : path, optional
+        A Python file with effects of your own, where the fit used one and is read from a folder.
+    seed : int
+    output : path, optional
+        Folder for the results.
+    progress : function of name, done and total, optional
+
+    Returns
+    -------
+    Pose
+        Its `summary` is the content of ``pose.json``.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong; in a table with line and column.
+
+    Examples
+    --------
+    >>> held = wb.pose("linear-7", posterior, times=[0, 60], draws=40, output="out/pose")
+    >>> held.summary()["drift"][0]["times_s"]
+    [0.0, 60.0]
+    >>> path = {"time_s": [0, 60, 3600], "x_m": [0, 0.1, 0.1], "y_m": [0, 0, 0], "z_m": [0.6, 0.6, 0.6]}
+    >>> moved = wb.pose("linear-7", posterior, trajectory=path | {"payload_kg": [0, 0.2, 0.2]}, draws=20)
+    >>> moved.summary()["history"]["rows"]
+    3
+
+    After a calibration, whose session wore the wires in and told their lengths:
+
+    >>> known = wb.pose("linear-7", thin, trajectory=path, calibration=lengths, draws=20)
+    >>> known.summary()["history"]["calibration"]["holds"]
+    9
+    """
+    own, seed = path_of(own_effects), check_seed(seed)
+    over_time = joints is not None or trajectory is not None
+    draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
+    _refuse_calibration(calibration is not None and not over_time)
+    payload, bare = float(payload), robot_of(robot)
+    machine = _loaded(bare, payload, payload_at)
+    line = draws_for(machine, wires, draws, experiment, own)
+    where = machine.home_m if position is None else numbers("--position", position, 3)
+    turned = asked_rotation(rotation)
+    _refuse_off_plane(machine, where, _start(machine, turned))
+    moments = rising_times(times)
+    tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
+    above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
+    specimen_spread = typical_spread(line, check_spread(specimen_spread, alike=False))
+    carried = {"--payload": payload, **_spelled({"--payload-at": payload_at})}
+    at = _spelled({"--position": position, "--rotation": rotation})
+    if over_time:
+        _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
+        _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
+        errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
+        errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
+        options = {"--experiment": experiment, **carried, **at}
+        decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, options)
+        return pose_history(machine, line, joints, trajectory, errors, (where, _start(machine, turned)), seed, decides,
+                            ResultFolder.at(output), own, progress)  # fmt: skip
+    slices = _slices(machine, map_heights, map_rotations)
+    other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
+    there = orientation(machine, where, turned)
+    request = PoseRequest(there.position_m, there.rotation, moments, 1e-3 * tolerance, math.radians(tolerance_tilt),
+                          specimen_spread, seed, slices, there)  # fmt: skip
+    options = {
+        "--experiment": experiment, **at, "--times": text_of(times), "--tolerance": tolerance,
+        "--tolerance-tilt": tolerance_tilt, "--specimen-spread": specimen_spread,
+        "--other-fit": None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR), **carried,
+    }  # fmt: skip
+    if slices is not LEVEL:
+        options["--map-heights, --map-rotation"] = plain(asdict(slices))
+    place, posterior = ResultFolder.at(output), posterior_of(wires, experiment)
+    decides = configuration("pose", robot, posterior, draws, seed, own, options)
+    with open_run(place.path, decides) as run, computing():
+        if run.state == "done":
+            return Pose(place, own, computed=False)
+        _write(run.directory, machine, request, answer(machine, line, request, other))
+        run.finish()
+    return Pose(place, own)
+
+
+def _write(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
+    write_json(folder / "pose.json", found.content)
+    if found.maps:
+        write_csv(folder / "workspace.csv", TABLE, rows(found.maps))
+    from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
+
+    pictures.save_pose(folder, robot, request, found)
+
+
+def _spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
+    """Options as the command line spells them; None where they were not given."""
+    return {name: None if values is None else text_of(values) for name, values in options.items()}
+
+
+def asked_rotation(rotation: Numbers | None) -> Floats | None:
+    """Components of a rotation vector, NaN where ``free`` (in Python None); None where nothing is asked for."""
+    if rotation is None:
+        return None
+    text = text_of(rotation)
+    words = ["free" if word.strip() in ("free", "None") else word for word in text.split(",")]
+    if "free" not in words:
+        return np.asarray(numbers("--rotation", text, 3))
+    try:
+        found = np.array([np.nan if word == "free" else float(word) for word in words])
+    except ValueError:
+        found = np.array([np.inf])
+    if len(found) != 3 or np.isinf(found).any():
+        raise InputError(f"--rotation: found {text!r}; expected three finite numbers or free, separated by commas")
+    return found if np.isfinite(found).any() else None
+
+
+def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> None:
+    far = float(plane.off(robot, position_m[None], rotation[None])[0])
+    if robot.plane is not None and far > OFF_PLANE * robot.span_m:
+        home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
+        raise InputError(
+            f"--position, --rotation: found a pose {far:.3g} m off the plane; expected one in the plane through the "
+            f"home position ({home}) with the normal ({normal}), turned about it only"
+        )
+
+
+def _start(robot: Robot, asked_rad: Floats | None) -> Floats:
+    """About how the platform is turned when a history begins."""
+    home = robot.home_rotation_rad
+    return matrix(home if asked_rad is None else np.where(np.isfinite(asked_rad), asked_rad, home))
+
+
+def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
+    """The robot with a payload, at its own centre of mass where no other place is given."""
+    if not 0 <= payload_kg < math.inf:
+        raise InputError(f"--payload: found {payload_kg:g}; expected kilograms, 0 or more")
+    return with_payload(robot, payload_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
+
+
+def _refuse_beside_history(options: str, given: bool) -> None:
+    if given:
+        raise InputError(f"{options}: found beside a history; expected them for a single pose only")
+
+
+def _refuse_calibration(alone: bool) -> None:
+    if alone:
+        raise InputError("--calibration: found beside a single pose; expected it beside --joints or --trajectory")
+
+
+def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
+    """The requested slices; refused where the robot has only one height or one orientation."""
+    if heights is not None and robot.plane is not None:
+        raise InputError("--map-heights: found heights for a robot in a plane; expected none")
+    if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
+        raise InputError("--map-heights: found heights for a workspace in a vertical plane; expected none")
+    if rotations is not None and robot.degrees == 3:
+        raise InputError("--map-rotation: found one for a robot whose lines keep the orientation; expected none")
+    if heights is None and rotations is None:
+        return LEVEL
+    levels = None if heights is None else np.unique(numbers("--map-heights", heights))
+    turns = [numbers("--map-rotation", turn, 3) for turn in rotations or ()]
+    return Slices(levels, np.array(turns) if turns else LEVEL.rotations_rad)

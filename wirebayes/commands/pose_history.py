@@ -1,0 +1,190 @@
+"""A robot's measured or commanded history: what `pose` does where it is given one."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wirebayes.commands.calibrate import calibrated_of
+from wirebayes.commands.options import Progress, above_zero
+from wirebayes.commands.wires import Wires, content, hash_of
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import open_run, write_csv, write_json
+from wirebayes.numeric.typing import Floats
+from wirebayes.processes.workers import computing
+from wirebayes.robot.history import table
+from wirebayes.robot.history.answer import answer
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.unknowns import Uncertain
+from wirebayes.robot.mechanics import plane
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.self_calibration.calibrated import to_dict
+from wirebayes.strict.columns import as_csv, row_place
+from wirebayes.strict.files import PathLike
+from wirebayes.views.calibration import Calibration
+from wirebayes.views.pose import Pose
+from wirebayes.views.result import ResultFolder
+
+_OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
+
+
+def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:
+    """Standard errors in the robot's units, mm and N and rad in.
+
+    Parameters
+    ----------
+    reference_sd : float
+        Of a wire's reference length, mm.
+    specimen_spread : float
+        Relative difference between specimens of one line.
+    tension_sd : float
+        Of a tension reading, N.
+    tilt_sd : float
+        Of an inclinometer's angle, rad.
+
+    Returns
+    -------
+    Uncertain
+
+    Raises
+    ------
+    InputError
+        If one is not a number that it can be.
+    """
+    reference_sd, tension_sd, tilt_sd = float(reference_sd), float(tension_sd), float(tilt_sd)
+    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
+    if not 0 <= reference_sd < np.inf:
+        raise InputError(f"--reference-sd: found {reference_sd:g}; expected millimetres, 0 or more")
+    return Uncertain(1e-3 * reference_sd, float(specimen_spread), tension_sd, tilt_sd)
+
+
+def calibrated_errors(
+    errors: Uncertain,
+    calibration: PathLike | Calibration | None,
+    robot: Robot,
+    line: WireDraws,
+    wires: Wires,
+    experiment: str | None,
+) -> Uncertain:
+    """The same standard errors, with what a calibration left known in the place of reference error and spread.
+
+    Parameters
+    ----------
+    errors : Uncertain
+    calibration : Calibration, path of its folder, or None
+        None leaves the errors as they are.
+    robot : Robot
+        Without payload.
+    line : WireDraws
+    wires : Posterior, path or mapping
+        What `line` was read from.
+    experiment : str or None
+
+    Returns
+    -------
+    Uncertain
+
+    Raises
+    ------
+    InputError
+        The calibration is not one of this robot and these wires, or a reference error was given beside it.
+    """
+    if calibration is None:
+        return errors
+    if errors.reference_m:
+        raise InputError("--reference-sd: found beside --calibration, which knows the lengths; expected one of them")
+    known = calibrated_of(calibration, robot, line, wires, experiment)
+    return replace(errors, spread=known.prior.spread, calibrated=known)
+
+
+def pose_history(
+    robot: Robot,
+    line: WireDraws,
+    joints: Any,
+    trajectory: Any,
+    errors: Uncertain,
+    start: tuple[Floats, Floats],
+    seed: int,
+    decides: dict[str, Any],
+    place: ResultFolder,
+    own_effects: Path | None,
+    progress: Progress,
+) -> Pose:
+    """Poses over time from `joints` or for `trajectory`: ``pose.json``, two tables and pictures.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    joints, trajectory : path, columns or None
+        One of them: measured joint values, or commanded poses.
+    errors : Uncertain
+    start : (position, rotation)
+        The pose near which the first row's is sought.
+    seed : int
+    decides : dict
+        What else decides the results, for ``configuration.json``.
+    place : ResultFolder
+        Folder of the results.
+    own_effects : Path or None
+        File of a user's own effects.
+    progress : callable
+        Called with a name, what is done and the total.
+
+    Returns
+    -------
+    Pose
+
+    Raises
+    ------
+    InputError
+        Both were given, or a table is wrong (line and column).
+    """
+    if joints is not None and trajectory is not None:
+        raise InputError("--joints and --trajectory: found both; expected one (a file of --joints may hold poses too)")
+    option, given = ("--joints", joints) if joints is not None else ("--trajectory", trajectory)
+    columns = table.measured if joints is not None else table.commanded
+    if isinstance(given, str | os.PathLike):
+        history = table.read(Path(given), robot, columns)
+        read = content(Path(given))
+    else:
+        text = as_csv(option[2:], given)
+        history = table.parse(option[2:], text, robot, columns, row_place)
+        read = hash_of({option: text})
+    _refuse_off_plane(robot, option, history)
+    lasting = {  # in a fixed order, as in `wires.configuration`
+        "of": option[2:],
+        "content": read,
+        "--reference-sd (m)": errors.reference_m,
+        "--specimen-spread": errors.spread,
+        "--tension-sd": errors.tension_N,
+        "--tilt-sd": errors.tilt_rad,
+    }
+    if errors.calibrated is not None:
+        lasting["--calibration"] = hash_of(to_dict(errors.calibrated))
+    with open_run(place.path, decides | {"history": lasting}) as run:
+        if run.state == "done":
+            return Pose(place, own_effects, computed=False)
+        with computing(), np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
+            found = answer(robot, line, history, errors, start, seed, progress)
+        write_json(run.directory / "pose.json", found.content)
+        for name, (header, rows) in found.tables.items():
+            write_csv(run.directory / name, header, rows)
+        from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
+
+        pictures.save(run.directory, robot, history, found)
+        run.finish()
+    return Pose(place, own_effects)
+
+
+def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
+    """Refuse commanded poses that a plane does not allow."""
+    if robot.plane is None or history.position_m is None or history.rotation is None:
+        return
+    far = plane.off(robot, history.position_m, history.rotation)
+    if far.max() > _OFF_PLANE * robot.span_m:
+        when = history.times_s[int(far.argmax())]
+        raise InputError(f"{option}: found a pose {far.max():.3g} m off the robot's plane at {when:g} s; expected none")

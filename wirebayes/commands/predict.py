@@ -1,0 +1,249 @@
+"""The readings that a posterior expects of a protocol."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from wirebayes.commands.options import check_choice, check_seed, path_of
+from wirebayes.errors import InputError
+from wirebayes.io.arrays import protocol_of_columns
+from wirebayes.io.readings import protocol_table
+from wirebayes.io.run_folder import check_file, write_csv
+from wirebayes.json_files.prediction import PredictionJson
+from wirebayes.notice import to_json
+from wirebayes.prediction.request import request_of
+from wirebayes.prediction.table import (
+    Prediction,
+    beyond_tested,
+    dataset,
+    header,
+    mixture_table,
+    unlikely_readings,
+)
+from wirebayes.results import store
+from wirebayes.results.mixture import members_of
+from wirebayes.results.store import Stored
+from wirebayes.strict.columns import is_table
+from wirebayes.strict.files import PathLike
+from wirebayes.views.findings import Findings
+from wirebayes.views.posterior import Posterior, Posteriors
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def predict(
+    posterior: PathLike | Posterior | Posteriors | Findings,
+    protocol: Any,
+    *,
+    experiment: str | None = None,
+    model: Literal["plain", "final"] | None = None,
+    fresh: bool = False,
+    own_effects: PathLike | None = None,
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> Prediction:
+    """Predict the readings of holds not measured yet.
+
+    Holds of the training are predicted as replicates. Holds with later numbers continue the tested sample: they begin
+    when the last trained hold ended and are predicted given all training readings.
+
+    Parameters
+    ----------
+    posterior : Posterior, Findings, or path of a folder written by fit or discover
+    protocol : path of a CSV, DataFrame, or mapping of name to (r,) array
+        Columns ``hold``, ``displacement_mm``, ``time_s``, with ``temperature_C`` where the training data had it, and
+        optionally ``tension_N``: a first reading of a hold, which conditions the prediction, else NaN. Of a test under
+        weights ``tension_N`` and ``displacement_mm`` change places.
+    experiment : str, optional
+        Which one, where there are several.
+    model : {"plain", "final"}, optional
+        Of findings: the plain model, or the final one, which is the default.
+    fresh : bool
+        The protocol is the whole history of a fresh sample instead.
+    own_effects : path, optional
+        A Python file with effects of your own, where the fit used one and was read from a folder.
+    seed : int
+    output : path, optional
+        A CSV file to write, with a row for each row of the protocol.
+
+    Returns
+    -------
+    Prediction
+        An `xarray.Dataset` whose ``plot()`` draws medians and bands. Dimension ``reading``, a row of the protocol
+        each; variables ``mean_N``, ``sd_N``, ``q05_N``, ``q50_N``, ``q95_N`` (``mean_mm`` … under weights) with units
+        as attributes. The attribute ``prediction`` says which sample was predicted, given what; ``warnings``, where
+        there is one, what speaks against the posterior, what lies far beyond the tested range, and which given readings
+        are far from what was expected; ``warning_kinds`` has the kind of each.
+
+    Raises
+    ------
+    InputError
+        The protocol does not follow from the training, with the row or line and the column; or no such posterior.
+
+    Examples
+    --------
+    >>> protocol = {"hold": [7, 7], "displacement_mm": [7, 7], "time_s": [0, 60]}
+    >>> predicted = wb.predict(posterior, protocol)
+    >>> predicted["mean_N"].dims, predicted["mean_N"].attrs["units"]
+    (('reading',), 'N')
+    >>> bool(predicted["mean_N"][0] > predicted["mean_N"][1])  # the wire creeps
+    True
+    """
+    own = path_of(own_effects)
+    if model is not None:
+        check_choice("model", model, ("plain", "final"))
+    members = stored_posteriors(posterior, experiment, model, own)
+    control = members[0][1].sample.protocol.control
+    if is_table(protocol):
+        cells = protocol_of_columns(protocol, control)
+    elif isinstance(protocol, str | os.PathLike):
+        cells = protocol_table(Path(protocol), control)
+    else:
+        raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
+    requests = [(probability, request_of(cells, stored, fresh=fresh)) for probability, stored in members]
+    seed = check_seed(seed)
+    if output is not None:
+        check_file(Path(output))
+        if isinstance(protocol, str | os.PathLike) and Path(output).exists() and Path(output).samefile(protocol):
+            raise InputError(f"--output {output}: found the protocol itself, expected another file")
+    rows = mixture_table(requests, seed)
+    if output is not None:
+        write_csv(Path(output), header(control), rows)
+    sentence = requests[0][1].sentence
+    if len(requests) > 1:
+        sentence += (
+            f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
+        )
+    doubts = [doubt for _, stored in members for doubt in stored.doubts]
+    notices = to_json([*doubts, *beyond_tested(rows, members[0][1]), *unlikely_readings(requests, seed)])
+    attributes: dict[str, Any] = {"prediction": sentence, "seed": seed}
+    if notices:  # in two attributes, for netCDF holds text but no mappings
+        attributes["warnings"] = [notice["text"] for notice in notices]
+        attributes["warning_kinds"] = [notice["kind"] for notice in notices]
+    return dataset(rows, attributes, control)
+
+
+def as_json(predicted: "xr.Dataset") -> PredictionJson:
+    """A prediction as plain values: what was predicted, a row for each reading, and the warnings.
+
+    Parameters
+    ----------
+    predicted : xarray.Dataset
+        What `predict` returned.
+    """
+    about = predicted.attrs
+    columns = {str(name): values.values.tolist() for name, values in predicted.reset_coords().data_vars.items()}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    warned = zip(about.get("warning_kinds", ()), about.get("warnings", ()), strict=True)
+    return {
+        "experiment": about["experiment"],
+        "prediction": about["prediction"],
+        "seed": int(about["seed"]),
+        "readings": rows,
+        "warnings": [{"kind": kind, "text": text} for kind, text in warned],
+    }
+
+
+def stored_posteriors(
+    posterior: PathLike | Posterior | Posteriors | Findings,
+    experiment: str | None = None,
+    model: str | None = None,
+    own_effects: Path | None = None,
+) -> list[tuple[float, Stored]]:
+    """Draws and models of one experiment with their probabilities, from what `predict` is given.
+
+    More than one where `discover` left undecided which effects are missing.
+
+    Parameters
+    ----------
+    posterior : path, Posterior, Posteriors or Findings
+        A folder that `fit` or `discover` wrote, or what they returned.
+    experiment : str, optional
+        May be left out where there is one.
+    model : {"plain", "final"}, optional
+        Of what `discover` found; final when left out.
+    own_effects : Path, optional
+        File of a user's own effects, for a folder.
+
+    Returns
+    -------
+    list of (probability, Stored)
+
+    Raises
+    ------
+    InputError
+        If there is no such posterior, or several to choose from.
+    """
+    if isinstance(posterior, str | os.PathLike):
+        name, folder = find_posterior(Path(posterior), experiment, model)
+        return [(p, store.load(place, name, own_effects)) for p, place in members_of(folder)]
+    if isinstance(posterior, Findings):
+        posteriors: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
+        one, experiment = one_of(posteriors, experiment), None
+    elif isinstance(posterior, Posteriors):
+        one, experiment = one_of(posterior, experiment), None
+    elif isinstance(posterior, Posterior):
+        one = posterior
+    else:
+        raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
+    return [(p, store.load(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
+
+
+def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:
+    """The posterior of the named experiment, or the only one."""
+    if experiment is None and len(posteriors) > 1:
+        raise InputError(f"experiment: found none, expected one of {', '.join(posteriors)}")
+    name = next(iter(posteriors)) if experiment is None else experiment
+    if name not in posteriors:
+        raise InputError(f"experiment: found {name!r}, expected one of {', '.join(posteriors)}")
+    return posteriors[name]
+
+
+def find_posterior(folder: Path, experiment: str | None = None, model: str | None = None) -> tuple[str, Path]:
+    """Find the posterior of one experiment in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        What `fit` or `discover` wrote, or the folder of one posterior itself.
+    experiment : str, optional
+        May be left out where there is one.
+    model : {"plain", "final"}, optional
+        Of what `discover` found; final when left out.
+
+    Returns
+    -------
+    name : str
+        Of the experiment.
+    folder : Path
+        The one that holds ``posterior.nc``.
+
+    Raises
+    ------
+    InputError
+        If there is none, several to choose from, or not the one requested.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")
+    found: dict[str, list[Path]] = {}
+    levels = ("posterior.nc", "*/posterior.nc", "*/*/posterior.nc")
+    for path in sorted(path for level in levels for path in folder.glob(level)):
+        for name in store.experiments_in(path):
+            found.setdefault(name, []).append(path.parent)
+    if not found:
+        raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")
+    if experiment is None and len(found) > 1:
+        raise InputError(f"{folder}: found {', '.join(sorted(found))}; expected one of them as --experiment")
+    name = experiment or next(iter(found))
+    if name not in found:
+        raise InputError(f"--experiment {name}: not in {folder}, expected one of {', '.join(sorted(found))}")
+    places = {place.name: place for place in found[name]}
+    if model is None:
+        if len(places) == 1:
+            return name, next(iter(places.values()))
+        model = "final"
+    if model not in places:
+        raise InputError(f"--model {model}: {folder} has no such posterior of {name}; discover writes plain and final")
+    return name, places[model]

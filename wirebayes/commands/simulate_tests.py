@@ -1,0 +1,186 @@
+"""Synthetic tests with known truth, as files the other functions read."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import get_args
+
+from wirebayes._version import __version__
+from wirebayes.commands.options import Numbers, check_choice, check_seed, check_whole, path_of, text_of, words
+from wirebayes.effects import catalogue, source_of
+from wirebayes.errors import InputError
+from wirebayes.io.run_folder import check_run, open_run
+from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
+from wirebayes.strict.files import PathLike
+from wirebayes.views.result import ResultFolder
+from wirebayes.views.simulated_tests import SimulatedTests
+from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.protocol import Control
+
+
+def simulate_tests(
+    *,
+    tests: int = 1,
+    lengths: Numbers = (1000.0,),
+    displacements: Numbers = tuple(range(1, 13)),
+    weights: Numbers = (),
+    unload: int = 0,
+    times: Numbers = (0.0, 30.0, 60.0, 90.0, 120.0),
+    unrecorded: Sequence[int] = (),
+    temperature: Numbers = (),
+    resolution: float = 0.01,
+    parameters: Mapping[str, float] | None = None,
+    effects: str | Sequence[str] | Mapping[str, float] = (),
+    own_effects: PathLike | None = None,
+    elastic_law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    seed: int = 0,
+    output: PathLike | None = None,
+) -> SimulatedTests:
+    """Simulate tests with known truth.
+
+    Parameters
+    ----------
+    tests : int
+        Number of lines tested, each with its own true parameters.
+    lengths : sequence of float
+        Zero-tension lengths, mm; one sample of each line for each length.
+    displacements : sequence of float
+        One a hold, mm.
+    weights : sequence of float
+        One a hold, N, in place of displacements: tensions are set, and displacements are read.
+    unload : int
+        Then so many holds back down through the same displacements or weights.
+    times : sequence of float
+        Reading times of a hold, s.
+    unrecorded : sequence of int
+        Holds without readings.
+    temperature : sequence of float
+        Temperatures at evenly spaced moments of the test, °C.
+    resolution : float
+        Rounding of the tensions, N, or of the displacements under weights, mm; 0 for none.
+    parameters : mapping of name to value, optional
+        Such as ``{"k1": 700}``; parameters not given are drawn from the prior.
+    effects : mapping of ``NAME.p`` to value, or sequence of ``NAME.p=VALUE`` or ``NAME``
+        Such as ``{"strain_stiffening.c": 12}`` or ``["grip_slip@7.w=0.2"]``; drawn from the prior without a value.
+    own_effects : path, optional
+        A Python file with effects of your own.
+    elastic_law, history
+        As in `fit`.
+    seed : int
+    output : path, optional
+        Folder for the files; a temporary one when left out.
+
+    Returns
+    -------
+    SimulatedTests
+        ``experiments`` are the tests, `summary` is the content of ``truth.json``.
+
+    Raises
+    ------
+    InputError
+        Something that was given is wrong.
+
+    Examples
+    --------
+    >>> made = wb.simulate_tests(displacements=[1, 2, 3], parameters={"k1": 700}, seed=1)
+    >>> made.experiments[0].tension().shape
+    (3, 5)
+    >>> made.summary()["experiments"]["wire"]["parameters"]["k1"]
+    700.0
+    >>> hung = wb.simulate_tests(weights=[2, 4, 6], parameters={"k1": 700}, seed=1)
+    >>> hung.experiments[0]
+    Experiment(wire: 1000 mm of line-1, 3 holds, 15 readings, tensions set)
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    own, seed = path_of(own_effects), check_seed(seed)
+    chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
+    found, amplitudes = _effects(effects, own)
+    chosen |= amplitudes
+    tests = check_whole("--tests", tests, 1)
+    sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
+    control: Control = "force" if text_of(weights) else "displacement"
+    option, given = ("--weights", weights) if control == "force" else ("--displacements", displacements)
+    path = _path(option, given, unload)
+    gaps = frozenset(unrecorded)
+    _check_protocol(control, path, sizes, moments, gaps)
+    warmth = _numbers("--temperature", temperature) if text_of(temperature) else []
+    benches = [
+        Bench(
+            _name(tests, sizes, i, length), f"line-{i + 1}", length,
+            times_s=moments, unrecorded=gaps, temperatures_C=warmth,
+        ).setting(control, path, float(resolution))
+        for i in range(tests)
+        for length in sizes
+    ]  # fmt: skip
+    truth = Truth(chosen, tuple(found.values()), elastic_law, history)
+    configuration = {
+        "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
+        ("weights_N" if control == "force" else "displacements_mm"): path, "times_s": moments,
+        "unrecorded": sorted(gaps), "temperatures_C": warmth,
+        f"resolution_{READ_UNIT[control]}": float(resolution), "parameters": chosen, "effects": list(found),
+        "own_effects": source_of(own),
+        "elastic_law": elastic_law, "history": history,
+    }  # fmt: skip
+    place = ResultFolder.at(output)
+    if check_run(place.path, configuration) == "new":
+        draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made
+    with open_run(place.path, configuration) as run:
+        if run.state != "done":
+            write(place.path, benches, truth, seed)
+            run.finish()
+    return SimulatedTests(place, own, computed=run.state != "done")
+
+
+def _effects(
+    effects: str | Sequence[str] | Mapping[str, float], own: Path | None
+) -> tuple[dict[str, Effect], dict[str, float]]:
+    """The effects by key, and the amplitudes that were given."""
+    found: dict[str, Effect] = {}
+    given: dict[str, float] = {}
+    known = catalogue(own)
+    listed = [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else words(effects)
+    for text in listed:
+        effect, amplitudes = effect_option(text, known)
+        found[effect.key] = effect
+        given |= amplitudes
+    return found, given
+
+
+def _path(option: str, settings: Numbers, unload: int) -> list[float]:
+    """What is set in each hold, mm or N: up as given, then so many back down."""
+    path = _numbers(option, settings)
+    if unload >= len(path):
+        raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} {option.removeprefix('--')}")
+    return path + path[-2 : -2 - unload : -1]
+
+
+def _check_protocol(
+    control: Control,
+    path: Sequence[float],
+    lengths: Sequence[float],
+    times: Sequence[float],
+    unrecorded: frozenset[int],
+) -> None:
+    """Refuse what no bench could do."""
+    if min(lengths) <= 0 or len(set(lengths)) < len(lengths):
+        raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
+    if control == "force" and min(path) <= 0:
+        raise InputError(f"--weights: found {min(path):g}, expected more than 0 N")
+    if control == "displacement" and min(path) <= -min(lengths):
+        raise InputError(f"--displacements: found {min(path):g}, expected more than -{min(lengths):g} mm, a length")
+    if times[0] < 0 or any(b <= a for a, b in zip(times, times[1:], strict=False)):
+        raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
+    if not unrecorded <= set(range(1, len(path))):
+        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {len(path) - 1}")
+
+
+def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str:
+    name = f"wire-{test + 1}" if tests > 1 else "wire"
+    return name if len(lengths) == 1 else f"{name}-{length:g}mm"
+
+
+def _numbers(option: str, values: Numbers) -> list[float]:
+    return [number(option, word) for word in text_of(values).split(",")]

@@ -1,0 +1,361 @@
+"""Inputs of the robot's commands: a fitted wire, the robot's description, and the configuration of the run."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from wirebayes._version import __version__
+from wirebayes.commands.predict import one_of
+from wirebayes.effects import source_of
+from wirebayes.errors import InputError
+from wirebayes.inference.between_specimens import between_specimens
+from wirebayes.json_files.plain import plain
+from wirebayes.results import store
+from wirebayes.results.store import Stored
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, lines_of, material
+from wirebayes.robot.motion.hanging import at_home
+from wirebayes.strict.files import PathLike
+from wirebayes.views.findings import Findings
+from wirebayes.views.posterior import POSTERIOR, Posterior, Posteriors
+
+RobotLike = PathLike | Robot
+Line = PathLike | Posterior | Posteriors | Findings
+Specimens = Line | Sequence[Line]  # a line, known from one test or from several of one material
+Wires = Specimens | Mapping[str, Specimens]  # for all legs, or by the names that legs have in the robot's file
+
+
+def read_robot(name_or_file: PathLike) -> Robot:
+    """Read a robot from a TOML file, or a shipped one by its name.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        ``linear-7``, for example; `wirebayes.robot.mechanics.schema.shipped` lists the names.
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        There is no such robot, or its file is wrong.
+
+    Examples
+    --------
+    >>> robot = wb.read_robot("linear-7")
+    >>> robot.legs, robot.degrees
+    (7, 6)
+    """
+    return schema.read(os.fspath(name_or_file))
+
+
+def robot_of(robot: RobotLike) -> Robot:
+    """The robot given, or the one read; its home orientation in balance where fewer wires than freedoms decide it."""
+    return at_home(robot if isinstance(robot, Robot) else read_robot(robot))
+
+
+def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:
+    """The posterior that decides a result; of several lines, what tells them all."""
+    if _several(wires):
+        return hash_of({name: str(_content_of(line, experiment)) for name, line in wires.items()})
+    if _is_sample(wires):
+        return str(_content_of(wires, experiment))
+    return folder_of(wires, experiment) / POSTERIOR
+
+
+def _content_of(line: Specimens, experiment: str | None) -> str:
+    """What tells the posteriors of a line from others."""
+    if _is_sample(line):
+        return hash_of({str(i): content(folder_of(one, experiment) / POSTERIOR) for i, one in enumerate(line)})
+    return content(folder_of(line, experiment) / POSTERIOR)
+
+
+def _is_sample(wires: Wires) -> TypeGuard[Sequence[Line]]:
+    """Whether several tests of one line were given."""
+    return isinstance(wires, list | tuple) and not isinstance(wires, Posteriors)
+
+
+def _several(wires: Wires) -> TypeGuard[Mapping[str, Line]]:
+    return isinstance(wires, Mapping) and not isinstance(wires, Posteriors)
+
+
+def folder_of(wires: Wires, experiment: str | None = None) -> Path:
+    """The folder with the posterior of a line; of findings, the final one."""
+    if isinstance(wires, Findings):
+        return one_of(wires.final, experiment).folder
+    if isinstance(wires, Posteriors):
+        return one_of(wires, experiment).folder
+    if isinstance(wires, Posterior):
+        return wires.folder
+    if not isinstance(wires, str | os.PathLike):
+        raise InputError(f"wires: found {type(wires).__name__}, expected a Posterior or a folder with a posterior.nc")
+    return Path(wires)
+
+
+def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
+    """Draws of a fitted line in the form that the robot takes.
+
+    Parameters
+    ----------
+    wires : path, Posterior, Posteriors, Findings, or mapping of wire name to one of them
+        A folder with a ``posterior.nc``, or what `fit` or `discover` returned.
+    count : int
+        Largest number of draws.
+    experiment : str, optional
+        May be left out where there is one.
+    own_effects : Path, optional
+        File of a user's own effects, for a folder.
+
+    Returns
+    -------
+    WireDraws
+
+    Raises
+    ------
+    InputError
+        If there is no posterior, or its model cannot be used on a robot.
+    """
+    if _several(wires):
+        return _together({name: draws_of(line, count, experiment, own_effects) for name, line in wires.items()})
+    if _is_sample(wires):
+        return _sample(wires, count, experiment, own_effects)
+    if isinstance(wires, Posteriors | Findings):
+        wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)
+    if isinstance(wires, Posterior):
+        return _usable(wires.stored(experiment), wires.name, count)
+    return read_wires(folder_of(wires), count, experiment, own_effects)
+
+
+def draws_for(
+    robot: Robot, wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None
+) -> WireDraws:
+    """`draws_of` for a robot, whose legs must fit the lines.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : path, Posterior, Posteriors or Findings
+        As for `draws_of`.
+    count : int
+        Largest number of draws.
+    experiment : str, optional
+        May be left out where there is one.
+    own_effects : Path, optional
+        File of a user's own effects, for a folder.
+
+    Returns
+    -------
+    WireDraws
+
+    Raises
+    ------
+    InputError
+        If there is no posterior, or the lines and the robot's legs do not fit together.
+    """
+    line = draws_of(wires, count, experiment, own_effects)
+    lines_of(robot, line)
+    idle = [name for name in line.each if name not in robot.wire]
+    if line.others and idle:
+        raise InputError(
+            f"--wires: found {idle[0]}, expected one of the legs' wires: {', '.join(sorted({*robot.wire}))}"
+        )
+    return line
+
+
+def _together(lines: dict[str, WireDraws]) -> WireDraws:
+    """Lines of differently named wires, as many draws of each; draws of two lines have nothing to do with another."""
+    if not lines:
+        raise InputError("wires: found no line, expected one or more")
+    name, first = next(iter(lines.items()))
+    count = min(line.count for line in lines.values())
+    rng = np.random.default_rng(0)
+    for other, line in lines.items():
+        for what, a, b in (("elastic-law", first.law, line.law), ("history", first.history, line.history)):
+            if a != b:
+                raise InputError(
+                    f"--wires: found {name} fitted with --{what} {a} and {other} with {b}; expected one for all wires"
+                )
+        order = slice(0, count) if line is first else rng.permutation(line.count)[:count]
+        lines[other] = replace(line.part(order), name=other)
+    first = lines.pop(name)
+    return replace(first, others=lines)
+
+
+def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effects: Path | None) -> WireDraws:
+    """A line known from several specimens: what they have in common, and how they differ."""
+    folders = [folder_of(line, experiment) for line in lines]
+    if len(folders) < 2:
+        raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
+    tests = [store.load(folder, experiment, own_effects) for folder in folders]
+    ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
+    first = ones[0]
+    for folder, one in zip(folders, ones, strict=True):
+        if one.material() or LENGTH_EXPONENT in one.parameters:
+            raise InputError(f"{folder}: found a fit with effects, expected plain fits where specimens are compared")
+        if (one.law, one.history) != (first.law, first.history):
+            raise InputError(
+                f"{folder}: found a fit with {one.law} and {one.history}, expected {first.law} and {first.history} as "
+                f"in {folders[0]}"
+            )
+    logarithms = []
+    for stored, one in zip(tests, ones, strict=True):
+        values = np.log(np.column_stack([stored.draws[name] for name in CORE]))
+        values[:, CORE.index("B")] += np.log(first.length_mm / one.length_mm)  # creep is a strain
+        logarithms.append(values)
+    before = store.prior_draws(folders[0], experiment)
+    log_prior = np.log(np.column_stack([before[name] for name in CORE]))
+    prior = log_prior.mean(0), np.cov(log_prior.T)
+    found = between_specimens(logarithms, prior, count, np.random.default_rng(0))
+    tension = np.array([one.tension_range_N or (0.0, 0.0) for one in ones])
+    time = np.array([one.time_range_s or (0.0, 0.0) for one in ones])
+    return replace(
+        first,
+        parameters=dict(zip(CORE, np.exp(found.mean).T, strict=True)),
+        effects=(),
+        tension_range_N=(float(tension.min()), float(tension.max())),
+        time_range_s=(float(time.min()), float(time.max())),
+        spread=dict(zip(CORE, found.spread.T, strict=True)),
+        specimens=len(ones),
+        doubts=tuple(doubt for one in ones for doubt in one.doubts),
+    )
+
+
+def named_lines(texts: Sequence[str]) -> Wires:
+    """What ``--wires`` was given: a line, or several times ``NAME=LINE``; a line is a folder, or some with commas."""
+    pairs = [text.partition("=") for text in texts]
+    if len(texts) == 1 and (not pairs[0][1] or Path(texts[0]).exists()):
+        return _folders(texts[0])
+    for text, (name, sign, folder) in zip(texts, pairs, strict=True):
+        if not (name and sign and folder):
+            raise InputError(f"--wires: found {text!r} beside others; expected NAME=FOLDER for each")
+    names = [name for name, _, _ in pairs]
+    if len(set(names)) < len(names):
+        raise InputError(f"--wires: found {', '.join(names)}; expected each name once")
+    return {name: _folders(folder) for name, _, folder in pairs}
+
+
+def _folders(text: str) -> Path | list[Path]:
+    """A folder, or several with commas between."""
+    if "," not in text or Path(text).exists():
+        return Path(text)
+    return [Path(part) for part in text.split(",") if part]
+
+
+def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
+    """Draws of a fitted line, read from a folder and evenly thinned.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds a ``posterior.nc``.
+    count : int
+        Largest number of draws.
+    experiment : str, optional
+        May be left out where the posterior has one.
+    own_effects : Path, optional
+        File of a user's own effects.
+
+    Returns
+    -------
+    WireDraws
+
+    Raises
+    ------
+    InputError
+        If there is no posterior, or its model cannot be used on a robot.
+    """
+    below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
+    if below and not (folder / POSTERIOR).is_file():
+        raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
+    return _usable(store.load(folder, experiment, own_effects), str(folder), count)
+
+
+def _usable(stored: Stored, where: str, count: int) -> WireDraws:
+    """Draws of a posterior that knows the stiffness."""
+    if stored.likelihood == "hold":
+        raise InputError(
+            f"{where}: found a fit with --likelihood hold, which does not determine the stiffness k1; expected one "
+            "with --likelihood chain, for a robot needs k1"
+        )
+    return wire_draws(stored, count)
+
+
+def wire_draws(stored: Stored, count: int) -> WireDraws:
+    """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
+    sample = stored.sample
+    effects = tuple(sample.model.effects)
+    names = [*CORE, *(c for e in material(effects) for c in e.columns())]
+    pick = np.unique(np.linspace(0, len(stored.draws["k1"]) - 1, count).round().astype(int))
+    protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
+    parameters = {name: stored.draws[name][pick] for name in names}
+    if stored.length_exponent is not None:
+        parameters[LENGTH_EXPONENT] = stored.length_exponent[pick]
+    return WireDraws(
+        parameters,
+        protocol.length_mm,
+        sample.model.law,
+        sample.model.history,
+        effects,
+        (float(readings.min()), float(readings.max())),
+        (0.0, float(protocol.duration_s.max())),
+        sample.model.tension_ref_N,
+        doubts=stored.doubts,
+    )
+
+
+def configuration(
+    command: str,
+    robot: RobotLike,
+    posterior: Path | str,
+    draws: int,
+    seed: int,
+    own_effects: Path | None,
+    options: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Everything that decides the results; files by their content, not by where they lie.
+
+    Parameters
+    ----------
+    command : str
+    robot : Robot or path
+    posterior : Path
+        The file of the wires' draws.
+    draws, seed : int
+    own_effects : Path or None
+    options : mapping of name to value
+        The command's own. Their order is fixed: folders made before the names were stored have the values alone.
+
+    Returns
+    -------
+    dict
+        What ``configuration.json`` holds: another one is refused in the same folder.
+    """
+    return {
+        "command": command,
+        "version": __version__,
+        "robot": hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot)),
+        "wires": posterior if isinstance(posterior, str) else content(posterior),
+        "own_effects": source_of(own_effects),
+        "draws": draws,
+        "seed": seed,
+        "options": dict(options),
+    }
+
+
+def content(path: Path) -> str:
+    """The hash of a file, or the name where there is none."""
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else str(path)
+
+
+def hash_of(value: Mapping[str, Any]) -> str:
+    """The hash of plain values."""
+    return sha256(json.dumps(plain(value)).encode()).hexdigest()

@@ -1,0 +1,45 @@
+"""Models side by side."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from wirebayes import answers
+from wirebayes.json_files.comparison import ComparisonJson
+
+if TYPE_CHECKING:
+    pass
+
+from wirebayes.views.result import NOTHING, Given, Result, html_table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result[ComparisonJson]):
+    """Models side by side on readings that their fits have not seen.
+
+    Examples
+    --------
+    >>> comparison
+    Comparison(wire: 2 models, best exponential)
+    """
+
+    _content: ClassVar[str] = "comparison.json"
+
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [answers.of_comparison(name, table) for name, table in found.items()]
+
+    def next_step(self, given: Given = NOTHING) -> str:
+        return f"wirebayes fit {given.file} with the options of the best model, or wirebayes discover {given.file}"
+
+    def _short_form(self) -> list[str]:
+        return [
+            f"{name}: {len(table['models'])} models, best {table['models'][0]['name']}"
+            for name, table in self.summary()["experiments"].items()
+        ]
+
+    def _repr_html_(self) -> str:
+        tables = []
+        for name, table in self.summary()["experiments"].items():
+            rows = [[row["name"], row["meaning"]] for row in table["models"]]
+            tables.append(html_table(name, ["model", "meaning"], rows))
+        return "".join(tables)

@@ -1,0 +1,110 @@
+"""What the plain model is missing in each experiment."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from wirebayes import answers
+from wirebayes.errors import InputError
+from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.results import store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+from wirebayes.views.posterior import Posterior
+from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Findings(Result[DiscoveryJson]):
+    """What the plain model is missing in each experiment of a file.
+
+    Examples
+    --------
+    >>> findings.report["experiments"]["wire"]["verdict"]
+    'nothing-missing'
+    >>> findings.final["wire"].summary()["effects"]
+    []
+    """
+
+    _content: ClassVar[str] = "discovery.json"
+
+    @cached_property
+    def report(self) -> DiscoveryJson:
+        """The content of ``discovery.json``."""
+        return self.summary()
+
+    @cached_property
+    def plain(self) -> dict[str, Posterior]:
+        """Posteriors of the plain model, by experiment."""
+        return self._posteriors("plain")
+
+    @cached_property
+    def final(self) -> dict[str, Posterior]:
+        """Posteriors of the model with what was found missing, by experiment."""
+        return self._posteriors("final")
+
+    def to_datatree(self) -> "xr.DataTree":
+        """One tree with a branch ``NAME/plain`` and ``NAME/final`` for each experiment."""
+        both = [*self.plain.values(), *self.final.values()]
+        return store.datatrees({posterior.within: posterior.folder for posterior in both})
+
+    def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
+        """Draw an experiment's readings with the curves of the plain and of the final model through them.
+
+        Parameters
+        ----------
+        experiment : str, optional
+            Needed where several were judged.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; new ones when left out.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            There are several experiments and none is named, or there is none of this name.
+
+        Examples
+        --------
+        >>> findings.plot().get_legend().get_texts()[-1].get_text()
+        'the plain model, 90 % band'
+        """
+        from wirebayes.report.pictures.curve import both_on_axes  # matplotlib only where it is needed
+
+        names = sorted(self.plain)
+        if experiment is None and len(names) == 1:
+            experiment = names[0]
+        if experiment not in names:
+            raise InputError(f"experiment: found {experiment!r}, expected one of {', '.join(names)}")
+        return both_on_axes(self.plain[experiment].stored(), self.final[experiment].stored(), axes)
+
+    def _posteriors(self, model: str) -> dict[str, Posterior]:
+        return {
+            name: Posterior(self.place, self.own_effects, self.computed, name, f"{name}/{model}", alone=False)
+            for name in self.report["experiments"]
+        }
+
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [line for name, report in found.items() for line in answers.of_findings(name, report)]
+
+    def next_step(self, given: Given = NOTHING) -> str:
+        return " ".join(f"{name}: {r['next_measurement']}" for name, r in self.report["experiments"].items())
+
+    def _short_form(self) -> list[str]:
+        return [
+            " ".join([f"{name}: {found['verdict']}", ", ".join(found["effects"])]).strip()
+            for name, found in self.report["experiments"].items()
+        ]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, found["verdict"], ", ".join(found["effects"]) or "-", figure(found["p_global"])]
+            for name, found in self.report["experiments"].items()
+        ]
+        return html_table("What the plain model is missing", ["experiment", "verdict", "effects", "p"], rows)

@@ -1,0 +1,56 @@
+"""Experiments out of raw files of a bench."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+from wirebayes import answers
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.json_files.imported import ImportJson
+from wirebayes.sentences import counted
+
+if TYPE_CHECKING:
+    pass
+
+from wirebayes.views.result import NOTHING, Given, Result, html_table
+
+IMPORTED = "import.json"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedTests(Result[ImportJson]):
+    """Experiments out of raw files of a bench.
+
+    Examples
+    --------
+    >>> imported.summary()["experiments"]["bench"]["notes"][0]
+    "semicolons between cells, decimal comma; displacement from 'Weg [mm]', time from 'Zeit [s]' and tension from
+    'Kraft [N]'"
+    """
+
+    _content: ClassVar[str] = IMPORTED
+
+    @cached_property
+    def experiments(self) -> list[Experiment]:
+        """The tests as `read_experiments` reads the files that were written."""
+        return [e for name in self.summary()["experiments"] for e in read_experiments(self.folder / f"{name}.toml")]
+
+    def lines(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [line for name, test in found.items() for line in answers.of_import(name, test)]
+
+    def next_step(self, given: Given = NOTHING) -> str:
+        names = list(self.summary()["experiments"])
+        file = names[0] if len(names) == 1 else "experiments"
+        return f"look at {self.place.path / names[0]}.svg, then wirebayes check {self.place.path / file}.toml"
+
+    def _short_form(self) -> list[str]:
+        found = self.summary()["experiments"]
+        return [
+            f"{name}: {counted(each['holds'], 'hold')}, {counted(each['readings'], 'reading')}"
+            for name, each in found.items()
+        ]
+
+    def _repr_html_(self) -> str:
+        rows = [[name, note] for name, each in self.summary()["experiments"].items() for note in each["notes"]]
+        return html_table(repr(self), ["experiment", "what was understood"], rows, self.messages)

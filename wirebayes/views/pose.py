@@ -1,0 +1,86 @@
+"""A pose of a robot on creeping wires, or poses over time."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from wirebayes import answers
+from wirebayes.json_files.pose import PoseJson
+from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.robot.mechanics.draws import specimens_in_words
+
+if TYPE_CHECKING:
+    pass
+
+from wirebayes.answers import known_at_the_end
+from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pose(Result[PoseJson | PoseHistoryJson]):
+    """A pose of a robot on creeping wires: kinematics, drift and pose error with bands.
+
+    Examples
+    --------
+    >>> held.summary()["feasible"]
+    True
+    """
+
+    _content: ClassVar[str] = "pose.json"
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """The estimated spread of specimens, and the warnings."""
+        return (*specimens_in_words(self.summary()["wires"]), *super().messages)
+
+    def lines(self) -> list[str]:
+        return answers.of_pose(self.summary())
+
+    def next_step(self, given: Given = NOTHING) -> str:
+        return _after_pose(self.summary(), self.place.path, given)
+
+    def _short_form(self) -> list[str]:
+        found = self.summary()
+        if not found["feasible"]:
+            return [found["robot"], found["sentence"]]
+        drift = found["drift"][0]
+        middle = drift["distance_mm"]["q50"][-1]
+        return [found["robot"], f"drift {figure(middle)} mm after {figure(drift['times_s'][-1])} s"]
+
+    def _repr_html_(self) -> str:
+        found = self.summary()
+        if not found["feasible"]:
+            return super()._repr_html_()
+        drift = found["drift"][0]
+        far = drift["distance_mm"]
+        rows = [
+            [figure(t), figure(far["q50"][i]), f"{figure(far['q05'][i])} to {figure(far['q95'][i])}"]
+            for i, t in enumerate(drift["times_s"])
+        ]
+        return html_table(repr(self), ["time, s", "drift, mm", "90 % interval"], rows, self.messages)
+
+
+def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -> str:
+    """What to do with a pose, or where there is none."""
+    lost = "drift" in found and not any(known_at_the_end(drift) for drift in found["drift"])
+    corrections = folder / "corrections.csv"
+    if corrections.is_file():
+        if lost:
+            where = f"the column held of {folder / 'poses.csv'} says where the platform is lost"
+            return f"check joint values or poses, their units and the payload; {where}"
+        if not _has_corrections(corrections):
+            return (
+                "other commanded poses, or other bounds of the tension in the robot's file: nothing holds these poses"
+            )
+        return f"give the controller the joint values of {corrections}"
+    if lost or not found.get("feasible", True):
+        return "another pose or payload, or other bounds of the tension in the robot's file"
+    calibrate = f"wirebayes calibrate {given.file} READINGS.csv --wires {given.wires}"
+    return f"{calibrate}, once the drift is more than you allow"
+
+
+def _has_corrections(path: Path) -> bool:
+    """Whether any row has one: none has where no tensions hold the poses to which they should lead."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return any(row["change_1_mm"] for row in csv.DictReader(file))

@@ -1,0 +1,39 @@
+"""Synthetic tests with known truth."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.json_files.truth import TruthJson
+
+if TYPE_CHECKING:
+    pass
+
+from wirebayes.views.result import Result, figure, html_table
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedTests(Result[TruthJson]):
+    """Synthetic tests with known truth.
+
+    Examples
+    --------
+    >>> [test.name for test in made.experiments]
+    ['wire']
+    """
+
+    _content: ClassVar[str] = "truth.json"
+
+    @cached_property
+    def experiments(self) -> list[Experiment]:
+        """The tests as `read_experiments` reads them."""
+        return read_experiments(self.folder / "experiments.toml")
+
+    def _short_form(self) -> list[str]:
+        return [e.name for e in self.experiments]
+
+    def _repr_html_(self) -> str:
+        truth = self.summary()["experiments"]
+        rows = [[name, p, figure(v)] for name, t in truth.items() for p, v in t["parameters"].items()]
+        return html_table(repr(self), ["test", "parameter", "true value"], rows)
