@@ -31,7 +31,7 @@ LAYERS: list[set[str]] = [
 ]
 NEUTRAL = {"errors", "notice", "json_files", "numeric", "sentences", "strict"}
 ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
-MAY_USE_ROBOT = {"report", "paper", "commands", "app", "cli", "__init__"}
+MAY_USE_ROBOT = {"report", "paper", "views", "commands", "app", "cli", "__init__"}
 
 
 def imports() -> set[tuple[str, str, str]]:
