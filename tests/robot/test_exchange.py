@@ -1,5 +1,8 @@
 """Robots of CASPR and WireX: files as those programs write them become the same robot; the rest is refused."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -128,6 +131,31 @@ def test_a_robot_of_caspr_is_read(name, rolling, tmp_path):
         assert "toy_bodies.xml and toy_cables.xml, cable set 'original'" in got.source
         assert "have bounds of their own" in got.source
         assert (got.lower_m <= got.home_m).all() and (got.home_m <= got.upper_m).all()
+
+
+@pytest.mark.parametrize(("joint", "axes"), [("PLANAR_XY", "xyz"), ("PLANAR_XZ", "xzy"), ("PLANAR_YZ", "yzx")])
+def test_a_planar_joint_of_caspr_is_a_rail(joint, axes, tmp_path):
+    """Two coordinates along the plane, then the turn about its normal; wires of a square hold it at every height."""
+    first, second, normal = ("xyz".index(axis) for axis in axes)
+    corners = np.zeros((4, 3))
+    corners[:, [first, second]] = [[2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]]
+    plain = schema.read("sled-4")
+    robot = replace(plain, exit_m=corners, platform_m=0.1 * corners[[1, 0, 3, 2]], home_m=np.zeros(3), mass_kg=0.1)
+    bodies = _caspr(tmp_path, robot)
+    given = re.sub('type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.3 -0.2 0.1"',
+                   bodies.read_text())  # fmt: skip
+    bodies.write_text(given)
+    got = schema.read(import_robot(bodies, tmp_path / "toy.toml"))
+    home = np.zeros(3)
+    home[[first, second]] = 0.3, -0.2
+    np.testing.assert_allclose(got.home_m, home)
+    np.testing.assert_allclose(got.home_rotation_rad, 0.1 * np.eye(3)[normal])
+    assert got.plane.contact == "rail" and got.freedoms == 3
+    np.testing.assert_array_equal(got.plane.normal, np.eye(3)[normal])
+    assert got.lower_m[normal] == got.upper_m[normal] == 0.0
+    assert "a rail" in got.source
+    tension = inverse.tensions(got, got.home_m[None], rotation.matrix(got.home_rotation_rad)[None])
+    assert np.isfinite(tension).all()
 
 
 def test_what_is_given_beside_the_files_counts(tmp_path):

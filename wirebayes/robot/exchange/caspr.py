@@ -16,10 +16,13 @@ from wirebayes.robot.mechanics.description import Freedom
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.strict.xml_file import Element
 
-_JOINTS: dict[str, tuple[Freedom, tuple[int, ...]]] = {  # freedom, and the axes that the first coordinates move along
-    "SPATIAL_EULER_XYZ": ("pose", (0, 1, 2)),
-    "T_XYZ": ("position", (0, 1, 2)),
-    "P_XZ": ("position", (0, 2)),
+_JOINTS: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {  # axes of the coordinates: moved along, turned about
+    "SPATIAL_EULER_XYZ": ((0, 1, 2), (0, 1, 2)),
+    "T_XYZ": ((0, 1, 2), ()),
+    "P_XZ": ((0, 2), ()),
+    "PLANAR_XY": ((0, 1), (2,)),
+    "PLANAR_XZ": ((0, 2), (1,)),
+    "PLANAR_YZ": ((1, 2), (0,)),
 }
 
 
@@ -41,11 +44,13 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
     joint, physical = link.one("joint"), link.one("physical")
     kind = joint.attribute("type")
     if kind not in _JOINTS:
-        raise joint.fail(f"the type {kind!r}", f"a free platform: {', '.join(_JOINTS)}")
-    freedom, axes = _JOINTS[kind]
+        raise joint.fail(f"the type {kind!r}", f"a free platform or one in a plane: {', '.join(_JOINTS)}")
+    moves, turns = _JOINTS[kind]
+    freedom: Freedom = "pose" if turns else "position"
+    normal = np.eye(3)[turns[0]] if len(turns) == 1 else None
     centre = physical.one("com_location").vector()
     base = link.one("parent").one("location").vector()
-    home, turn = _home(joint, freedom, axes, base)
+    home, turn = _home(joint, moves, turns, base)
     chosen = _set(cables, cable_set)
     legs = [_leg(cable, centre) for cable in chosen.children if cable.tag.startswith("cable_")]
     if len(legs) < 2:
@@ -55,6 +60,8 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
     notes = ["Lengths, mass and bounds of the tensions are that file's; its stiffnesses are left out."]
     if np.ptp(low) or np.ptp(high):
         notes.append("Its cables have bounds of their own: the highest force_min and the lowest force_max are taken.")
+    if normal is not None:
+        notes.append("Its planar joint is a rail: the plane holds the platform both ways.")
     names = " and ".join(Path(root.file).name for root in (bodies, cables))
     return ImportedRobot(
         link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
@@ -62,7 +69,7 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
         freedom, physical.one("mass").number(), centre,
         np.array([leg.exit_m for leg in legs]), np.array([leg.platform_m for leg in legs]),
         np.array([leg.pulley_radius_m for leg in legs]), np.array([leg.swivel_axis for leg in legs]),
-        (float(low.max()), float(high.min())), home, turn, tuple(notes),
+        (float(low.max()), float(high.min())), home, turn, tuple(notes), normal=normal,
     )  # fmt: skip
 
 
@@ -77,18 +84,27 @@ def _platform(bodies: Element) -> Element:
     return bodily[0]
 
 
-def _home(joint: Element, freedom: Freedom, axes: tuple[int, ...], base: Floats) -> tuple[Floats | None, Floats]:
-    """Position and rotation vector of ``q_initial``; angles turn about x, then y, then z of the turned platform."""
+def _home(joint: Element, moves: tuple[int, ...], turns: tuple[int, ...], base: Floats) -> tuple[Floats | None, Floats]:
+    """Position and rotation vector of ``q_initial``; each angle turns about an axis of the platform as turned so far.
+
+    Parameters
+    ----------
+    joint : Element
+    moves, turns : tuples of int
+        Axes that the first coordinates move along, and that the others turn about.
+    base : (3,) array
+        Position where all coordinates are zero.
+    """
     if "q_initial" not in joint.attributes:
         return None, np.zeros(3)
     words = Element(joint.file, joint.tag, joint.line, {}, text=joint.attributes["q_initial"])
-    q = words.vector(6 if freedom == "pose" else len(axes))
+    q = words.vector(len(moves) + len(turns))
     position = np.array(base)
-    position[list(axes)] += q[: len(axes)]
-    if freedom == "position":
-        return position, np.zeros(3)
-    about = [matrix(angle * np.eye(3)[k]) for k, angle in enumerate(q[3:])]
-    return position, vector(about[0] @ about[1] @ about[2])
+    position[list(moves)] += q[: len(moves)]
+    turned = np.eye(3)
+    for axis, angle in zip(turns, q[len(moves) :], strict=True):
+        turned = turned @ matrix(angle * np.eye(3)[axis])
+    return position, vector(turned)
 
 
 def _set(cables: Element, name: str | None) -> Element:

@@ -31,6 +31,8 @@ class ImportedRobot:
         What was left out or decided on the way, a sentence each.
     lines, beyond_m : (w,) arrays or None
         Parallel lines of each wire, and wire beyond its exit point, where the file says so.
+    normal : (3,) array or None
+        Of the plane in which a rail holds the platform.
     """
 
     name: str
@@ -48,6 +50,7 @@ class ImportedRobot:
     notes: tuple[str, ...]
     lines: Floats | None = None
     beyond_m: Floats | None = None
+    normal: Floats | None = None
 
 
 def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Floats) -> str:
@@ -61,6 +64,8 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
     """
     extent = np.ptp(robot.exit_m, axis=0)
     half = _SHARE * np.where((np.arange(3) == 2) & (extent == 0), extent.max(), extent)
+    if robot.normal is not None:
+        half = half * (robot.normal == 0)
     beyond = ", beyond_exit_m" if robot.beyond_m is None else ""
     ours = f"Ours: the choice of tensions, the workspace{beyond}" + _given(robot, tension_N, home_m)
     source = [_text(line)[1:-1] for line in (robot.source, *robot.notes, ours + ".")]
@@ -90,6 +95,8 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
         f"lower_m = {_row((home_m - half).round(6))}",
         f"upper_m = {_row((home_m + half).round(6))}",
     ]
+    if robot.normal is not None:
+        lines += ["", "[plane]", f"normal = {_row(robot.normal)}", 'contact = "rail"']
     legs = zip(robot.exit_m, robot.platform_m, robot.pulley_m, robot.axis, strict=True)
     for i, (exit_m, point, radius, axis) in enumerate(legs):
         lines += ["", "[[leg]]", f"exit_point_m = {_row(exit_m)}", f"platform_point_m = {_row(point)}"]
