@@ -206,7 +206,7 @@ def test_every_page_stands_in_one_of_the_five_parts():
 THETA = {"k1": 1545.0, "B": 2.0, "U": 0.14, "k2": 0.015, "N": 0.5, "preload": 1.0}
 
 
-ROBOTS = (DOCS / "robot.rst").read_text(encoding="utf-8")
+OPTIONS, KEYS = ((DOCS / f"robot-{page}.rst").read_text(encoding="utf-8") for page in ("options", "file"))
 
 
 @pytest.mark.parametrize("command", ["pose", "calibrate", "export"])
@@ -215,7 +215,7 @@ def test_the_page_on_robots_has_every_option(command):
 
     app = typer.Typer(add_completion=False)
     app.command()(getattr(importlib.import_module("wirebayes.cli.robot"), command))
-    after = ROBOTS.split(f"\n``{command}``\n{'^' * (len(command) + 4)}\n")[1]
+    after = OPTIONS.split(f"\n``{command}``\n{'^' * (len(command) + 4)}\n")[1]
     listed = re.findall(r"\* - ``(--[a-z-]+)", after.split("^^^^")[0])
     options = [name for one in typer.main.get_command(app).params for name in one.opts if name.startswith("--")]
     assert sorted({*listed, "--json", "--quiet"}) == sorted({*options, "--json", "--quiet"})
@@ -236,7 +236,7 @@ def test_the_page_on_robots_has_every_key_of_a_robots_file(monkeypatch):
     wire = "[wires.own]\nk1_N = 800\nB_mm = 0.3\nU = 0.8\nk2 = 0.03\nN = 0.64\nlength_mm = 1000\n"
     schema.parse(text.replace("[[leg]]\n", leg) + wire, "whole")
     schema.read("linear-7")
-    known = set(re.findall(r"[A-Za-z]\w+|[UN]\b", " ".join(re.findall(r"\* - (.+)", ROBOTS))))
+    known = set(re.findall(r"[A-Za-z]\w+|[UN]\b", " ".join(re.findall(r"\* - (.+)", KEYS))))
     missing = {key for key in asked if key.rpartition(".")[2] not in known and key != "wires.own"}
     assert len(asked) > 40
     assert not missing

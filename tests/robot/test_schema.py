@@ -153,6 +153,6 @@ def test_every_key_of_a_robots_file_is_documented():
     for name in schema.shipped():
         used |= set(re.findall(r"^(\w+) =", (root / "data" / "robots" / f"{name}.toml").read_text(), re.MULTILINE))
     assert len(used) > 15
-    for page in (root / "data" / "robots" / "README.md", root / "docs" / "robot.rst"):
+    for page in (root / "data" / "robots" / "README.md", root / "docs" / "robot-file.rst"):
         text = page.read_text()
         assert [key for key in sorted(used | OPTIONAL) if f"{key}" not in text] == []
