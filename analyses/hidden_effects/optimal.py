@@ -95,11 +95,11 @@ def ninety_percent_sets(probability: Array) -> Mask:
 def judge(case: Case, draws: int = 200) -> dict[str, Any]:
     """Group, separability and, for a catalogue effect, the ideal judge's rates on fresh noise, given its detection."""
     geo = case.geo
-    candidates = library(case.rig, values=4)
-    sizes, curves = delta_curves(geo, candidates)
     result: dict[str, Any] = {"key": case.spec.key}
     share = [float(np.linalg.norm(geo.whiten(geo.floor)[0, part])) for part in case.rig.bench_slices]
     if case.hidden:
+        candidates = library(case.rig, values=4)
+        sizes, curves = delta_curves(geo, candidates)
         z = signature(geo, [list(case.hidden)])[0]
         hidden = simulate(case.rig, members=members(case.rig, [list(case.hidden)]))[0]
         result["delta_after_refit"] = delta_after_refit(case.rig, geo.chol, hidden)
