@@ -36,6 +36,17 @@ def test_help_names_every_command_and_loads_nothing_heavy():
         assert command.summary.split()[0] in result.stdout
 
 
+def test_reading_a_bench_file_loads_no_library_of_posteriors(tmp_path):
+    bench = DATA.parent / "docs" / "example" / "bench.csv"
+    code = (
+        "import sys; from wirebayes.cli import main\n"
+        f"assert main(['import', {str(bench)!r}, '--length-mm', '1200', '--material', 'x', '--output', 'w']) == 0\n"
+        "print([m for m in ('pandas', 'xarray', 'arviz_base', 'arviz_stats') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize("columns", [50, 80, 200])
 def test_help_is_what_typer_would_say(columns, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(columns))

@@ -12,6 +12,7 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import Likelihood, build
 from wirebayes.processes.workers import cores, workers
+from wirebayes.results.store import save, save_summary
 from wirebayes.wire.laws import ElasticLaw, History
 
 
@@ -162,8 +163,6 @@ def store(job: Job, result: Fit, directory: Path, seed: int, policy: Policy, *, 
     draws : bool
         Write the posterior draws, not only their summary.
     """
-    from wirebayes.results.store import save, save_summary  # loads xarray, which takes a second
-
     about = job.provenance | {"seed": seed, "policy": vars(policy)}
     samples = result.problem.samples if job.apart else (None,)
     for place, sample in zip(job.folders, samples, strict=True):

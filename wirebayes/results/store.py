@@ -1,22 +1,20 @@
-"""Results on disk: netCDF that ArviZ reads, and a summary in JSON. The only module that knows xarray and ArviZ."""
+"""Results on disk: netCDF that ArviZ reads, and a summary in JSON. The only module that makes objects of xarray."""
 
 import json
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import arviz_base
-import arviz_stats
 import numpy as np
-import xarray as xr
+from numpy.typing import NDArray
 
 from wirebayes._version import __version__
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
+from wirebayes.inference.array_statistics import array_statistics
 from wirebayes.inference.fit import Fit
 from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.io.run_folder import read_json, stored_results, write_bytes, write_json
@@ -28,8 +26,9 @@ from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.numeric.typing import Array
-from wirebayes.results import hold_ends, posterior_checks
+from wirebayes.results import hold_ends, netcdf, posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability
+from wirebayes.results.netcdf import Group, Variable
 from wirebayes.results.stored_check import check
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect
@@ -37,12 +36,16 @@ from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control, Protocol
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 # a hold of the paper, and what a robot on the wire works through
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
 _PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
 _READING, _SETTING = "reading", "setting"  # of steps and weights together
 _MODEL = ("posterior", "observed_data", "constant_data")  # groups that say what was fitted, and the draws
+_PRIOR_DRAWS = 2000  # a 5 % quantile is then one between 4.2 % and 5.8 %
 _CHUNK = 2000  # draws at a time: bounds the memory
 
 
@@ -63,8 +66,11 @@ def save(
         Store the parameters of this sample alone, under their plain names; otherwise all samples, with a dimension
         ``experiment``. A problem of one sample needs none.
     """
-    tree = _tree(fit, _alone(fit, sample), provenance, np.random.default_rng(seed))
-    write_bytes(folder / "posterior.nc", _netcdf(tree))
+    alone = _alone(fit, sample)
+    groups = _groups(fit, alone, provenance, np.random.default_rng(seed))
+    about = groups["posterior"].attributes
+    whole = {key: about[key] for key in ("wirebayes_version", "inference_library", "provenance")}
+    write_bytes(folder / "posterior.nc", netcdf.content(groups, whole))
     return save_summary(fit, folder, sample=sample)
 
 
@@ -86,17 +92,6 @@ def save_summary(fit: Fit, folder: Path, *, sample: Sample | None = None) -> Sum
 def _alone(fit: Fit, sample: Sample | None) -> Sample | None:
     """The sample that is stored under plain names; None where several are stored together."""
     return fit.problem.samples[0] if sample is None and len(fit.problem.samples) == 1 else sample
-
-
-def _netcdf(tree: xr.DataTree) -> bytes:
-    """The content of a netCDF file, made in memory: HDF5 itself may end the process where a disk is full."""
-    if "dask" not in sys.modules:
-        return bytes(tree.to_netcdf(engine="h5netcdf"))
-    import dask
-
-    # on a cluster's worker xarray would ask the scheduler for a lock of what no other can see
-    with dask.config.set(scheduler="synchronous"):
-        return bytes(tree.to_netcdf(engine="h5netcdf"))
 
 
 @dataclass(frozen=True)
@@ -144,14 +139,14 @@ class Stored:
 def experiments_in(path: Path) -> tuple[str, ...]:
     """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
     with _opened(path, "posterior") as groups:
-        return tuple(str(name) for name in json.loads(groups["posterior"].attrs["experiments"]))
+        return tuple(str(name) for name in json.loads(groups["posterior"].attributes["experiments"]))
 
 
 @contextmanager
-def _opened(path: Path, *groups: str) -> Iterator[dict[str, xr.Dataset]]:
-    """Some groups of a ``posterior.nc``, for each costs time to open; whatever is wrong there is an `InputError`."""
-    with stored_results(path), ExitStack() as stack:
-        yield {g: stack.enter_context(xr.open_dataset(path, group=g, engine="h5netcdf")) for g in groups}
+def _opened(path: Path, *groups: str) -> Iterator[dict[str, Group]]:
+    """Some groups of a ``posterior.nc``, for each costs time to read; whatever is wrong there is an `InputError`."""
+    with stored_results(path):
+        yield netcdf.read(path, groups)
 
 
 def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
@@ -184,10 +179,10 @@ def load(folder: Path, experiment: str | None = None, own_effects: Path | None =
         return replace(stored, doubts=_doubts(groups, stored.sample.name, folder / "summary.json"))
 
 
-def _doubts(groups: Mapping[str, xr.Dataset], name: str, summary: Path) -> tuple[Notice, ...]:
+def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Notice, ...]:
     """What a fit says against using it, and its check, which is in the summary beside it if there was one."""
     out = []
-    if not groups["posterior"].attrs.get("converged", 1):
+    if not groups["posterior"].attributes.get("converged", 1):
         text = f"the fit of {name} has not converged: nothing that follows from it is to be relied on"
         out.append(Notice("not-converged", text))
     check = read_json(summary).get("model_check") if summary.is_file() else None
@@ -207,21 +202,20 @@ def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:
         return [(_stored(groups, path, at), _prior(groups, at)) for at in range(len(_names_in(groups, path)))]
 
 
-def _names_in(groups: Mapping[str, xr.Dataset], path: Path) -> list[str]:
-    about = groups["posterior"].attrs
+def _names_in(groups: Mapping[str, Group], path: Path) -> list[str]:
+    about = groups["posterior"].attributes
     if "wirebayes_version" not in about:
         raise InputError(f"{path}: not a posterior of wirebayes")
     names: list[str] = json.loads(about["experiments"])
     return names
 
 
-def _stored(groups: Mapping[str, xr.Dataset], path: Path, at: int, own_effects: Path | None = None) -> Stored:
+def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path | None = None) -> Stored:
     """The posterior of the experiment at this place among those of the file."""
     posterior, observed, constant = (groups[name] for name in _MODEL)
-    about = posterior.attrs
+    about = posterior.attributes
     names = json.loads(about["experiments"])
-    posterior = posterior.isel(experiment=at) if "experiment" in posterior.dims else posterior
-    draws = {str(n): np.ascontiguousarray(v.values.reshape(-1)) for n, v in posterior.data_vars.items()}
+    draws = _one_of(posterior, at)
     lengths = json.loads(about["lengths_mm"])
     keys, known = json.loads(about["effects"]), catalogue(own_effects)
     model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
@@ -231,9 +225,9 @@ def _stored(groups: Mapping[str, xr.Dataset], path: Path, at: int, own_effects: 
         reference = float(np.exp(np.mean(np.log(lengths))))
         draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
         draws = _by_length(draws, model.effects, lengths[at], reference)
-    if "reference_C" not in constant.attrs:
+    if "reference_C" not in constant.attributes:
         raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
-    reference_C = json.loads(constant.attrs["reference_C"])[at]
+    reference_C = json.loads(constant.attributes["reference_C"])[at]
     if "controls" not in about:
         raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
     control = json.loads(about["controls"])[at]
@@ -244,38 +238,46 @@ def _stored(groups: Mapping[str, xr.Dataset], path: Path, at: int, own_effects: 
     return Stored(draws, sample, about["likelihood"], exponent)
 
 
+def _one_of(group: Group, at: int) -> dict[str, Array]:
+    """Draws of each parameter, (n,), of the experiment at this place, where there are several."""
+    draws = {}
+    for name, (dims, values) in group.variables.items():
+        own = values.take(at, axis=dims.index("experiment")) if "experiment" in dims else values
+        draws[name] = np.ascontiguousarray(own.reshape(-1))
+    return draws
+
+
 def _measured(
-    constant: Any, observed: Any, name: str, length_mm: float, reference_C: float | None, control: Control
+    constant: Group, observed: Group, name: str, length_mm: float, reference_C: float | None, control: Control
 ) -> tuple[Protocol, Array]:
     """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
     read_as = READ[control] if READ[control] in observed else _READING
     set_as = SET[control] if SET[control] in constant else _SETTING
-    own = constant["hold"].values
-    if "experiment" in constant.coords:
-        own = own[constant["experiment"].values == name]
-    here, measured = constant.sel(hold=own), observed[read_as].sel(hold=own).values
+    holds = constant["hold"]
+    own = constant["experiment"] == name if "experiment" in constant else np.full(len(holds), True)
+    if not np.array_equal(observed["hold"], holds):
+        raise ValueError("readings and holds that do not belong together")
+    here = {key: constant[key][own] for key in (set_as, "duration_s", "time_s")}
+    measured = observed[read_as][own]
     width = int(np.isfinite(measured).sum(axis=1).max())
-    before = np.zeros(0, int)
-    if "unrecorded_hold" in here.dims:
-        if "unrecorded_experiment" in here:
-            here = here.isel(unrecorded_hold=here["unrecorded_experiment"].values == name)
-        before = here["unrecorded_before_hold"].values
-    number = here["number" if "number" in here.coords else "hold"].values
+    before, unrecorded = np.zeros(0, int), dict[str, Array]()
+    if "unrecorded_before_hold" in constant:
+        mine = constant["unrecorded_experiment"] == name
+        before = constant["unrecorded_before_hold"][mine]
+        unrecorded = {key: constant[f"unrecorded_{key}"][mine] for key in (set_as, "duration_s")}
+    number = constant["number" if "number" in constant else "hold"][own]
     # An unrecorded hold stands before the recorded one it names; several keep their order.
     place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
 
-    def whole(recorded: Array, unrecorded: Array | None = None) -> Array:
-        none = np.full((len(before), *recorded.shape[1:]), np.nan) if unrecorded is None else unrecorded
+    def whole(recorded: Array, others: Array | None = None) -> Array:
+        none = np.full((len(before), *recorded.shape[1:]), np.nan) if others is None else others
         return np.concatenate([none, recorded])[place]
 
-    readings, times = (whole(values)[:, :width] for values in (measured, here["time_s"].values))
+    readings, times = (whole(values)[:, :width] for values in (measured, here["time_s"]))
     mask = np.isfinite(readings)
     if not np.array_equal(mask, np.isfinite(times)):
         raise ValueError("readings and times that do not belong together")
-    setting, duration = (
-        whole(here[key].values, here[f"unrecorded_{key}"].values if len(before) else None)
-        for key in (set_as, "duration_s")
-    )
+    setting, duration = (whole(here[key], unrecorded.get(key)) for key in (set_as, "duration_s"))
     protocol = Protocol(
         length_mm,
         setting,
@@ -283,7 +285,7 @@ def _measured(
         mask,
         duration,
         whole(number, np.full(len(before), -1)).astype(np.int64),
-        None if reference_C is None else np.nan_to_num(whole(here["warming_K"].values)[:, :width]),
+        None if reference_C is None else np.nan_to_num(whole(constant["warming_K"][own])[:, :width]),
         reference_C,
         control,
     )
@@ -291,16 +293,20 @@ def _measured(
     return protocol, np.pad(np.nan_to_num(readings), [(0, 0), (0, padding)])
 
 
-def datatree(folder: Path) -> xr.DataTree:
+def datatree(folder: Path) -> "xr.DataTree":
     """The whole content of a folder's ``posterior.nc``, in memory."""
+    import xarray as xr  # for users; no command makes such objects
+
     path = folder / "posterior.nc"
     with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
         loaded: xr.DataTree = tree.load()
         return loaded
 
 
-def datatrees(folders: Mapping[str, Path]) -> xr.DataTree:
+def datatrees(folders: Mapping[str, Path]) -> "xr.DataTree":
     """The content of several ``posterior.nc`` in memory, each a branch under its name."""
+    import xarray as xr  # as above
+
     groups = {
         f"{name}{path}".rstrip("/"): group
         for name, folder in folders.items()
@@ -317,78 +323,82 @@ def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]
         return _prior(groups, names.index(experiment or names[0]))
 
 
-def _prior(groups: Mapping[str, xr.Dataset], at: int) -> dict[str, Array]:
+def _prior(groups: Mapping[str, Group], at: int) -> dict[str, Array]:
     """Draws of the prior of the experiment at this place among those of the file."""
-    prior = groups["prior"]
-    prior = prior.isel(experiment=at) if "experiment" in prior.dims else prior
-    return {str(name): values.values.reshape(-1) for name, values in prior.data_vars.items()}
+    return _one_of(groups["prior"], at)
 
 
-def _tree(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator) -> Any:
+def _groups(
+    fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator
+) -> dict[str, Group]:
     """The content of ``posterior.nc``: of one sample as if it stood alone, or of all samples."""
     problem, (m, draws, _) = fit.problem, fit.theta.shape
     members = list(problem.samples) if sample is None else [sample]
     few = np.unique(np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int))
     chosen = fit.theta[:, few].reshape(-1, fit.theta.shape[-1])
-    tree = _parameters_tree(fit, sample, members, rng)
+    groups = _of_parameters(fit, sample, members, rng)
     replicated = {s.name: np.moveaxis(replicate(problem, chosen, s, rng), -1, 0) for s in members}
-    groups = {
-        "posterior_predictive": _readings(members, replicated, (m, len(few))),
-        "log_likelihood": _log_likelihood(fit, members),
-        "observed_data": _readings(members, {s.name: np.moveaxis(s.readings, -1, 0) for s in members}, ()),
-        "constant_data": _protocols(members),
+    labels = _hold_coordinates(members, apart=sample is not None)
+    measured = {s.name: np.moveaxis(s.readings, -1, 0) for s in members}
+    groups |= {
+        "posterior_predictive": Group(_readings(members, replicated, (m, len(few))), labels | _steps(m, few)),
+        "log_likelihood": Group(_log_likelihood(fit, members), labels | _steps(m, np.arange(draws))),
+        "observed_data": Group(_readings(members, measured, ()), labels),
+        "constant_data": Group(_protocols(members), labels),
     }
-    sampled = {"posterior_predictive": few, "log_likelihood": np.arange(draws)}
-    for group, data in groups.items():
-        coords = _hold_coordinates(members, apart=sample is not None)
-        if group in sampled:
-            coords |= {"chain": np.arange(m), "draw": sampled[group]}
-        tree[group] = xr.DataTree(xr.Dataset(data, coords=coords))
-    _label(tree, fit, members, provenance)
-    return tree
+    _label(groups, fit, members, provenance)
+    return groups
 
 
-def _parameters_tree(fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: np.random.Generator) -> Any:
+def _of_parameters(
+    fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: np.random.Generator
+) -> dict[str, Group]:
     """Posterior and prior draws of the parameters, and the log density."""
-    problem = fit.problem
-    variables = _variables(problem, fit.theta, sample)
-    prior = problem.prior.rvs(2000, rng)
-    return arviz_base.from_dict(
-        {
-            "posterior": variables,
-            "sample_stats": {"lp": fit.log_density},
-            "prior": _variables(problem, prior[None], sample),
-        },
-        dims={name: ["experiment"] for name, v in variables.items() if v.ndim > 2},
-        coords={} if sample else {"experiment": [s.name for s in members]},
-    )
+    problem, (m, draws, _) = fit.problem, fit.theta.shape
+    prior = problem.prior.rvs(_PRIOR_DRAWS, rng)
+    experiments = Variable(("experiment",), np.array([s.name for s in members]))
+
+    def group(variables: Mapping[str, Array], steps: dict[str, Variable]) -> Group:
+        axes = ("chain", "draw", "experiment")
+        named = {name: Variable(axes[: values.ndim], values) for name, values in variables.items()}
+        return Group(named, steps | ({} if sample else {"experiment": experiments}))
+
+    return {
+        "posterior": group(_variables(problem, fit.theta, sample), _steps(m, np.arange(draws))),
+        "sample_stats": Group({"lp": Variable(("chain", "draw"), fit.log_density)}, _steps(m, np.arange(draws))),
+        "prior": group(_variables(problem, prior[None], sample), _steps(1, np.arange(_PRIOR_DRAWS))),
+    }
 
 
-def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Any]:
+def _steps(chains: int, draws: NDArray[np.int64]) -> dict[str, Variable]:
+    """Coordinates of draws."""
+    return {"chain": Variable(("chain",), np.arange(chains)), "draw": Variable(("draw",), draws)}
+
+
+def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Variable]:
     """Log density of each recorded hold given all others, at every draw."""
     m, draws, _ = fit.theta.shape
     samples = zip(_left_out(fit.problem, fit.flat), fit.problem.samples, strict=True)
     holds = np.concatenate([values[s.protocol.recorded] for values, s in samples if s in members])
-    return {_name(members, READ, _READING): (("chain", "draw", "hold"), holds.T.reshape(m, draws, -1))}
+    return {_name(members, READ, _READING): Variable(("chain", "draw", "hold"), holds.T.reshape(m, draws, -1))}
 
 
-def _label(tree: Any, fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> None:
+def _label(groups: Mapping[str, Group], fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> None:
     """Units of all variables, and what is needed to use the posterior without its experiment file."""
-    for group, node in tree.children.items():
-        node.attrs.clear()
-        for name, variable in node.data_vars.items():
-            if group in ("posterior", "prior"):
-                variable.attrs["units"] = unit_of(str(name), members[0].model.effects, _controls(members))
-            elif group in ("log_likelihood", "sample_stats"):
-                variable.attrs["units"] = "1"
-            elif str(name) in (_READING, _SETTING, "hold_mean", f"unrecorded_{_SETTING}"):
-                variable.attrs["units"] = "of the hold's control"
+    effects, controls = members[0].model.effects, _controls(members)
+    for kind, group in groups.items():
+        for name in group.variables:
+            if kind in ("posterior", "prior"):
+                unit = unit_of(name, effects, controls)
+            elif kind in ("log_likelihood", "sample_stats"):
+                unit = "1"
+            elif name in (_READING, _SETTING, "hold_mean", f"unrecorded_{_SETTING}"):
+                unit = "of the hold's control"
             else:
-                variable.attrs["units"] = _UNIT_IN_NAME.get(str(name).rsplit("_", 1)[-1], "1")
-    about = _about(fit, members, provenance)
-    tree["constant_data"].attrs["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
-    tree["posterior"].attrs.update(about)
-    tree.attrs.update({k: about[k] for k in ("wirebayes_version", "inference_library", "provenance")})
+                unit = _UNIT_IN_NAME.get(name.rsplit("_", 1)[-1], "1")
+            group.units[name] = unit
+    groups["constant_data"].attributes["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
+    groups["posterior"].attributes.update(_about(fit, members, provenance))
 
 
 def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -419,7 +429,7 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
     }
 
 
-def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Any]:
+def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Variable]:
     """Labels of the recorded holds: their numbers; of several experiments ``NAME:NUMBER``, one after the other.
 
     Unrecorded holds have no readings, so they are no part of this dimension: what is a missing value for one function
@@ -427,10 +437,11 @@ def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, An
     """
     number = np.concatenate([s.protocol.number[s.protocol.recorded] for s in members])
     if apart or len(members) == 1:
-        return {"hold": number}
+        return {"hold": Variable(("hold",), number)}
     names = np.repeat([s.name for s in members], [s.protocol.recorded.sum() for s in members])
-    labels = [f"{name}:{n}" for name, n in zip(names, number, strict=True)]
-    return {"hold": labels, "experiment": ("hold", names), "number": ("hold", number)}
+    labels = np.array([f"{name}:{n}" for name, n in zip(names, number, strict=True)])
+    each = {"hold": labels, "experiment": names, "number": number}
+    return {name: Variable(("hold",), values) for name, values in each.items()}
 
 
 def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
@@ -443,14 +454,14 @@ def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
     return np.concatenate(rows, axis=1)
 
 
-def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Any]:
+def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Variable]:
     """Readings of each hold, and their mean, which has the dimensions of the log-likelihood."""
     read, first = _stacked(members, values), ("chain", "draw") if shape else ()
     name = _name(members, READ, _READING)
     mean = "hold_mean" if name == _READING else f"hold_mean_{UNIT[name]}"
     return {
-        name: ((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
-        mean: ((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
+        name: Variable((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
+        mean: Variable((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
     }
 
 
@@ -471,7 +482,7 @@ def _tensions(sample: Sample) -> Array:
     return np.asarray(sample.readings[..., 0][sample.protocol.mask])
 
 
-def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
+def _protocols(members: Sequence[Sample]) -> dict[str, Variable]:
     """What was done: the recorded holds, and beside them the unrecorded ones, as an experiment file states them."""
     protocols = [s.protocol for s in members]
     recorded = np.concatenate([p.recorded for p in protocols])
@@ -481,27 +492,28 @@ def _protocols(members: Sequence[Sample]) -> dict[str, Any]:
 
     set_as = _name(members, SET, _SETTING)
     times = {s.name: s.protocol.time_s[None] for s in members}
-    out: dict[str, Any] = {
-        set_as: ("hold", each("setting")[recorded]),
-        "duration_s": ("hold", each("duration_s")[recorded]),
-        "time_s": (("hold", "time"), _stacked(members, times)[0]),
+    out = {
+        set_as: Variable(("hold",), each("setting")[recorded]),
+        "duration_s": Variable(("hold",), each("duration_s")[recorded]),
+        "time_s": Variable(("hold", "time"), _stacked(members, times)[0]),
     }
     if any(p.warming_K is not None for p in protocols):
         warming = {s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
                    for s, p in zip(members, protocols, strict=True)}  # fmt: skip
-        out["warming_K"] = (("hold", "time"), _stacked(members, warming)[0])
+        out["warming_K"] = Variable(("hold", "time"), _stacked(members, warming)[0])
     if set_as == _SETTING:
         controls = np.concatenate([np.full(len(p.number), p.control) for p in protocols])
-        out["control"] = ("hold", controls[recorded])
+        out["control"] = Variable(("hold",), controls[recorded])
     if not recorded.all():
         following = np.concatenate([_following(p.number) for p in protocols])
         names = np.repeat([s.name for s in members], [len(p.number) for p in protocols])
-        out |= {
-            "unrecorded_experiment": ("unrecorded_hold", names[~recorded]),
-            "unrecorded_before_hold": ("unrecorded_hold", following[~recorded]),
-            f"unrecorded_{set_as}": ("unrecorded_hold", each("setting")[~recorded]),
-            "unrecorded_duration_s": ("unrecorded_hold", each("duration_s")[~recorded]),
+        unrecorded = {
+            "unrecorded_experiment": names,
+            "unrecorded_before_hold": following,
+            f"unrecorded_{set_as}": each("setting"),
+            "unrecorded_duration_s": each("duration_s"),
         }
+        out |= {name: Variable(("unrecorded_hold",), values[~recorded]) for name, values in unrecorded.items()}
     return out
 
 
@@ -601,13 +613,14 @@ def band(values: Array) -> Statistics | None:
 def statistics(values: Array) -> Mixed:
     """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
     q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
+    of_chains = array_statistics()
     with np.errstate(invalid="ignore"):
         return {
             "mean": float(values.mean()), "sd": float(values.std(ddof=1)),
             "q05": float(q05), "q50": float(q50), "q95": float(q95),
-            "ess_bulk": float(arviz_stats.ess(values, method="bulk")),
-            "ess_tail": float(arviz_stats.ess(values, method="tail", prob=(0.05, 0.95))),
-            "r_hat": float(arviz_stats.rhat(values)),
+            "ess_bulk": float(of_chains.ess(values, method="bulk")),
+            "ess_tail": float(of_chains.ess(values, method="tail", prob=(0.05, 0.95))),
+            "r_hat": float(of_chains.rhat(values)),
         }  # fmt: skip
 
 

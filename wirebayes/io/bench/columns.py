@@ -61,6 +61,12 @@ _OF_SAMPLE: dict[Role, tuple[str, ...]] = {
         "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "s", "应力", "応力",
     ),
 }  # fmt: skip
+# What a rig calls its weights, and the gauge that reads the wire: only where no column speaks of the quantity itself.
+_OF_RIG: dict[Role, tuple[str, ...]] = {
+    "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok"),
+    "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
+}  # fmt: skip
+_LEAST_WIDE = 3  # columns of tensions that make a table with one for each time; two may be two load cells
 _NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
 _BRACKET = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
@@ -119,7 +125,7 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
             open_questions[known] = question
     free = [i for i, name in enumerate(table.header) if name and i not in taken]
     for role in [role for role in ROLES if role not in roles and role not in open_questions]:
-        likely = [i for i in free if _may_be(table, i, role)]
+        likely = [i for i in free if _may_be(table, i, role)] or [i for i in free if _is_of_rig(table, i, role)]
         try:
             if likely:
                 roles[role] = _one(table, likely, role)
@@ -297,6 +303,13 @@ def _may_be(table: RawTable, index: int, role: Role) -> bool:
     return _speaks_of(name, role) or (role in units and plain(name) in _LETTERS.get(role, ()))
 
 
+def _is_of_rig(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column with a unit of the quantity has a name of `_OF_RIG`."""
+    name, unit = name_and_unit(table.header[index], role)
+    unit = unit_of(table.units[index], role) or unit
+    return unit is not None and bool(set(_words(name)) & set(_OF_RIG.get(role, ())))
+
+
 def _has_foreign_unit(header: str, row_unit: str) -> bool:
     """Whether a column is said to be in a unit that no quantity of a test has."""
     if row_unit not in _NO_UNIT:
@@ -367,6 +380,9 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     hint = ""
     if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
         hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
+    tensions = [i for i in free if name_and_unit(table.header[i], "tension")[1]]
+    if {"time", "tension"} <= set(missing) and len(tensions) >= _LEAST_WIDE:
+        hint += "; a table with a column for each time has to be turned into one with a row for each reading"
     place = f"{table.sheet.path}, line {table.header_line}: found no column of"
     with_units = " ".join(f'--map "HEADER={missed} [{UNITS[missed]}]"' for missed in missing)
     message = (

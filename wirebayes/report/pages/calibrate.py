@@ -25,6 +25,7 @@ from wirebayes.report.blocks import (
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.sentences import counted
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -102,7 +103,7 @@ def _done(found: CalibrateJson) -> Points:
     )
     known = [f"{name} were known to {sd:g} mm" for name, sd in stated if sd]
     return Points("What was done", [
-        f"{found['holds']} holds, tensions read in {found['read']} of them.",
+        f"{counted(found['holds'], 'hold')}, tensions read in {found['read']} of them.",
         *([f"Before, {' and '.join(known)}."] if known else []),
         f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line were "
         f"assumed to differ by {100 * prior['specimen_spread']:g} %.",

@@ -25,6 +25,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.sentences import counted
 
 _CAPTIONS = {
     "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
@@ -86,27 +87,28 @@ def _requested(pose: PoseHistoryJson) -> list[str]:
     model = f"the plain model with {effects}" if effects else "the plain model"
     kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
     out = [
-        f"{history['rows']} rows of {kind} over {number(float(history['duration_s']))} s; platform of "
+        f"{counted(history['rows'], 'row')} of {kind} over {number(float(history['duration_s']))} s; platform of "
         f"{pose['mass_kg']:g} kg"
         + (f", payload up to {history['highest_payload_kg']:g} kg." if history["highest_payload_kg"] else "."),
         f"Wires known from {wires['draws']} posterior draws of a sample of {wires['tested_length_mm']:g} mm: {model}. "
         f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. {_began(history)}",
     ]
     out += specimens_in_words(wires)
+    started = f"The wires' clocks started {counted(history['holds'], 'time')}"
     if history["restart_share"] is None:
-        out.append(f"The wires' clocks started {history['holds']} times, as the column hold says.")
+        out.append(f"{started}, as the column hold says.")
     else:
         out.append(
-            f"The wires' clocks started {history['holds']} times: when a command or a load had changed a tension by "
+            f"{started}: when a command or a load had changed a tension by "
             f"more than {100 * history['restart_share']:g} % of the mean tension."
         )
     readings = pose.get("readings")
     if readings:
         out.append(
-            f"{readings['tensions']} tensions (standard error {readings['tension_sd_N']:g} N) and {readings['tilts']} "
-            f"inclinations ({readings['tilt_sd_rad']:g} rad) were read; mean squared residual "
-            f"{number(readings['misfit'])}. Given them, the draws are worth {number(readings['effective_draws'], 2)} "
-            "independent ones."
+            f"{counted(readings['tensions'], 'tension')} (standard error {readings['tension_sd_N']:g} N) and "
+            f"{counted(readings['tilts'], 'inclination')} ({readings['tilt_sd_rad']:g} rad) were read; "
+            f"mean squared residual {number(readings['misfit'])}. Given them, the draws are worth "
+            f"{number(readings['effective_draws'], 2)} independent ones."
         )
     return out
 
@@ -118,9 +120,9 @@ def _began(history: HistoryOfRobot) -> str:
         return "They were new at the first row."
     sd = known["reference_error_mm"]["sd"]
     return (
-        f"The history goes on where a calibration of {known['holds']} holds and {_seconds(known['duration_s'])} s "
-        "ended: its posterior gives the wires, their creep so far and their reference lengths, which it knows to "
-        f"{span(min(sd), max(sd), 2)} mm (standard error)."
+        f"The history goes on where a calibration of {counted(known['holds'], 'hold')} and "
+        f"{_seconds(known['duration_s'])} s ended: its posterior gives the wires, their creep so far and their "
+        f"reference lengths, which it knows to {span(min(sd), max(sd), 2)} mm (standard error)."
     )
 
 

@@ -1,0 +1,40 @@
+"""Logs of dead weights: masses hung on a wire and the dial gauge beside it, and tables that are wide."""
+
+import pytest
+
+import wirebayes as wb
+from wirebayes.errors import InputError
+
+ROWS = [
+    (step, mass, 60 * minute, 1.0 * step + 0.1 * minute) for step, mass in ((1, 0.2), (2, 0.4)) for minute in (0, 1, 5)
+]
+
+
+def written(path, header, cells):
+    path.write_text("\n".join([header, *(",".join(map(str, row)) for row in cells)]) + "\n")
+    return path
+
+
+def test_masses_and_a_dial_gauge_are_known_by_their_names(tmp_path):
+    file = written(tmp_path / "log.csv", "step,mass (kg),time (s),dial (mm)", ROWS)
+    wb.import_bench(file, length_mm=1500, material="Kevlar", output=tmp_path / "out")
+    (test,) = wb.read_experiments(tmp_path / "out" / "log.toml")
+    assert test.control == "force"
+    assert [hold.setting for hold in test.recorded_holds] == pytest.approx([0.2 * 9.80665, 0.4 * 9.80665])
+
+
+def test_a_column_that_speaks_of_a_force_comes_before_a_mass(tmp_path):
+    rows = [(step, mass, time, float(step), 3.0 * step - 0.001 * time) for step, mass, time, _ in ROWS]
+    file = written(tmp_path / "log.csv", "step,mass (kg),time (s),Position (mm),Load (N)", rows)
+    imported = wb.import_bench(file, length_mm=1500, material="Kevlar", output=tmp_path / "out")
+    assert "tension from 'Load (N)'" in str(imported)
+
+
+def test_a_table_with_a_column_for_each_time_is_told_to_be_turned(tmp_path):
+    file = written(tmp_path / "wide.csv", "Position (mm),F 0 s (N),F 10 s (N),F 60 s (N)", [(1, 1.2, 1.1, 1.0)])
+    with pytest.raises(InputError, match="a column for each time has to be turned"):
+        wb.import_bench(file, length_mm=800, material="rope", output=tmp_path / "out")
+    two = written(tmp_path / "two.csv", "Position (mm),A (N),B (N)", [(1, 1.2, 1.1)])
+    with pytest.raises(InputError) as error:
+        wb.import_bench(two, length_mm=800, material="rope", output=tmp_path / "out")
+    assert "turned" not in str(error.value)
