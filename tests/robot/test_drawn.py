@@ -103,11 +103,13 @@ def test_drift_agrees_with_a_stiff_integrator_at_every_time(kind):
     assert spun.max() < 1e-2
 
 
-@pytest.mark.parametrize(("kind", "seed"), TOP_HEAVY[:1])
+@pytest.mark.parametrize(
+    ("kind", "seed"), [TOP_HEAVY[0], *(pytest.param(*other, marks=pytest.mark.slow) for other in TOP_HEAVY[1:])]
+)
 def test_falls_are_found_at_their_time_and_reported(kind, seed):
     d = _top_heavy(kind, seed)
     off, spun, ours, theirs = _drift(d)
-    assert ours == pytest.approx(theirs, rel=0.02)
+    assert ours == pytest.approx(theirs, rel=2e-3)
     assert off.max(initial=0) < 2e-3
     assert spun.max(initial=0) < 1e-2
     course = drift.from_command(d.robot, draws.for_robot(d.robot, d.line), d.position_m, d.rotation, TIMES)

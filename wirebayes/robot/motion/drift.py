@@ -81,6 +81,9 @@ _TOLERANCE = 2e-4  # of the creep so far, a step: the drift is then right to .2 
 _FIRST = 0.02  # first step tried, in creep's own clock k2 t^N
 # of the way so far: so short a step is taken whatever its error, which a shorter one would not make smaller
 _LEAST_STEP = 1e-4
+# of the way so far: the longest step in which a platform may fall. Where within it is told by a straight line, while
+# creep runs away as the square root of the time that is left: a twentieth of the step is then a thousandth of the time.
+_FALL_STEP = 0.02
 _RESOLVED = 1e-6  # of all creep that tension leads to: what grows less is rounding in tensions, not a drift
 _POWERS = 0.1, 3.0  # of time, between which steps are laid; draws of an estimate may have any N
 
@@ -261,6 +264,8 @@ class Walk:
             return worst
         here = self._settle(last, time, there.here)
         fell = self.live & ~(there.here.found & here.found)
+        if fell.any() and not least and 1.0 - (now / time) ** self.power > _FALL_STEP:
+            return np.inf
         self._note(fell, there, here, (now, time))
         if creep.follow == "current":
             last.amount = np.where(self.live, creep.amount_at(here.tension_N.T), creep.amount)
